@@ -1,0 +1,1 @@
+"""Files out (formats), files in (solutions), local solvers, drawing, command line."""

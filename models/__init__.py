@@ -1,0 +1,1 @@
+"""The mathematics: sketch, instance, formulations, problem, field. Knows no file format of a solver."""

@@ -1,0 +1,200 @@
+"""An instance: what a formulation needs to know of a sketch. Frozen and validated."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+
+from .angles import wrap
+from .errors import InstanceError
+from .grid import Bools, Floats, Grid, Ints
+
+Gauge = Literal["strokes", "box"]
+GAUGES: Final[tuple[str, ...]] = get_args(Gauge)
+
+QUARTER: Final = np.pi / 4
+HALF: Final = np.pi / 2
+_SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+"""Instance names: lower case, digits and underscores, at most 32 characters, as instance libraries ask for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A mask with stroke directions on some of its pixels, and the weights of the energy.
+
+    name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
+    mask: bool [height, width], row 0 at the top; True = solve for this pixel.
+    stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
+    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi.
+    w: float (s,), reliability of each direction in (0, 1].
+    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6).
+    gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
+    source: where the sketch came from, one line of text.
+    pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
+    corner of pixel [0, 0], with y downwards as sketches have it.
+
+    Raises InstanceError when a rule is broken. Section 1 and 2 of the formulation notes.
+    """
+
+    name: str
+    mask: Bools
+    stroke_pixels: Ints
+    theta: Floats
+    w: Floats
+    w_strokes: float = 1.0
+    w_beta: float = 1e-6
+    gauge: Gauge = "strokes"
+    source: str = ""
+    pixel_size: float = 1.0
+    origin: tuple[float, float] = field(default=(0.0, 0.0))
+
+    def __post_init__(self) -> None:
+        """Take over read-only copies in the documented types, then check every rule."""
+        self._freeze("mask", np.asarray(self.mask, dtype=bool))
+        self._freeze("stroke_pixels", np.asarray(self.stroke_pixels, dtype=np.int32).reshape(-1, 2))
+        self._freeze("theta", np.asarray(self.theta, dtype=np.float64))
+        self._freeze("w", np.asarray(self.w, dtype=np.float64))
+        object.__setattr__(self, "origin", (float(self.origin[0]), float(self.origin[1])))
+        for name in ("w_strokes", "w_beta", "pixel_size"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+        self._check_scalars()
+        self._check_strokes()
+        self._freeze("theta", wrap(self.theta, 0.0, np.pi))
+
+    def _freeze(self, name: str, value: Any) -> None:
+        value = value.copy()
+        value.setflags(write=False)
+        object.__setattr__(self, name, value)
+
+    def _check_scalars(self) -> None:
+        if not NAME.fullmatch(self.name):
+            raise InstanceError(
+                f"the name {self.name[:40]!r} is not allowed; use a lower-case letter, then at most 31 lower-case letters, digits and underscores"
+            )
+        if self.gauge not in GAUGES:
+            raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
+        for name in ("w_strokes", "w_beta"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise InstanceError(f"{name} is {value}; it must be a finite number, not negative")
+        if not (np.isfinite(self.pixel_size) and self.pixel_size > 0):
+            raise InstanceError(f"pixel_size is {self.pixel_size}; it must be a positive number")
+        if not np.isfinite(self.origin).all():
+            raise InstanceError(f"origin is {self.origin}; it must be two finite numbers")
+        if "\n" in self.source or "\r" in self.source:
+            raise InstanceError("source holds a line break; give one line of text")
+
+    def _check_strokes(self) -> None:
+        if self.mask.ndim != 2 or not self.mask.any():
+            raise InstanceError("the mask has no pixel to solve for; draw something white in it")
+        if max(self.mask.shape) > 9999:
+            raise InstanceError(f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; at most 9999 pixels a side are allowed")
+        count = len(self.stroke_pixels)
+        if self.theta.shape != (count,) or self.w.shape != (count,):
+            raise InstanceError(f"{count} stroke pixels need as many theta and w, but there are {self.theta.size} and {self.w.size}")
+        if count == 0:
+            raise InstanceError("no stroke lies inside the mask; move the mask or draw a curvature line")
+        for label, wrong in (
+            ("theta is not a finite number", ~np.isfinite(self.theta)),
+            ("w is not in (0, 1]", ~((self.w > 0) & (self.w <= 1))),
+            ("is outside the mask", ~self._inside()),
+        ):
+            if wrong.any():
+                row, column = self.stroke_pixels[int(np.argmax(wrong))]
+                raise InstanceError(f"stroke pixel [{row}, {column}]: {label} ({int(wrong.sum())} in all)")
+        key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
+        if (np.diff(key) <= 0).any():
+            row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
+            raise InstanceError(f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row")
+
+    def _inside(self) -> Bools:
+        row, column = self.stroke_pixels.T
+        height, width = self.mask.shape
+        on_grid = (row >= 0) & (column >= 0) & (row < height) & (column < width)
+        return on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The pixels, numbered, with their neighbour pairs."""
+        return Grid(self.mask)
+
+    @cached_property
+    def stroke_index(self) -> Ints:
+        """Pixel number of each stroke pixel, shape (s,)."""
+        row, column = self.stroke_pixels.T
+        return self.grid.number[row, column]
+
+    @cached_property
+    def target(self) -> Floats:
+        """theta in the gauge's own range: [-pi/4, 3 pi/4) for `box`, [0, pi) for `strokes`; shape (s,)."""
+        return wrap(self.theta, -QUARTER, np.pi) if self.gauge == "box" else self.theta
+
+    @cached_property
+    def alpha_lower(self) -> Floats:
+        """Lower end of each pixel's window of alpha, shape (n,). The upper end is pi/2 above."""
+        lower = np.zeros(self.grid.size)
+        if self.gauge == "strokes":
+            lower[self.stroke_index] = self.target - QUARTER
+        return lower
+
+    @cached_property
+    def alpha_upper(self) -> Floats:
+        """Upper end of each pixel's window of alpha, shape (n,)."""
+        upper = np.full(self.grid.size, HALF)
+        if self.gauge == "strokes":
+            upper[self.stroke_index] = self.target + QUARTER
+        return upper
+
+    @cached_property
+    def p_min(self) -> Ints:
+        """Least useful jump of each pair, shape (m,): floor(-2 d_hi / pi)."""
+        d_hi = self.alpha_upper[self.grid.first] - self.alpha_lower[self.grid.second]
+        return np.floor(-2 * d_hi / np.pi + _SLACK).astype(np.int32)
+
+    @cached_property
+    def p_max(self) -> Ints:
+        """Greatest useful jump of each pair, shape (m,): ceil(-2 d_lo / pi)."""
+        d_lo = self.alpha_lower[self.grid.first] - self.alpha_upper[self.grid.second]
+        return np.ceil(-2 * d_lo / np.pi - _SLACK).astype(np.int32)
+
+    def with_gauge(self, gauge: Gauge) -> Instance:
+        """The same instance under another gauge."""
+        return replace(self, gauge=gauge)
+
+    def turned(self) -> Instance:
+        """The instance of the sketch turned by a quarter counter-clockwise."""
+        row, column = self.stroke_pixels.T
+        pixels = np.stack([self.mask.shape[1] - 1 - column, row], axis=1)
+        return self._moved(np.rot90(self.mask), pixels, self.theta + HALF)
+
+    def mirrored(self) -> Instance:
+        """The instance of the sketch mirrored left to right."""
+        row, column = self.stroke_pixels.T
+        pixels = np.stack([row, self.mask.shape[1] - 1 - column], axis=1)
+        return self._moved(self.mask[:, ::-1], pixels, np.pi - self.theta)
+
+    def transposed(self) -> Instance:
+        """The instance with rows and columns exchanged: mirrored at the line from top left to bottom right."""
+        return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -HALF - self.theta)
+
+    def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:
+        order = np.lexsort((pixels[:, 1], pixels[:, 0]))
+        return replace(self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order])
+
+    @cached_property
+    def sha256(self) -> str:
+        """64 hexadecimal digits that stand for the whole content; equal for equal instances only."""
+        digest = hashlib.sha256(b"crossfield-instance 1\n")
+        for text in (self.name, self.gauge, self.source):
+            digest.update(text.encode() + b"\0")
+        scalars = np.array([*self.mask.shape, self.w_strokes, self.w_beta, self.pixel_size, *self.origin], dtype="<f8")
+        for array in (scalars, np.packbits(self.mask), self.stroke_pixels.astype("<i4"), self.theta.astype("<f8"), self.w.astype("<f8")):
+            digest.update(array.tobytes())
+        return digest.hexdigest()
