@@ -1,0 +1,148 @@
+"""The symbols of the formulations: which quantity each one means, and where on the grid it lives.
+
+A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels S_c or the
+neighbour pairs E. A *slot* is a symbol in an expression over such a set; it names a quantity and the way to it: over the
+pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a sketch changes the length of the index
+arrays, never an expression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import sympy as sp
+
+from .grid import Floats, Ints
+from .instance import HALF, QUARTER, Instance
+
+IndexSet = Literal["pixels", "strokes", "pairs"]
+Way = Literal["itself", "first", "second", "stroke"]
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", "psi"))
+alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
+p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
+p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
+w_strokes, w_beta = (_symbol(name) for name in ("w_strokes", "w_beta"))
+pi: Final = sp.pi
+
+A: Final = alpha_i - alpha_j + pi / 2 * (p1 + 2 * p2)
+"""Change of direction across a pair, (8)."""
+B: Final = (1 - 2 * p1) * beta_i - beta_j
+"""Change of skew across a pair, bilinear, (8)."""
+B_LIFTED: Final = beta_i - 2 * z - beta_j
+"""Change of skew with z standing for p1 beta_i, section 4."""
+R: Final = alpha + beta - theta
+"""Deviation of line u from its stroke, (5)."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A block of columns: one variable per element of an index set.
+
+    lower, upper: bounds as arrays or numbers of an instance; value: the variable at a given field, as an expression
+    over its index set; latex: how mathematics writes it; meaning: one line for the docs.
+    """
+
+    name: str
+    over: IndexSet
+    integer: bool
+    lower: Callable[[Instance], Floats | Ints | float]
+    upper: Callable[[Instance], Floats | Ints | float]
+    value: sp.Expr
+    latex: str
+    meaning: str
+
+
+_FREE: Final = float("inf")
+
+VARIABLES: Final = {
+    variable.name: variable
+    for variable in (
+        Variable("alpha", "pixels", False, lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, r"\alpha", "direction of the cross"),
+        Variable("beta", "pixels", False, lambda _: -QUARTER, lambda _: QUARTER, beta, r"\beta", "skew of the cross"),
+        Variable("p", "pairs", True, lambda i: i.p_min, lambda i: i.p_max, p, "p", "jump between the labels of two neighbours"),
+        Variable("p1", "pairs", True, lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "p^{1}", "1 when the jump is odd"),
+        Variable("p2", "pairs", True, lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "p^{2}", "half of the even part of the jump"),
+        Variable("s", "pairs", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "s", "absolute change of direction"),
+        Variable("t", "pairs", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "t", "absolute change of skew"),
+        Variable("z", "pairs", False, lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "z", "the product of p1 and beta of the first pixel"),
+        Variable("d", "pairs", False, lambda _: -_FREE, lambda _: _FREE, A, "d", "change of direction"),
+        Variable("u", "pairs", False, lambda _: -_FREE, lambda _: _FREE, B, "u", "change of skew"),
+        Variable("gamma", "strokes", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(R), r"\gamma", "absolute deviation from a stroke"),
+        Variable("psi", "pixels", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), r"\psi", "absolute skew"),
+    )
+}
+"""Every variable of every formulation, in the order of columns."""
+
+SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
+    "pixels": {alpha: ("alpha", "itself"), beta: ("beta", "itself"), psi: ("psi", "itself")},
+    "strokes": {
+        alpha: ("alpha", "stroke"),
+        beta: ("beta", "stroke"),
+        gamma: ("gamma", "itself"),
+        theta: ("theta", "itself"),
+        w: ("w", "itself"),
+    },
+    "pairs": {
+        alpha_i: ("alpha", "first"),
+        alpha_j: ("alpha", "second"),
+        beta_i: ("beta", "first"),
+        beta_j: ("beta", "second"),
+        **{symbol: (symbol.name, "itself") for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max)},
+    },
+}
+"""For each index set: symbol -> (quantity, way to it)."""
+
+SCALARS: Final = {w_strokes: "w_strokes", w_beta: "w_beta"}
+"""Symbols that are one number for the whole instance."""
+
+LATEX: Final = {
+    **{symbol: VARIABLES[symbol.name].latex for symbol in (alpha, beta, gamma, psi)},
+    **{symbol: VARIABLES[symbol.name].latex + "_{ij}" for symbol in (p, p1, p2, s, t, z, d, u)},
+    alpha: r"\alpha_i",
+    beta: r"\beta_i",
+    gamma: r"\gamma_i",
+    psi: r"\psi_i",
+    alpha_i: r"\alpha_i",
+    alpha_j: r"\alpha_j",
+    beta_i: r"\beta_i",
+    beta_j: r"\beta_j",
+    p1: r"p^{1}_{ij}",
+    p2: r"p^{2}_{ij}",
+    p_min: r"p^{\min}_{ij}",
+    p_max: r"p^{\max}_{ij}",
+    theta: r"\theta_i",
+    w: r"w_i",
+    w_strokes: r"w_{\mathrm{strokes}}",
+    w_beta: r"w_{\beta}",
+}
+
+
+def elements(instance: Instance, over: IndexSet) -> int:
+    """Number of elements of an index set."""
+    sizes = {"pixels": instance.grid.size, "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
+    return sizes[over]
+
+
+def way(instance: Instance, kind: Way) -> Ints | slice:
+    """Index array that leads from the elements of a family to the elements of a quantity."""
+    if kind == "first":
+        return instance.grid.first
+    if kind == "second":
+        return instance.grid.second
+    return instance.stroke_index if kind == "stroke" else slice(None)
+
+
+def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
+    """A NumPy function of the symbols that evaluates the expression over whole arrays."""
+    return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
+
+
+__all__ = ["HALF", "LATEX", "SCALARS", "SLOTS", "VARIABLES", "A", "B", "B_LIFTED", "R", "Variable", "elements", "numeric", "way"]

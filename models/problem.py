@@ -1,0 +1,392 @@
+"""A problem: a formulation bound to an instance. Columns, rows and terms as arrays; values and violations at points.
+
+Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the declaration: SymPy splits an
+expression into monomials once per family, index arrays do the rest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import sympy as sp
+
+from .errors import FormulationError, InstanceError
+from .field import CrossField
+from .formulations import FORMULATIONS, Family, Formulation, declare, lift_products
+from .grid import Bools, Floats, Ints
+from .instance import Instance
+from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, elements, numeric, way
+
+Coefficient = float | Floats
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of columns: offset of the first one, bounds (count,), and whether they are integer."""
+
+    name: str
+    over: IndexSet
+    offset: int
+    lower: Floats
+    upper: Floats
+    integer: bool
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.lower)
+
+    @property
+    def columns(self) -> slice:
+        """The columns as a slice of a point."""
+        return slice(self.offset, self.offset + self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A monomial of a family: column index arrays of its factors and its coefficient (a number or one per element)."""
+
+    factors: tuple[Ints, ...]
+    coefficient: Coefficient
+
+    @property
+    def degree(self) -> int:
+        """Number of factors."""
+        return len(self.factors)
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A family bound to an instance: where its elements are and which columns its symbols mean.
+
+    elements: indices into the family's index set, shape (count,). `terms` is None for what is no polynomial.
+    """
+
+    family: Family
+    problem: Problem
+    elements: Ints
+
+    @property
+    def count(self) -> int:
+        """Number of rows, or of summands of the objective."""
+        return len(self.elements)
+
+    @cached_property
+    def variables(self) -> tuple[sp.Symbol, ...]:
+        """Symbols that mean columns."""
+        slots = SLOTS[self.family.over]
+        return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
+
+    def columns(self, symbol: sp.Symbol) -> Ints:
+        """Column of the symbol at each element, shape (count,)."""
+        name, kind = SLOTS[self.family.over][symbol]
+        return self._reach(np.arange(self.problem.blocks[name].count, dtype=np.int32), kind) + np.int32(self.problem.blocks[name].offset)
+
+    def _reach(self, values: Any, kind: Any) -> Any:
+        index = way(self.problem.instance, kind)
+        return values[self.elements] if isinstance(index, slice) else values[index[self.elements]]
+
+    def data(self, expression: sp.Expr) -> Coefficient:
+        """Value of an expression free of columns: a number, or an array (count,)."""
+        symbols = sorted(expression.free_symbols, key=str)
+        if not symbols:
+            return float(expression)
+        value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
+        return value if np.ndim(value) else float(value)
+
+    def _datum(self, symbol: sp.Symbol) -> Any:
+        if symbol in SCALARS:
+            return getattr(self.problem.instance, SCALARS[symbol])
+        name, kind = SLOTS[self.family.over][symbol]
+        return self._reach(self.problem.data[name], kind)
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...] | None:
+        """Its monomials, the constant one included, or None when it is no polynomial."""
+        try:
+            polynomial = sp.Poly(self.family.body, *self.variables) if self.variables else None
+        except sp.PolynomialError:
+            return None
+        if polynomial is None:
+            return (Term((), self.data(self.family.body)),)
+        return tuple(
+            Term(tuple(self.columns(s) for s, power in zip(self.variables, powers, strict=True) for _ in range(power)), self.data(c))
+            for powers, c in sorted(polynomial.terms(), key=lambda term: (sum(term[0]), tuple(-power for power in term[0])))
+            if c != 0
+        )
+
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomial; 99 for what is none."""
+        return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
+
+    def of_degree(self, degree: int) -> tuple[Term, ...]:
+        """Its monomials of that degree."""
+        return tuple(term for term in self.terms or () if term.degree == degree)
+
+    @cached_property
+    def limit(self) -> Floats:
+        """Right side of each row once its constant has moved there, shape (count,)."""
+        constant = sum((np.asarray(term.coefficient) for term in self.of_degree(0)), np.zeros(()))
+        return np.broadcast_to(0.0 - constant, (self.count,))
+
+    def values(self, point: Floats) -> Floats:
+        """The expression (of a row: left minus right side) at a point, one value per element, shape (count,)."""
+        symbols = sorted(self.family.body.free_symbols, key=str)
+        evaluate = numeric(symbols, self.family.body)
+        given = (point[self.columns(symbol)] if symbol in self.variables else self._datum(symbol) for symbol in symbols)
+        return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
+
+
+@dataclass(frozen=True)
+class Violation:
+    """The worst violations of a point: of rows, of bounds, of integrality; zero when there is none."""
+
+    rows: float
+    bounds: float
+    integrality: float
+    worst_family: str
+
+    @property
+    def worst(self) -> float:
+        """The largest of the three."""
+        return max(self.rows, self.bounds, self.integrality)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A formulation bound to an instance. jumps: the data p of `qp-fixed`, shape (m,), else None."""
+
+    instance: Instance
+    formulation: Formulation
+    jumps: Ints | None = None
+
+    def __post_init__(self) -> None:
+        """Check that jumps are there exactly where they are data."""
+        if (self.jumps is None) == bool(self.formulation.fixed):
+            raise FormulationError(
+                f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
+                if self.formulation.fixed
+                else f"{self.formulation.name} has the jumps as variables; leave p out"
+            )
+        if self.jumps is not None:
+            jumps = np.array(self.jumps, dtype=np.int32)
+            if jumps.shape != (elements(self.instance, "pairs"),):
+                raise FormulationError(f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs")
+            object.__setattr__(self, "jumps", jumps)
+
+    @property
+    def name(self) -> str:
+        """Name of its formulation."""
+        return self.formulation.name
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """Arrays that symbols may mean beside columns."""
+        data: dict[str, Any] = {
+            "theta": self.instance.target,
+            "w": self.instance.w,
+            "p_min": self.instance.p_min,
+            "p_max": self.instance.p_max,
+        }
+        if self.jumps is not None:
+            data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
+        return data
+
+    @cached_property
+    def blocks(self) -> dict[str, Block]:
+        """Blocks of columns by name, in column order."""
+        blocks: dict[str, Block] = {}
+        offset = 0
+        for name in self.formulation.variables:
+            variable = VARIABLES[name]
+            shape = (elements(self.instance, variable.over),)
+            lower, upper = (
+                np.broadcast_to(np.asarray(bound(self.instance), dtype=np.float64), shape) for bound in (variable.lower, variable.upper)
+            )
+            blocks[name] = Block(name, variable.over, offset, lower, upper, variable.integer and not self.formulation.options.relax)
+            offset += shape[0]
+        return blocks
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return sum(block.count for block in self.blocks.values())
+
+    @cached_property
+    def lower(self) -> Floats:
+        """Lower bounds of all columns."""
+        return np.concatenate([block.lower for block in self.blocks.values()])
+
+    @cached_property
+    def upper(self) -> Floats:
+        """Upper bounds of all columns."""
+        return np.concatenate([block.upper for block in self.blocks.values()])
+
+    @cached_property
+    def integer(self) -> Bools:
+        """True for integer columns."""
+        return np.concatenate([np.full(block.count, block.integer) for block in self.blocks.values()])
+
+    @cached_property
+    def objective(self) -> tuple[Bound, ...]:
+        """Terms of the objective bound to the instance, empty ones left out."""
+        return self._bind(self.formulation.objective)
+
+    @cached_property
+    def rows(self) -> tuple[Bound, ...]:
+        """Families of rows bound to the instance, in row order, empty ones left out."""
+        return self._bind(self.formulation.rows)
+
+    def _bind(self, families: tuple[Family, ...]) -> tuple[Bound, ...]:
+        bound = (Bound(family, self, self._elements(family)) for family in families)
+        return tuple(family for family in bound if family.count)
+
+    def _elements(self, family: Family) -> Ints:
+        if family.only is None:
+            return np.arange(elements(self.instance, family.over), dtype=np.int32)
+        name, parity = family.only
+        return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows."""
+        return sum(family.count for family in self.rows)
+
+    @cached_property
+    def objective_degree(self) -> int:
+        """Degree of the objective; 99 when it is no polynomial."""
+        return max((family.degree for family in self.objective), default=0)
+
+    @cached_property
+    def row_degree(self) -> int:
+        """Greatest degree of a row; 99 when one is no polynomial, 0 without rows."""
+        return max((family.degree for family in self.rows), default=0)
+
+    @property
+    def problem_class(self) -> str:
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP, by what is in it (any QP and MIQP may be non-convex: see `convex`)."""
+        integer = "MI" if self.integer.any() else ""
+        if max(self.objective_degree, self.row_degree) > 2:
+            return f"{integer}NLP"
+        if self.row_degree == 2:
+            return f"{integer}QCP"
+        if self.objective_degree == 2:
+            return f"{integer}QP"
+        return f"{integer}LP"
+
+    @property
+    def convex(self) -> bool:
+        """Whether its continuous relaxation is known to be convex."""
+        return self.formulation.convex
+
+    def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
+        """The monomials of that degree, each set of columns once, sorted: columns (k, degree) and coefficients (k,).
+
+        Coefficients that cancel are left out. Shape (1, 0) for the constant.
+        """
+        terms = [(term, family.count) for family in self.objective for term in family.of_degree(degree)]
+        if degree == 0:
+            total = sum(float(np.sum(np.broadcast_to(term.coefficient, (count,)))) for term, count in terms)
+            return np.zeros((1, 0), np.int32), np.array([total])
+        if not terms:
+            return np.zeros((0, degree), np.int32), np.zeros(0)
+        index = np.concatenate([np.sort(np.stack(term.factors, axis=1), axis=1) for term, _ in terms])
+        coefficient = np.concatenate([np.broadcast_to(term.coefficient, (count,)) for term, count in terms])
+        return _merge(index, coefficient, self.columns)
+
+    def objective_value(self, point: Floats) -> float:
+        """The objective at a point (columns,)."""
+        return float(sum(np.sum(family.values(point)) for family in self.objective))
+
+    def violation(self, point: Floats) -> Violation:
+        """The worst violations of rows, bounds and integrality at a point (columns,)."""
+        worst = {family.family.tag: float(np.max(_excess(family.family.sense, family.values(point)))) for family in self.rows}
+        tag = max(worst, key=lambda name: worst[name], default="")
+        bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
+        gaps = np.abs(point - np.round(point))[self.integer]
+        return Violation(
+            rows=max(worst.get(tag, 0.0), 0.0),
+            bounds=float(bounds.max(initial=0.0)),
+            integrality=float(gaps.max(initial=0.0)),
+            worst_family=tag,
+        )
+
+    def point(self, field: CrossField) -> Floats:
+        """The complete point of a field: angles, jumps, and every other column at the value it stands for."""
+        if field.instance.sha256 != self.instance.sha256:
+            raise InstanceError(f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, or under another gauge")
+        p = field.p.astype(np.int64)
+        given = {"alpha": field.alpha, "beta": field.beta, "p": p, "p1": p & 1, "p2": p >> 1}
+        return np.concatenate([_at_field(self, name, given) for name in self.blocks])
+
+    def field(self, point: Floats) -> CrossField:
+        """The cross field of a point, jumps rounded to the nearest integer."""
+        if self.jumps is not None:
+            jumps = self.jumps
+        elif "p" in self.blocks:
+            jumps = np.round(point[self.blocks["p"].columns]).astype(np.int32)
+        else:
+            jumps = np.round(point[self.blocks["p1"].columns] + 2 * np.round(point[self.blocks["p2"].columns])).astype(np.int32)
+        return CrossField(self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps)
+
+    @cached_property
+    def sha256(self) -> str:
+        """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
+        text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {self.formulation.lifted}"
+        jumps = b"" if self.jumps is None else self.jumps.astype("<i4").tobytes()
+        return hashlib.sha256(text.encode() + jumps).hexdigest()
+
+
+def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
+    """The block of columns `name` where angles and jumps have the given values, from the variable's own definition."""
+    if name in given:
+        return np.asarray(given[name], dtype=np.float64)
+    variable = VARIABLES[name]
+    sources = problem.data | given
+    symbols = sorted(variable.value.free_symbols, key=str)
+    slots = (SLOTS[variable.over][symbol] for symbol in symbols)
+    arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
+    return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
+
+
+def _excess(sense: str, values: Floats) -> Floats:
+    if sense == "==":
+        return np.abs(values)
+    return values if sense == "<=" else -values
+
+
+_NOISE: Final = 1e-12
+"""Coefficients that cancel up to rounding, or come from an angle of 1e-16, are noise: no reader would keep them."""
+
+
+def _merge(index: Ints, coefficient: Floats, columns: int) -> tuple[Ints, Floats]:
+    """Sum of coefficients over equal rows of `index`, sorted by row."""
+    key = index[:, 0].astype(np.int64)
+    for factor in range(1, index.shape[1]):
+        key = key * columns + index[:, factor]
+    _, place, inverse = np.unique(key, return_index=True, return_inverse=True)
+    total = np.bincount(inverse, weights=coefficient, minlength=len(place))
+    kept = np.abs(total) > _NOISE
+    return index[place[kept]], total[kept]
+
+
+def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
+    """The problem of that formulation on the instance.
+
+    options: facet, stroke_norm, beta_norm, relax; p: the jumps (m,), for `qp-fixed` alone.
+    Raises FormulationError for an unknown name, option or value.
+    """
+    return Problem(instance, declare(name, **options), p)
+
+
+def lifted(problem: Problem) -> Problem:
+    """The same problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic."""
+    return replace(problem, formulation=lift_products(problem.formulation))
+
+
+__all__ = ["FORMULATIONS", "Block", "Bound", "Problem", "Term", "Violation", "formulate", "lifted"]
