@@ -30,8 +30,6 @@ from ..models.problem import Block, Bound, Problem, Term
 from .names import column_names, family_names, with_one
 from .records import Pieces, Words, check_coefficients, number, render, signed, words
 
-LINEAR_DEGREE = 1
-
 
 def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
@@ -99,7 +97,7 @@ def _objective(problem: Problem, names: Words) -> Iterator[bytes]:
 
 def _rows(family: Bound, names: Words) -> Iterator[bytes]:
     parts: list[bytes | Words] = [b" ", Words(family_names(family), None), b":"]
-    for term in family.of_degree(LINEAR_DEGREE):
+    for term in family.of_degree(1):
         parts += [b" ", coefficient(term, family), b" ", names.at(term.factors[0])]
     products = family.of_degree(2)
     if products:

@@ -95,7 +95,7 @@ class Formulation:
     """A declared formulation: names, families, and what is known of it.
 
     fixed: variables that are data (p1, p2 of `qp-fixed`); convex: of the continuous relaxation;
-    lifted: how products were lifted, empty when they were not.
+    equivalent: another formulation of the very same problem; lifted: how products were lifted, empty when they were not.
     """
 
     name: str
@@ -106,6 +106,7 @@ class Formulation:
     rows: tuple[Family, ...]
     convex: bool
     fixed: tuple[str, ...] = ()
+    equivalent: str = ""
     lifted: str = ""
 
     @property
@@ -189,7 +190,7 @@ class Recipe:
     """A line of the table of formulations.
 
     smooth, smooth_rows: the smoothness term and its rows for a facet; options: those that may be set;
-    defaults: of the options; kind: the class as people call it; equivalent: the problem in other words.
+    defaults: of the options; kind: the class as people call it; equivalent: another formulation of the very same problem.
     """
 
     name: str
@@ -202,6 +203,7 @@ class Recipe:
     defaults: Options = field(default_factory=Options)
     settable: frozenset[str] = frozenset({"relax"})
     fixed: tuple[str, ...] = ()
+    equivalent: str = ""
 
 
 _NORMS: Final = frozenset({"stroke_norm", "beta_norm", "relax"})
@@ -211,7 +213,7 @@ FORMULATIONS: Final = {
     for recipe in (
         Recipe(
             "minlp-parity", "1, (1)-(6)", "one integer jump per pair, its parity as cos(pi p)", "non-convex MINLP",
-            PARITY, lambda _: (), convex=False,
+            PARITY, lambda _: (), convex=False, equivalent="minlp-quartic",
         ),
         Recipe(
             "minlp-quartic", "2, (8)", "parity bit p1 and even part p2, squares kept as squares", "polynomial MINLP of degree 4",
@@ -273,6 +275,7 @@ def declare(name: str, **chosen: Any) -> Formulation:
         rows=(*recipe.smooth_rows(options.facet), *stroke_rows, *skew_rows),
         convex=recipe.convex,
         fixed=recipe.fixed,
+        equivalent=recipe.equivalent,
     )
 
 

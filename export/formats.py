@@ -1,0 +1,193 @@
+"""The table of file formats, and the one function that writes a problem to a file.
+
+A format states what it carries; what it cannot carry is lifted where that is exact, else refused by name before the first byte.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import IO, Any, Final, cast
+
+from ..models.errors import InputError, UnsupportedByFormatError
+from ..models.field import CrossField
+from ..models.grid import Floats
+from ..models.problem import Problem, lifted
+from ..models.storage import replacing, sha256_of
+
+ANY_DEGREE: Final = 99
+
+
+def _nl(problem: Problem, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+    from . import nl
+
+    return nl.generate(problem, binary=dialect == "binary", start=start)
+
+
+def _gms(problem: Problem, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+    from . import gams, gams_indexed
+
+    return (gams if dialect == "scalar" else gams_indexed).generate(problem, header, start=start)
+
+
+def _lp(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import lp
+
+    return lp.generate(problem, header)
+
+
+def _mps(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import mps
+
+    return mps.generate(problem, header)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format: what it carries and how it is written.
+
+    degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default first;
+    starts: whether a starting point has a place in it.
+    """
+
+    name: str
+    summary: str
+    degree: int
+    generate: Callable[[Problem, list[str], Floats | None, str], Iterator[bytes]]
+    dialects: tuple[str, ...] = ("",)
+    starts: bool = False
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of its files, with the dot."""
+        return f".{self.name}"
+
+
+FORMATS: Final = {
+    entry.name: entry
+    for entry in (
+        Format("nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro", ANY_DEGREE, _nl, ("text", "binary"), starts=True),
+        Format("gms", "GAMS model, self-contained: sets and equations, or scalar", ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True),
+        Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
+        Format("mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _mps),
+    )
+}
+"""The table of formats; command line, docs and tests are generated from it."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: the format and dialect, the problem as the file holds it, and per file name, bytes and SHA-256."""
+
+    format: str
+    dialect: str
+    problem: Problem
+    files: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def lifted(self) -> str:
+        """How products were lifted for this format, empty when they were not."""
+        return self.problem.formulation.lifted
+
+
+@cache
+def generator() -> str:
+    """Name and version of this program, as files carry it."""
+    try:
+        return f"crossfield {version('crossfield')}"
+    except PackageNotFoundError:
+        return "crossfield"
+
+
+def format_of(path: str | Path) -> Format:
+    """The format that a path's suffix names, `.gz` aside. Raises InputError."""
+    name = Path(path).name.removesuffix(".gz")
+    suffix = Path(name).suffix.removeprefix(".")
+    if suffix not in FORMATS:
+        raise InputError(f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz", file=path)
+    return FORMATS[suffix]
+
+
+def carried(problem: Problem, entry: Format) -> Problem:
+    """The problem as the format can hold it: itself, or with products lifted.
+
+    Raises UnsupportedByFormatError, naming an equivalent formulation, when neither fits.
+    """
+    if _degree(problem) <= entry.degree:
+        return problem
+    if _degree(problem) < ANY_DEGREE:
+        other = lifted(problem)
+        if _degree(other) <= entry.degree:
+            return other
+    instead = problem.formulation.equivalent
+    remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
+    raise UnsupportedByFormatError(f"{entry.name} holds nothing beyond quadratic and cannot carry {problem.name}; {remedy}")
+
+
+def _degree(problem: Problem) -> int:
+    return max(problem.objective_degree, problem.row_degree)
+
+
+def header(problem: Problem) -> list[str]:
+    """Lines of comment that say what a file holds."""
+    formulation, options = problem.formulation, problem.formulation.options
+    lines = [
+        f"{generator()}: {formulation.name} (section {formulation.paper}), {problem.problem_class}, {formulation.summary}",
+        f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
+        f"facet {options.facet}, stroke norm {options.stroke_norm}, beta norm {options.beta_norm}, integrality {'dropped' if options.relax else 'kept'}",
+    ]
+    return lines + ([f"lifted: {formulation.lifted}"] if formulation.lifted else [])
+
+
+def write(problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None) -> Written:
+    """What was written to `path`: its suffix names the format, `.gz` compresses; .nl gets .row and .col beside it.
+
+    dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point is the starting point
+    where the format has a place for one. Same problem, same bytes. Raises UnsupportedByFormatError before a byte is written,
+    InputError for an unknown suffix or dialect, OutputError.
+    """
+    path = Path(path)
+    entry = format_of(path)
+    chosen = entry.dialects[0] if dialect is None else dialect
+    if chosen not in entry.dialects:
+        raise InputError(f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}")
+    held = carried(problem, entry)
+    point = held.point(start) if start is not None and entry.starts else None
+    written = Written(entry.name, chosen, held)
+    _save(path, entry.generate(held, header(held), point, chosen), written)
+    if entry.name == "nl":
+        _save_names(path, held, written)
+    return written
+
+
+def _save_names(path: Path, problem: Problem, written: Written) -> None:
+    from . import nl
+
+    layout = nl.Layout(problem)
+    stub = path.with_name(path.name.removesuffix(".gz").removesuffix(".nl"))
+    for suffix, names in ((".row", layout.row_names()), (".col", layout.column_names())):
+        _save(stub.with_name(stub.name + suffix), nl.names_file(names), written)
+
+
+def _save(path: Path, chunks: Iterator[bytes], written: Written) -> None:
+    with replacing(path) as stream, compressed(stream, path) as sink:
+        for chunk in chunks:
+            sink.write(chunk)
+    written.files[path.name] = {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
+
+
+@contextmanager
+def compressed(stream: IO[bytes], path: Path) -> Iterator[IO[bytes]]:
+    """The stream, through gzip when the path ends in .gz; without name and time, so that the bytes are stable."""
+    if path.suffix != ".gz":
+        yield stream
+        return
+    with gzip.GzipFile(filename="", mode="wb", fileobj=stream, compresslevel=3, mtime=0) as archive:
+        with io.BufferedWriter(cast("Any", archive), 1 << 20) as buffer:
+            yield buffer
