@@ -81,16 +81,16 @@ class _Code(NamedTuple):
     without_point: Status
 
 
+_FAILURE: Final = _Code(-1, Status.ERROR, Status.ERROR)  # codes below 0 and from 500 on
 _CODES: Final = (
-    _Code(-1, Status.ERROR, Status.ERROR),
+    _FAILURE,
     _Code(99, Status.OPTIMAL_LOCAL, Status.ERROR),
     _Code(199, Status.FEASIBLE, Status.ERROR),
     _Code(299, Status.INFEASIBLE, Status.INFEASIBLE),
     _Code(399, Status.UNBOUNDED, Status.UNBOUNDED),
     _Code(449, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    _Code(
-        469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT
-    ),  # infeasible or unbounded; SCIP before 10: interrupted
+    # up to 469: infeasible or unbounded, which no point can be; older SCIP uses 450 for interrupted
+    _Code(469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
     _Code(499, Status.LIMIT_WITHOUT_POINT, Status.LIMIT_WITHOUT_POINT),
 )
 
@@ -226,7 +226,7 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
         return Status.OPTIMAL_GLOBAL
     if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():
         return Status.INFEASIBLE
-    entry = next((entry for entry in _CODES if code <= entry.last), _CODES[0])
+    entry = next((entry for entry in _CODES if code <= entry.last), _FAILURE)
     return entry.with_point if with_point else entry.without_point
 
 
@@ -240,7 +240,9 @@ def parse_binary(data: bytes) -> RawSolution:
         raise records.fault(
             f"{counts.duals} dual values and {counts.values} values are announced, {duals.size} and {values.size} follow"
         )
-    rows = counts.rows if counts else duals.size or None
+    if np.isnan(values).any():
+        raise records.fault("one of the values is not a number")
+    rows = counts.rows if counts else duals.size
     return _solution(BINARY, message, records.take_code(), values, rows)
 
 
@@ -292,10 +294,7 @@ class _Records:
         record = self.take()
         if len(record) % 8:
             raise self.fault(f"{len(record)} bytes cannot hold {what} of 8 bytes")
-        values = np.frombuffer(record, "<f8").astype(np.float64)
-        if np.isnan(values).any():
-            raise self.fault(f"one of the {what} is not a number")
-        return values
+        return np.frombuffer(record, "<f8").astype(np.float64)
 
     def take_code(self) -> int | None:
         """The solve code, or None when the file has none."""
@@ -340,8 +339,10 @@ def write_ampl_sol(
 
 def _lines_of(message: str) -> bytes:
     """The message so that no line of it is empty or says Options."""
-    words = [one_line(line.encode()) for line in message[:_LONGEST_MESSAGE].strip().splitlines()]
-    return "\n".join(f" {line}" if line in {"", "Options"} else line for line in words).encode()
+    words = [
+        one_line(line.encode(errors="replace")) for line in message[:_LONGEST_MESSAGE].strip().splitlines()
+    ]
+    return "\n".join({"": " ", "Options": "Options."}.get(line, line) for line in words).encode()
 
 
 def _text_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:

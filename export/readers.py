@@ -56,7 +56,7 @@ def read_raw(path: str | Path) -> RawSolution:
 
 def parse_raw(data: bytes) -> RawSolution:
     """What the content of a solution file says. Raises SolutionError."""
-    if not data.strip():
+    if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should say why it wrote no solution")
     head = data[:HEAD]
     for reader in READERS:

@@ -65,7 +65,7 @@ class RawSolution:
     on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
-    A positional file with rows None does not say where its dual values end: the last values are the primal ones.
+    A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
     """
 
     reader: str
@@ -146,8 +146,7 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     """
     _check_point(raw)
     found = raw.values.size
-    with_duals = raw.rows is None and found == columns + rows
-    if raw.rows not in {None, rows} or not (found == columns or with_duals):
+    if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
         size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
             f"the file is of {size}, the problem has {columns} columns and {rows} rows; give the solution of this very problem"

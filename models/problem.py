@@ -159,11 +159,16 @@ class Violation:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A formulation bound to an instance. jumps: the data p of `qp-fixed`, shape (m,), else None."""
+    """A formulation bound to an instance.
+
+    jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns are fixed
+    (equal bounds, continuous), or None.
+    """
 
     instance: Instance
     formulation: Formulation
     jumps: Ints | None = None
+    pinned: CrossField | None = None
 
     def __post_init__(self) -> None:
         """Check that jumps are there exactly where they are data."""
@@ -208,7 +213,11 @@ class Problem:
             lower, upper = (
                 np.broadcast_to(np.asarray(bound(self.instance), dtype=np.float64), shape) for bound in (variable.lower, variable.upper)
             )
-            blocks[name] = Block(name, variable.over, offset, lower, upper, variable.integer and not self.formulation.options.relax)
+            integer = variable.integer and not self.formulation.options.relax
+            if variable.integer and self.pinned is not None:
+                lower = upper = _at_field(self, name, _angles_and_jumps(self.pinned))
+                integer = False
+            blocks[name] = Block(name, variable.over, offset, lower, upper, integer)
             offset += shape[0]
         return blocks
 
@@ -320,8 +329,7 @@ class Problem:
         """The complete point of a field: angles, jumps, and every other column at the value it stands for."""
         if field.instance.sha256 != self.instance.sha256:
             raise InstanceError(f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, or under another gauge")
-        p = field.p.astype(np.int64)
-        given = {"alpha": field.alpha, "beta": field.beta, "p": p, "p1": p & 1, "p2": p >> 1}
+        given = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
@@ -338,8 +346,13 @@ class Problem:
     def sha256(self) -> str:
         """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {self.formulation.lifted}"
-        jumps = b"" if self.jumps is None else self.jumps.astype("<i4").tobytes()
-        return hashlib.sha256(text.encode() + jumps).hexdigest()
+        given = [jumps for jumps in (self.jumps, None if self.pinned is None else self.pinned.p) if jumps is not None]
+        return hashlib.sha256(text.encode() + b"".join(jumps.astype("<i4").tobytes() for jumps in given)).hexdigest()
+
+
+def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
+    p = field.p.astype(np.int64)
+    return {"alpha": field.alpha, "beta": field.beta, "p": p, "p1": p & 1, "p2": p >> 1}
 
 
 def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
@@ -384,9 +397,14 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
     return Problem(instance, declare(name, **options), p)
 
 
+def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
+    """The same problem with its integer columns fixed at the jumps of a field: a continuous problem."""
+    return replace(problem, pinned=field)
+
+
 def lifted(problem: Problem) -> Problem:
     """The same problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 
-__all__ = ["FORMULATIONS", "Block", "Bound", "Problem", "Term", "Violation", "formulate", "lifted"]
+__all__ = ["FORMULATIONS", "Block", "Bound", "Problem", "Term", "Violation", "formulate", "lifted", "with_integers_fixed"]

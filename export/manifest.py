@@ -1,0 +1,211 @@
+"""Sets of files: one problem in several formats, with the instance and a manifest beside them.
+
+    bottle_n024.instance.json (or .npz)              the instance, once per folder
+    bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
+    bottle_n024.milp-mccormick.manifest.json         what these are; all that is needed, with the instance, to read a solution
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ..models.errors import CrossfieldError, InputError, InstanceError, SolutionError, UnsupportedByFormatError
+from ..models.field import CrossField
+from ..models.formulations import FORMULATIONS
+from ..models.instance import Instance
+from ..models.instance_file import check_schema, check_version, parse_json, read_instance, write_instance
+from ..models.problem import Problem, formulate
+from ..models.storage import make_folder, read_bytes, write_bytes
+from .formats import FORMATS, Written, generator, write
+
+FORMAT: Final = "crossfield-manifest"
+VERSION: Final = 1
+LARGE: Final = 1 << 16
+"""Instances of more pixels are written as .npz instead of JSON."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a set of files is: the checked document, and the folder it lies in."""
+
+    document: dict[str, Any]
+    folder: Path
+
+    @property
+    def formulation(self) -> str:
+        """Name of the formulation."""
+        return str(self.document["formulation"])
+
+    @property
+    def path(self) -> Path:
+        """Where it lies."""
+        return self.folder / f"{self.document['instance']['name']}.{self.formulation}.manifest.json"
+
+    def instance(self) -> Instance:
+        """The instance beside the manifest. Raises InputError when it is missing, InstanceError when it is another one."""
+        path = self.folder / self.document["instance"]["file"]
+        instance = read_instance(path)
+        if instance.sha256 != self.document["instance"]["sha256"]:
+            raise InstanceError("is another instance than the one the manifest was written for; export again", file=path)
+        return instance
+
+    def problem(self) -> Problem:
+        """The problem that the files hold. Raises InputError, InstanceError."""
+        instance = self.instance()
+        problem = formulate(instance, self.formulation, p=_jumps(self.document, instance), **self.document["options"])
+        if problem.sha256 != self.document["sha256"]:
+            raise InstanceError("does not fit its own instance, options and jumps; export again", file=self.path)
+        return problem
+
+
+def read_manifest(path: str | Path) -> Manifest:
+    """The manifest in a file. Raises InputError when it cannot be read, InstanceError when it breaks its schema."""
+    try:
+        document = parse_json(read_bytes(path).decode())
+        check_version(document, FORMAT, VERSION)
+        return Manifest(check_schema(document, "manifest"), Path(path).parent)
+    except UnicodeDecodeError as error:
+        raise InstanceError("is not JSON; give the .manifest.json that export wrote", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+
+
+def write_problem(
+    problem: Problem,
+    folder: str | Path,
+    formats: Iterable[str] = tuple(FORMATS),
+    *,
+    start: CrossField | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+) -> Manifest:
+    """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
+
+    What a format cannot carry is listed in the manifest as refused. dialects: by format. Raises OutputError, InputError.
+    """
+    folder = make_folder(folder)
+    stem = f"{problem.instance.name}.{problem.name}"
+    written: list[Written] = []
+    refused: dict[str, str] = {}
+    for name in formats:
+        if name not in FORMATS:
+            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+        path = folder / f"{stem}{FORMATS[name].suffix}{'.gz' if compress else ''}"
+        try:
+            written.append(write(problem, path, dialect=(dialects or {}).get(name), start=start))
+        except UnsupportedByFormatError as error:
+            refused[name] = str(error)
+    manifest = Manifest(_document(problem, _instance_file(problem.instance, folder), written, refused), folder)
+    write_bytes(manifest.path, (json.dumps(manifest.document, indent=1) + "\n").encode())
+    return manifest
+
+
+def write_all(
+    instance: Instance,
+    folder: str | Path,
+    formulations: Iterable[str] = tuple(FORMULATIONS),
+    formats: Iterable[str] = tuple(FORMATS),
+    *,
+    start: CrossField | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Manifest]:
+    """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
+
+    start: a field, for starting points and for the jumps of `qp-fixed`; without one the greedy baseline gives the jumps.
+    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. progress: called with each name.
+    """
+    manifests = []
+    formats = tuple(formats)
+    for name in formulations:
+        progress(name)
+        problem = _formulated(instance, name, start, options or {})
+        manifests.append(write_problem(problem, folder, formats, start=start, dialects=dialects, compress=compress))
+    return manifests
+
+
+def _formulated(instance: Instance, name: str, start: CrossField | None, options: dict[str, Any]) -> Problem:
+    recipe = FORMULATIONS.get(name)
+    jumps = None
+    if recipe is not None and recipe.fixed:
+        from ..models.greedy import greedy
+
+        jumps = (start or greedy(instance)).p
+    chosen = {key: value for key, value in options.items() if recipe is None or key in recipe.settable}
+    return formulate(instance, name, p=jumps, **chosen)
+
+
+def _instance_file(instance: Instance, folder: Path) -> str:
+    """Name of the instance's file in the folder, written unless the very same instance is there."""
+    name = f"{instance.name}.instance.{'npz' if instance.grid.size > LARGE else 'json'}"
+    try:
+        unchanged = (folder / name).exists() and read_instance(folder / name).sha256 == instance.sha256
+    except CrossfieldError:
+        unchanged = False
+    if not unchanged:
+        write_instance(instance, folder / name)
+    return name
+
+
+def _document(problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]) -> dict[str, Any]:
+    instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
+    integer = {name: block for name, block in problem.blocks.items() if block.integer}
+    binary = sum(block.count for block in integer.values() if (block.lower == 0).all() and (block.upper == 1).all())
+    files = [
+        {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
+        for entry in written
+        for name, facts in entry.files.items()
+    ]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "generator": generator(),
+        "instance": {"file": instance_file, "name": instance.name, "gauge": instance.gauge, "sha256": instance.sha256},
+        "formulation": formulation.name,
+        "paper": formulation.paper,
+        "options": {"facet": options.facet, "stroke_norm": options.stroke_norm, "beta_norm": options.beta_norm, "relax": options.relax},
+        "class": problem.problem_class,
+        "convex": problem.convex,
+        "counts": {
+            "columns": problem.columns,
+            "binary": binary,
+            "integer": sum(block.count for block in integer.values()) - binary,
+            "rows": problem.row_count,
+            "pixels": instance.grid.size,
+            "pairs": len(instance.grid.first),
+            "stroke_pixels": len(instance.theta),
+        },
+        "columns": [{"name": block.name, "over": block.over, "first": block.offset, "count": block.count} for block in problem.blocks.values()],
+        "rows": [{"name": family.family.tag, "over": family.family.over, "count": family.count, "paper": family.family.paper} for family in problem.rows],
+        "jumps": _nonzero(problem),
+        "sha256": problem.sha256,
+        "files": files,
+        "refused": refused,
+    }
+
+
+def _nonzero(problem: Problem) -> list[list[int]] | None:
+    """[pair, jump] of every pair whose jump is data and not zero; None where jumps are variables."""
+    if problem.jumps is None:
+        return None
+    at = np.nonzero(problem.jumps)[0]
+    return np.stack([at, problem.jumps[at]], axis=1).tolist()
+
+
+def _jumps(document: dict[str, Any], instance: Instance) -> np.ndarray[Any, Any] | None:
+    if document["jumps"] is None:
+        return None
+    jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+    listed = np.array(document["jumps"], dtype=np.int64).reshape(-1, 2)
+    if len(listed) and (listed[:, 0].max() >= len(jumps) or listed[:, 0].min() < 0):
+        raise SolutionError("the manifest lists a jump of a pair that the instance does not have; export again")
+    jumps[listed[:, 0]] = listed[:, 1]
+    return jumps

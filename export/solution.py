@@ -1,0 +1,121 @@
+"""A solution: what a solver's file says, mapped by name onto a problem and checked against the instance.
+
+Nothing in the file is believed: integers are rounded, objective and violations are computed again from the declaration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ..models.errors import SolutionError
+from ..models.field import CrossField
+from ..models.grid import Floats
+from ..models.problem import Problem, Violation, lifted
+from .names import column_names
+from .nl import Layout
+from .readers import read_raw
+from .solution_text import RawSolution, Status, values_for, values_in_order
+
+ROUND: Final = 1e-5
+"""An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A point of a problem with what was claimed and what was recomputed.
+
+    problem: as the file's columns have it (with products lifted, where the format needed it); point: float (columns,), or None.
+    status, message, reported: claims of the file; bound: the solver's dual bound, where one is known.
+    rounded: the furthest that rounding moved an integer column.
+    """
+
+    problem: Problem
+    point: Floats | None
+    status: Status
+    message: str
+    reader: str
+    reported: float | None = None
+    bound: float | None = None
+    rounded: float = 0.0
+    unknown: int = 0
+    seconds: float | None = None
+
+    @cached_property
+    def objective(self) -> float | None:
+        """The objective at the point, recomputed."""
+        return None if self.point is None else self.problem.objective_value(self.point)
+
+    @cached_property
+    def violation(self) -> Violation | None:
+        """The worst violations at the point, recomputed."""
+        return None if self.point is None else self.problem.violation(self.point)
+
+    @cached_property
+    def field(self) -> CrossField:
+        """The cross field of the point. Raises SolutionError when there is none."""
+        if self.point is None:
+            raise SolutionError(f"there is no point in the solution ({self.status}): {self.message or 'no message'}")
+        return self.problem.field(self.point)
+
+
+def read_solution(path: str | Path, problem: Problem) -> Solution:
+    """The solution that a file holds for the problem; the format is found by content.
+
+    Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
+    by the column order of the .nl file. A file without a point gives a Solution without one.
+    Raises SolutionError, naming the file, when it is malformed or of another problem.
+    """
+    raw = read_raw(path)
+    if not raw.has_point:
+        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective)
+    try:
+        return _mapped(raw, problem)
+    except SolutionError as error:
+        raise SolutionError(str(error), file=path) from error
+
+
+def _mapped(raw: RawSolution, problem: Problem) -> Solution:
+    unknown = 0
+    if raw.names is None:
+        point = np.empty(problem.columns)
+        point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
+    else:
+        problem, point, unknown = _by_name(raw, problem)
+    if np.isnan(point).any():
+        raise SolutionError("holds values that are not numbers; let the solver write it again")
+    point, moved = _rounded(point, problem)
+    return Solution(problem, point, raw.status, raw.message, raw.reader, raw.objective, rounded=moved, unknown=unknown)
+
+
+def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
+    held = values_for(_names(problem), raw)
+    if held.unknown and "p1" in problem.blocks and "z" not in problem.blocks:
+        other = lifted(problem)
+        with_products = values_for(_names(other), raw)
+        if with_products.unknown < held.unknown:
+            problem, held = other, with_products
+    if held.missing:
+        raise SolutionError(
+            f"{held.missing} of {problem.columns} columns of {problem.name} are missing and {held.unknown} names are unknown; "
+            "it is of another instance, formulation or option"
+        )
+    if held.unknown > len(raw.values) // 2:
+        raise SolutionError(f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation")
+    return problem, held.values, held.unknown
+
+
+def _names(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
+    matrix = np.ascontiguousarray(column_names(problem))
+    return matrix.view(f"S{matrix.shape[1]}").ravel()
+
+
+def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:
+    nearest = np.round(point)
+    gap = np.abs(point - nearest)
+    chosen = problem.integer & (gap <= ROUND)
+    return np.where(chosen, nearest + 0.0, point), float(gap[chosen].max(initial=0.0))
