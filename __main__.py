@@ -1,0 +1,5 @@
+"""`python -m crossfield`: the command line."""
+
+from .export.cli import main
+
+main()

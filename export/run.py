@@ -1,0 +1,184 @@
+"""Everything at once: an instance, all its files, every field that can be had here, pictures, and a report."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ..models.errors import CrossfieldError
+from ..models.field import CrossField
+from ..models.field_file import write_field
+from ..models.greedy import greedy, power_field
+from ..models.instance import Instance
+from ..models.storage import make_folder, write_bytes
+from .formats import generator
+from .manifest import Manifest, write_all
+from .solution import Solution
+from .solvers import Limits
+from .stages import fit_angles, two_stage
+
+Progress = Callable[[str], None]
+PICTURES: Final = ("overview", "field", "crosses", "angle")
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A field and how it was found: method, seconds, and the solution file's facts where a solver gave it."""
+
+    method: str
+    field: CrossField
+    seconds: float
+    solution: Solution | None = None
+
+    def facts(self) -> dict[str, Any]:
+        """What the report says of it: energies in both norms, singularities, skew, and claims beside recomputed values."""
+        answer = self.field
+        facts: dict[str, Any] = {
+            "method": self.method,
+            "energy_2_norm": answer.energy(2).total,
+            "energy_1_norm": answer.energy(1).total,
+            "singularities": len(answer.singularities.index),
+            "degenerate_pixels": int(answer.degenerate.sum()),
+            "mean_abs_beta_degrees": float(np.degrees(np.abs(answer.beta).mean())),
+            "seconds": round(self.seconds, 3),
+        }
+        return facts if self.solution is None else facts | solution_facts(self.solution)
+
+
+def solution_facts(solution: Solution) -> dict[str, Any]:
+    """What a solution file claims, beside what was recomputed from the instance."""
+    violation = solution.violation
+    return {
+        "formulation": solution.problem.name,
+        "status": str(solution.status),
+        "message": solution.message,
+        "objective_reported": solution.reported,
+        "objective_recomputed": solution.objective,
+        "dual_bound": solution.bound,
+        "worst_violation": None if violation is None else violation.worst,
+        "worst_family": None if violation is None else violation.worst_family,
+        "furthest_rounding": solution.rounded,
+        "unknown_names": solution.unknown,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a run found. candidates: every field, best (lowest 2-norm energy) first; manifests: the written sets."""
+
+    instance: Instance
+    candidates: tuple[Candidate, ...]
+    manifests: tuple[Manifest, ...]
+    failures: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Candidate:
+        """The field that is kept and drawn."""
+        return self.candidates[0]
+
+    def document(self) -> dict[str, Any]:
+        """The report as JSON: instance, methods, files."""
+        instance = self.instance
+        return {
+            "format": "crossfield-report",
+            "version": 1,
+            "generator": generator(),
+            "instance": {
+                "name": instance.name,
+                "source": instance.source,
+                "gauge": instance.gauge,
+                "sha256": instance.sha256,
+                "height": instance.grid.height,
+                "width": instance.grid.width,
+                "pixels": instance.grid.size,
+                "pairs": len(instance.grid.first),
+                "stroke_pixels": len(instance.theta),
+                "parts": instance.grid.parts,
+                "pixel_size": instance.pixel_size,
+            },
+            "best": self.best.method,
+            "methods": [candidate.facts() for candidate in self.candidates],
+            "failures": self.failures,
+            "files": sum(len([f for f in m.document["files"] if f["name"].split(".")[-1] not in {"row", "col"}]) for m in self.manifests),
+            "refused": {m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]},
+        }
+
+
+def run(
+    instance: Instance,
+    folder: str | Path,
+    *,
+    limits: Limits | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    progress: Progress = lambda _: None,
+) -> Report:
+    """The report of a run; the folder then holds instance, solver files, the best field, pictures and report.json.
+
+        DIR/models     every formulation in every format, manifests, the instance
+        DIR/solve      what the local solvers read and left
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...; report.json
+
+    A solver that fails is noted in the report; the fields that were found stand. Raises OutputError.
+    """
+    folder = make_folder(folder)
+    limits = limits or Limits()
+    progress("greedy baseline")
+    baseline = _timed("greedy", lambda: greedy(instance))
+    manifests = write_all(
+        instance, folder / "models", start=baseline.field, options=options, dialects=dialects, progress=lambda name: progress(f"writing {name}")
+    )
+    candidates, failures = [baseline], dict[str, str]()
+    for search in (_fitted, _power, _two_stages):
+        try:
+            candidates += search(baseline.field, folder / "solve", limits, options or {}, progress)
+        except CrossfieldError as error:
+            failures[search.__name__.strip("_")] = str(error)
+    report = Report(instance, tuple(sorted(candidates, key=lambda c: c.field.energy(2).total)), tuple(manifests), failures)
+    for suffix in (".npz", ".json", ".rawfield"):
+        write_field(report.best.field, folder / f"field{suffix}")
+    write_bytes(folder / "report.json", (json.dumps(report.document(), indent=1) + "\n").encode())
+    _draw(report, folder, progress)
+    return report
+
+
+def _draw(report: Report, folder: Path, progress: Progress) -> None:
+    from .draw import draw
+
+    for kind in PICTURES:
+        progress(f"drawing {kind}")
+        draw(report.best.field, folder / f"{kind}.png", kind=kind)
+    draw(report.instance, folder / "instance.png", kind="instance")
+
+
+def _timed(method: str, find: Callable[[], CrossField]) -> Candidate:
+    begin = time.perf_counter()
+    found = find()
+    return Candidate(method, found, time.perf_counter() - begin)
+
+
+def _of(method: str, solution: Solution) -> Candidate:
+    return Candidate(method, solution.field, solution.seconds or 0.0, solution)
+
+
+def _fitted(start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress) -> list[Candidate]:
+    progress("Ipopt: angles for the greedy jumps")
+    return [_of("greedy + QP", fit_angles(start, folder / "greedy", limits=limits))]
+
+
+def _power(start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress) -> list[Candidate]:
+    progress("power field")
+    power = _timed("power field", lambda: power_field(start.instance))
+    return [power, _of("power field + QP", fit_angles(power.field, folder / "power", limits=limits))]
+
+
+def _two_stages(start: CrossField, folder: Path, limits: Limits, options: dict[str, Any], progress: Progress) -> list[Candidate]:
+    progress(f"HiGHS: MILP for the jumps, at most {limits.seconds:g} s")
+    both = two_stage(start.instance, folder / "two-stage", limits=limits, start=start, **options)
+    return [_of("MILP", both.milp), _of("MILP + QP (two stages)", both.qp)]

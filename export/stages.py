@@ -1,0 +1,51 @@
+"""The two stages of section 5 of the paper: a MILP for the jumps, then the box-constrained QP for the angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..models.field import CrossField
+from ..models.formulations import FORMULATIONS
+from ..models.greedy import greedy
+from ..models.instance import Instance
+from ..models.problem import formulate
+from .solution import Solution
+from .solvers import Limits, solve
+
+
+@dataclass(frozen=True, eq=False)
+class TwoStage:
+    """Both solutions; `field` is that of the second stage, or of the first where the second left no point."""
+
+    milp: Solution
+    qp: Solution
+
+    @property
+    def field(self) -> CrossField:
+        """The field with the jumps of the first stage and the angles of the second."""
+        return self.qp.field if self.qp.point is not None else self.milp.field
+
+
+def fit_angles(field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None) -> Solution:
+    """The solution of `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage."""
+    return solve(formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field)
+
+
+def two_stage(
+    instance: Instance,
+    folder: str | Path | None = None,
+    *,
+    limits: Limits | None = None,
+    start: CrossField | None = None,
+    **options: Any,
+) -> TwoStage:
+    """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
+
+    start: the incumbent handed to HiGHS, the greedy baseline when None: cold, HiGHS is lost beyond 10 x 10 pixels.
+    options: facet, stroke_norm, beta_norm of the MILP. limits: for each stage. Raises SolverError, SolutionError.
+    """
+    chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
+    milp = solve(formulate(instance, "milp-mccormick", **chosen), None, folder, limits=limits, start=start or greedy(instance))
+    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits))

@@ -1,0 +1,85 @@
+"""The tables of formulations, formats, solvers and readers, and which go together: for the command line and the docs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..models.errors import UnsupportedByFormatError
+from ..models.formulations import FORMULATIONS
+from ..models.instance import Instance
+from ..models.problem import Problem, formulate
+from ..models.samples import sample, samples
+from .formats import FORMATS, carried
+from .readers import READERS
+from .solvers import SOLVERS, refusal
+
+Row = dict[str, Any]
+Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
+
+
+def tables() -> Tables:
+    """For each table its columns and its rows, computed from the code, never typed."""
+    return {
+        "formulations": (("name", "paper", "class", "summary", *FORMATS), [_formulation_row(problem) for problem in smallest_problems()]),
+        "formats": (("name", "dialects", "summary"), [_format_row(name) for name in FORMATS]),
+        "solvers": (("formulation", *SOLVERS), [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()]),
+        "readers": (("name", "description"), [{"name": reader.name, "description": reader.description} for reader in READERS]),
+    }
+
+
+def sample_rows(size: int) -> list[Row]:
+    """Name, kind, grid, stroke share and one line of each built-in sample on a grid of that size."""
+    rows = []
+    for entry in samples():
+        instance = sample(entry.name, size)
+        grid = instance.grid
+        share = len(instance.theta) / grid.size
+        row = {"name": entry.name, "kind": entry.kind, "grid": f"{grid.width} x {grid.height}", "pixels": grid.size, "strokes": f"{share:.0%}"}
+        rows.append(row | {"description": entry.description})
+    return rows
+
+
+def smallest_problems() -> list[Problem]:
+    """Every formulation on the instance of two pixels: enough to ask what a format carries and a solver takes."""
+    return [_smallest(name) for name in FORMULATIONS]
+
+
+def _smallest(name: str, *, relax: bool | None = None) -> Problem:
+    instance = Instance("smallest", np.ones((1, 2), dtype=bool), np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
+    jumps = np.zeros(1, dtype=np.int32) if FORMULATIONS[name].fixed else None
+    return formulate(instance, name, p=jumps, relax=relax)
+
+
+def _with_relaxations() -> list[tuple[Problem, bool]]:
+    rows: list[tuple[Problem, bool]] = []
+    for name, recipe in FORMULATIONS.items():
+        rows.append((_smallest(name), False))
+        if "relax" in recipe.settable:
+            rows.append((_smallest(name, relax=True), True))
+    return rows
+
+
+def _formulation_row(problem: Problem) -> Row:
+    recipe = FORMULATIONS[problem.name]
+    row: Row = {"name": problem.name, "paper": recipe.paper, "class": recipe.kind, "summary": recipe.summary}
+    return row | {name: _carriage(problem, name) for name in FORMATS}
+
+
+def _carriage(problem: Problem, name: str) -> str:
+    try:
+        held = carried(problem, FORMATS[name])
+    except UnsupportedByFormatError:
+        return f"refused: write {problem.formulation.equivalent}"
+    return "lifted, exact" if held.formulation.lifted else "yes"
+
+
+def _format_row(name: str) -> Row:
+    entry = FORMATS[name]
+    return {"name": name, "dialects": ", ".join(filter(None, entry.dialects)), "summary": entry.summary}
+
+
+def _solver_row(problem: Problem, relaxed: bool) -> Row:
+    answers = {name: refusal(problem, solver) or "yes" for name, solver in SOLVERS.items()}
+    return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
