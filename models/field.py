@@ -15,7 +15,7 @@ import numpy as np
 from .angles import line_difference
 from .errors import InstanceError
 from .grid import Bools, Floats, Ints
-from .instance import HALF, QUARTER, Instance
+from .instance import HALF, QUARTER, Instance, whole_numbers
 
 Norm = Literal[1, 2]
 
@@ -65,10 +65,16 @@ class CrossField:
     def __post_init__(self) -> None:
         """Take over read-only copies and check shapes and values."""
         grid = self.instance.grid
-        for name, size, kind in (("alpha", grid.size, np.float64), ("beta", grid.size, np.float64), ("p", len(grid.first), np.int32)):
-            value = np.array(getattr(self, name), dtype=kind)
+        given: dict[str, np.ndarray[Any, Any]] = {
+            "alpha": np.array(self.alpha, dtype=np.float64),
+            "beta": np.array(self.beta, dtype=np.float64),
+            "p": whole_numbers(self.p, "p"),
+        }
+        for (name, value), size in zip(given.items(), (grid.size, grid.size, len(grid.first)), strict=True):
             if value.shape != (size,):
-                raise InstanceError(f"{name} has shape {value.shape}, but the grid of {self.instance.name} needs ({size},)")
+                raise InstanceError(
+                    f"{name} has shape {value.shape}, but the grid of {self.instance.name} needs ({size},)"
+                )
             if not np.isfinite(value).all():
                 raise InstanceError(f"{name} holds a value that is not finite")
             value.setflags(write=False)
@@ -117,7 +123,9 @@ class CrossField:
         """Smooth 2-norm energy per pixel, each pair shared by its two pixels; shape (n,)."""
         grid = self.instance.grid
         share = self.residual_a**2 + self.residual_b**2
-        return np.bincount(grid.first, share, grid.size) + np.bincount(grid.second, share, grid.size)
+        ends, halves = np.concatenate([grid.first, grid.second]), np.concatenate([share, share])
+        at_pixel: Floats = np.bincount(ends, halves, grid.size).astype(np.float64)
+        return at_pixel
 
     @cached_property
     def singularities(self) -> Singularities:
@@ -132,7 +140,8 @@ class CrossField:
     @cached_property
     def degenerate(self) -> Bools:
         """True where both lines are the same to within 5 degrees; shape (n,)."""
-        return np.abs(self.beta) > QUARTER - DEGENERATE
+        close: Bools = np.abs(self.beta) > QUARTER - DEGENERATE
+        return close
 
     @property
     def angle_between(self) -> Floats:
@@ -151,7 +160,9 @@ class CrossField:
 
     def with_best_jumps(self) -> CrossField:
         """The field with the jump of least energy on each pair, within the instance's p_min and p_max."""
-        return CrossField(self.instance, self.alpha, self.beta, best_jumps(self.instance, self.alpha, self.beta))
+        return CrossField(
+            self.instance, self.alpha, self.beta, best_jumps(self.instance, self.alpha, self.beta)
+        )
 
     def image(self, values: np.ndarray[Any, Any], fill: float = np.nan) -> Floats:
         """Values of the pixels as a picture [height, width], `fill` outside the mask."""
@@ -165,25 +176,32 @@ def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
     grid = instance.grid
     difference = alpha[grid.first] - alpha[grid.second]
     near = np.clip(np.floor(-difference / HALF).astype(np.int32), instance.p_min, instance.p_max)
-    candidates = np.stack([np.maximum(near - 1, instance.p_min), near, np.minimum(near + 1, instance.p_max), np.minimum(near + 2, instance.p_max)])
+    candidates = np.stack(
+        [
+            np.maximum(near - 1, instance.p_min),
+            near,
+            np.minimum(near + 1, instance.p_max),
+            np.minimum(near + 2, instance.p_max),
+        ]
+    )
     a = difference + HALF * candidates
     b = _sign(candidates) * beta[grid.first] - beta[grid.second]
     cost = np.round(a * a + b * b, 12)  # equal costs must not be told apart by rounding
-    return candidates[np.argmin(cost, axis=0), np.arange(len(difference))]
+    best: Ints = candidates[np.argmin(cost, axis=0), np.arange(len(difference))]
+    return best
 
 
 def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
 
-    alpha and beta may be any real numbers; where u carries a stroke it goes on carrying it. What does not fit a
-    window (a stroke pixel that misses its direction by more than pi/4) is clipped, and then each pair gets its best jump;
-    if nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge `box` the
+    alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if nothing was clipped
+    the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
     """
     grid = instance.grid
     lower = instance.alpha_lower
     steps = np.ceil((lower - alpha) / HALF - 1e-12).astype(np.int32)
-    at = instance.stroke_index
-    steps[at] = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
+    steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
     shifted = np.clip(alpha + HALF * steps, lower, instance.alpha_upper)
     turned = np.clip(_sign(steps) * beta, -QUARTER, QUARTER)
     moved = np.clip(p - steps[grid.first] + steps[grid.second], instance.p_min, instance.p_max)
@@ -192,10 +210,26 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     return best if best.energy().total < kept.energy().total else kept
 
 
+def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
+    """The step of each stroke pixel's label, shape (s,): of three the one with the least clipping and misfit of the stroke.
+
+    The label in the window, the next one (on the window's edge both fit), and the one in which u stays nearest to
+    the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the energy punishes.
+    """
+    at = instance.stroke_index
+    lower, upper = instance.alpha_lower[at], instance.alpha_upper[at]
+    faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
+    candidates = np.stack([steps[at], steps[at] + 1, faithful])
+    moved = alpha[at] + HALF * candidates
+    shifted = np.clip(moved, lower, upper)
+    turned = np.clip(_sign(candidates) * beta[at], -QUARTER, QUARTER)
+    cost = np.abs(moved - shifted) + np.abs(shifted + turned - instance.target)
+    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
+    return best
 
 
 def _sign(p: Ints) -> Floats:
-    return 1.0 - 2.0 * (p & 1)
+    return 1.0 - 2.0 * (p & 1).astype(np.float64)
 
 
 def _unit(angle: Floats) -> Floats:

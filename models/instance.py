@@ -15,7 +15,7 @@ from .errors import InstanceError
 from .grid import Bools, Floats, Grid, Ints
 
 Gauge = Literal["strokes", "box"]
-GAUGES: Final[tuple[str, ...]] = get_args(Gauge)
+GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 
 QUARTER: Final = np.pi / 4
 HALF: Final = np.pi / 2
@@ -23,6 +23,23 @@ _SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names: lower case, digits and underscores, at most 32 characters, as instance libraries ask for."""
+
+_NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
+
+
+def whole_numbers(values: Any, name: str) -> Ints:
+    """The values as int32 of the same shape.
+
+    Raises InstanceError for fractions and for numbers beyond int32, which a plain cast would change silently.
+    """
+    given = np.asarray(values)
+    if (
+        given.dtype.kind not in "iuf"
+        or not ((given >= -(2**31)) & (given < 2**31)).all()
+        or (given != np.floor(given)).any()
+    ):
+        raise InstanceError(f"{name} holds something other than whole numbers of 32 bits")
+    return given.astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +75,7 @@ class Instance:
     def __post_init__(self) -> None:
         """Take over read-only copies in the documented types, then check every rule."""
         self._freeze("mask", np.asarray(self.mask, dtype=bool))
-        self._freeze("stroke_pixels", np.asarray(self.stroke_pixels, dtype=np.int32).reshape(-1, 2))
+        self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         self._freeze("theta", np.asarray(self.theta, dtype=np.float64))
         self._freeze("w", np.asarray(self.w, dtype=np.float64))
         object.__setattr__(self, "origin", (float(self.origin[0]), float(self.origin[1])))
@@ -88,19 +105,27 @@ class Instance:
             raise InstanceError(f"pixel_size is {self.pixel_size}; it must be a positive number")
         if not np.isfinite(self.origin).all():
             raise InstanceError(f"origin is {self.origin}; it must be two finite numbers")
-        if "\n" in self.source or "\r" in self.source:
-            raise InstanceError("source holds a line break; give one line of text")
+        if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
+            raise InstanceError("source holds a line break or what is no text; give one line of text")
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():
             raise InstanceError("the mask has no pixel to solve for; draw something white in it")
         if max(self.mask.shape) > 9999:
-            raise InstanceError(f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; at most 9999 pixels a side are allowed")
+            raise InstanceError(
+                f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; at most 9999 pixels a side are allowed"
+            )
+        if self.stroke_pixels.size == 0:
+            raise InstanceError("no stroke lies inside the mask; move the mask or draw a curvature line")
+        if self.stroke_pixels.ndim != 2 or self.stroke_pixels.shape[1] != 2:
+            raise InstanceError(
+                f"stroke_pixels has shape {self.stroke_pixels.shape}; give a row [row, column] for each stroke pixel"
+            )
         count = len(self.stroke_pixels)
         if self.theta.shape != (count,) or self.w.shape != (count,):
-            raise InstanceError(f"{count} stroke pixels need as many theta and w, but there are {self.theta.size} and {self.w.size}")
-        if count == 0:
-            raise InstanceError("no stroke lies inside the mask; move the mask or draw a curvature line")
+            raise InstanceError(
+                f"{count} stroke pixels need as many theta and w, but there are {self.theta.size} and {self.w.size}"
+            )
         for label, wrong in (
             ("theta is not a finite number", ~np.isfinite(self.theta)),
             ("w is not in (0, 1]", ~((self.w > 0) & (self.w <= 1))),
@@ -112,13 +137,16 @@ class Instance:
         key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
         if (np.diff(key) <= 0).any():
             row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
-            raise InstanceError(f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row")
+            raise InstanceError(
+                f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row"
+            )
 
     def _inside(self) -> Bools:
         row, column = self.stroke_pixels.T
         height, width = self.mask.shape
         on_grid = (row >= 0) & (column >= 0) & (row < height) & (column < width)
-        return on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
+        inside: Bools = on_grid & self.mask[np.where(on_grid, row, 0), np.where(on_grid, column, 0)]
+        return inside
 
     @cached_property
     def grid(self) -> Grid:
@@ -129,11 +157,12 @@ class Instance:
     def stroke_index(self) -> Ints:
         """Pixel number of each stroke pixel, shape (s,)."""
         row, column = self.stroke_pixels.T
-        return self.grid.number[row, column]
+        number: Ints = self.grid.number[row, column]
+        return number
 
     @cached_property
     def target(self) -> Floats:
-        """theta in the gauge's own range: [-pi/4, 3 pi/4) for `box`, [0, pi) for `strokes`; shape (s,)."""
+        """Theta in the gauge's own range: [-pi/4, 3 pi/4) for `box`, [0, pi) for `strokes`; shape (s,)."""
         return wrap(self.theta, -QUARTER, np.pi) if self.gauge == "box" else self.theta
 
     @cached_property
@@ -194,7 +223,15 @@ class Instance:
         digest = hashlib.sha256(b"crossfield-instance 1\n")
         for text in (self.name, self.gauge, self.source):
             digest.update(text.encode() + b"\0")
-        scalars = np.array([*self.mask.shape, self.w_strokes, self.w_beta, self.pixel_size, *self.origin], dtype="<f8")
-        for array in (scalars, np.packbits(self.mask), self.stroke_pixels.astype("<i4"), self.theta.astype("<f8"), self.w.astype("<f8")):
+        scalars = np.array(
+            [*self.mask.shape, self.w_strokes, self.w_beta, self.pixel_size, *self.origin], dtype="<f8"
+        )
+        for array in (
+            scalars,
+            np.packbits(self.mask),
+            self.stroke_pixels.astype("<i4"),
+            self.theta.astype("<f8"),
+            self.w.astype("<f8"),
+        ):
             digest.update(array.tobytes())
         return digest.hexdigest()
