@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 import crossfield as cf
 from crossfield.export.formats import FORMATS
@@ -157,11 +158,17 @@ One pixel with a stroke at 120 degrees (`qp-fixed`, Ipopt): the box forces a ske
 
 
 def pictures() -> None:
-    """docs/pictures: the picture of the README and one for each sample."""
+    """docs/samples.md: a picture of each sample with the field of the greedy baseline."""
     folder = DOCS / "pictures"
     folder.mkdir(exist_ok=True)
-    for name in SAMPLES:
-        cf.draw(cf.greedy(cf.sample(name, 48)), folder / f"{name}.png", kind="overview", title=name.replace("_", " "))
+    parts = ["# Samples", said("python docs/make.py pictures"), "The greedy baseline on grids of 48 pixels."]
+    for name, entry in SAMPLES.items():
+        path = cf.draw(cf.greedy(cf.sample(name, 48)), folder / f"{name}.png", kind="overview")
+        with Image.open(path) as picture:
+            small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+        small.save(path, optimize=True)
+        parts += [f"## `{name}`", f"{entry.description[0].upper()}{entry.description[1:]}.", f"![{name}](pictures/{name}.png)"]
+    (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
 
 
 def readme() -> None:

@@ -52,7 +52,7 @@ class Family:
     """One expression over one index set: a term of the objective, or a row.
 
     tag: short name, the stem of row names; a row's expression is a relation. paper: where it comes from.
-    parity: for rows that are needed only where p_min (or p_max) has this parity, else None.
+    only: (`p_min` or `p_max`, parity) for rows that are needed only where it has this parity, else None.
     """
 
     tag: str
@@ -112,7 +112,11 @@ class Formulation:
     @property
     def variables(self) -> tuple[str, ...]:
         """Names of the blocks of columns, in the order of VARIABLES."""
-        used = {SLOTS[family.over][symbol][0] for family in (*self.objective, *self.rows) for symbol in family.symbols}
+        used = {
+            SLOTS[family.over][symbol][0]
+            for family in (*self.objective, *self.rows)
+            for symbol in family.symbols
+        }
         return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
 
 
@@ -143,12 +147,18 @@ CUBIC: Final = sp.expand(sp.expand(QUARTIC).subs(p1**2, p1))
 LINEAR: Final = 2 * s + 2 * t
 SEPARABLE: Final = 2 * (d**2 + u**2)
 
-S_ROWS: Final = (on_pairs("c14", sp.Ge(s, A, evaluate=False), "(14)"), on_pairs("c15", sp.Ge(s, -A, evaluate=False), "(15)"))
+S_ROWS: Final = (
+    on_pairs("c14", sp.Ge(s, A, evaluate=False), "(14)"),
+    on_pairs("c15", sp.Ge(s, -A, evaluate=False), "(15)"),
+)
 
 
 def t_rows(change: sp.Expr) -> tuple[Family, ...]:
-    """t >= B and t >= -B for a change of skew B: (16), (17)."""
-    return (on_pairs("c16", sp.Ge(t, change, evaluate=False), "(16)"), on_pairs("c17", sp.Ge(t, -change, evaluate=False), "(17)"))
+    """The rows t >= B and t >= -B for a change of skew B: (16), (17)."""
+    return (
+        on_pairs("c16", sp.Ge(t, change, evaluate=False), "(16)"),
+        on_pairs("c17", sp.Ge(t, -change, evaluate=False), "(17)"),
+    )
 
 
 def product_rows(facet: Facet) -> tuple[Family, ...]:
@@ -173,7 +183,10 @@ def stroke_families(norm: int) -> tuple[Family, tuple[Family, ...]]:
     """The stroke term, (5) or (20), and its rows (22), (23)."""
     if norm == 2:
         return on_strokes("strokes", w_strokes * w * R**2, "(5)"), ()
-    rows = (on_strokes("c22", sp.Ge(gamma, R, evaluate=False), "(22)"), on_strokes("c23", sp.Ge(gamma, -R, evaluate=False), "(23)"))
+    rows = (
+        on_strokes("c22", sp.Ge(gamma, R, evaluate=False), "(22)"),
+        on_strokes("c23", sp.Ge(gamma, -R, evaluate=False), "(23)"),
+    )
     return on_strokes("strokes", w_strokes * w * gamma, "(20)"), rows
 
 
@@ -181,7 +194,10 @@ def beta_families(norm: int) -> tuple[Family, tuple[Family, ...]]:
     """The skew term, (6) or (21), and its rows (24), (25). w_beta is meant once."""
     if norm == 2:
         return on_pixels("skew", w_beta * beta**2, "(6)"), ()
-    rows = (on_pixels("c24", sp.Ge(psi, beta, evaluate=False), "(24)"), on_pixels("c25", sp.Ge(psi, -beta, evaluate=False), "(25)"))
+    rows = (
+        on_pixels("c24", sp.Ge(psi, beta, evaluate=False), "(24)"),
+        on_pixels("c25", sp.Ge(psi, -beta, evaluate=False), "(25)"),
+    )
     return on_pixels("skew", w_beta * psi, "(21)"), rows
 
 
@@ -282,9 +298,13 @@ def declare(name: str, **chosen: Any) -> Formulation:
 def _options(recipe: Recipe, chosen: dict[str, Any]) -> Options:
     for key, value in chosen.items():
         if key not in Options.__dataclass_fields__:
-            raise FormulationError(f"there is no option {key!r}; the options are {', '.join(Options.__dataclass_fields__)}")
+            raise FormulationError(
+                f"there is no option {key!r}; the options are {', '.join(Options.__dataclass_fields__)}"
+            )
         if key not in recipe.settable and value != getattr(recipe.defaults, key):
-            raise FormulationError(f"{recipe.name} has no option {key}; it is always {getattr(recipe.defaults, key)}")
+            raise FormulationError(
+                f"{recipe.name} has no option {key}; it is always {getattr(recipe.defaults, key)}"
+            )
     options = replace(recipe.defaults, **chosen)
     if options.facet not in FACETS:
         raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")

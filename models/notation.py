@@ -9,9 +9,11 @@ arrays, never an expression.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Final, Literal
 
+import numpy as np
 import sympy as sp
 
 from .grid import Floats, Ints
@@ -52,12 +54,12 @@ class Variable:
 
     name: str
     over: IndexSet
-    integer: bool
     lower: Callable[[Instance], Floats | Ints | float]
     upper: Callable[[Instance], Floats | Ints | float]
     value: sp.Expr
     latex: str
     meaning: str
+    integer: bool = field(default=False, kw_only=True)
 
 
 _FREE: Final = float("inf")
@@ -65,20 +67,20 @@ _FREE: Final = float("inf")
 VARIABLES: Final = {
     variable.name: variable
     for variable in (
-        Variable("alpha", "pixels", False, lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, r"\alpha", "direction of the cross"),
-        Variable("beta", "pixels", False, lambda _: -QUARTER, lambda _: QUARTER, beta, r"\beta", "skew of the cross"),
-        Variable("p", "pairs", True, lambda i: i.p_min, lambda i: i.p_max, p, "p", "jump between the labels of two neighbours"),
-        Variable("p1", "pairs", True, lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "p^{1}", "1 when the jump is odd"),
-        Variable("p2", "pairs", True, lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "p^{2}", "half of the even part of the jump"),
-        Variable("s", "pairs", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "s", "absolute change of direction"),
-        Variable("t", "pairs", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "t", "absolute change of skew"),
-        Variable("z", "pairs", False, lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "z", "the product of p1 and beta of the first pixel"),
-        Variable("d", "pairs", False, lambda _: -_FREE, lambda _: _FREE, A, "d", "change of direction"),
-        Variable("u", "pairs", False, lambda _: -_FREE, lambda _: _FREE, B, "u", "change of skew"),
-        Variable("gamma", "strokes", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(R), r"\gamma", "absolute deviation from a stroke"),
-        Variable("psi", "pixels", False, lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), r"\psi", "absolute skew"),
+        Variable("alpha", "pixels", lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, r"\alpha", "direction of the cross"),
+        Variable("beta", "pixels", lambda _: -QUARTER, lambda _: QUARTER, beta, r"\beta", "skew of the cross"),
+        Variable("p", "pairs", lambda i: i.p_min, lambda i: i.p_max, p, "p", "jump between the labels of two neighbours", integer=True),
+        Variable("p1", "pairs", lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "p^{1}", "1 when the jump is odd", integer=True),
+        Variable("p2", "pairs", lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "p^{2}", "half of the even part of the jump", integer=True),
+        Variable("s", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "s", "absolute change of direction"),
+        Variable("t", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "t", "absolute change of skew"),
+        Variable("z", "pairs", lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "z", "the product of p1 and beta of the first pixel"),
+        Variable("d", "pairs", lambda _: -_FREE, lambda _: _FREE, A, "d", "change of direction"),
+        Variable("u", "pairs", lambda _: -_FREE, lambda _: _FREE, B, "u", "change of skew"),
+        Variable("gamma", "strokes", lambda _: 0.0, lambda _: _FREE, sp.Abs(R), r"\gamma", "absolute deviation from a stroke"),
+        Variable("psi", "pixels", lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), r"\psi", "absolute skew"),
     )
-}
+}  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
 
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
@@ -114,8 +116,8 @@ LATEX: Final = {
     alpha_j: r"\alpha_j",
     beta_i: r"\beta_i",
     beta_j: r"\beta_j",
-    p1: r"p^{1}_{ij}",
-    p2: r"p^{2}_{ij}",
+    p1: r"p_{ij,1}",
+    p2: r"p_{ij,2}",
     p_min: r"p^{\min}_{ij}",
     p_max: r"p^{\max}_{ij}",
     theta: r"\theta_i",
@@ -140,9 +142,37 @@ def way(instance: Instance, kind: Way) -> Ints | slice:
     return instance.stroke_index if kind == "stroke" else slice(None)
 
 
+def pixel_of(instance: Instance, over: IndexSet) -> Ints:
+    """Number of the pixel at which each element of an index set lies (of a pair: its first pixel)."""
+    if over == "pixels":
+        return np.arange(instance.grid.size, dtype=np.int32)
+    return instance.stroke_index if over == "strokes" else instance.grid.first
+
+
 def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
     """A NumPy function of the symbols that evaluates the expression over whole arrays."""
+    return _compiled(tuple(arguments), expression)
+
+
+@cache
+def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
+    """The declarations are few and fixed, so each is compiled once however many problems and points there are."""
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
 
 
-__all__ = ["HALF", "LATEX", "SCALARS", "SLOTS", "VARIABLES", "A", "B", "B_LIFTED", "R", "Variable", "elements", "numeric", "way"]
+__all__ = [
+    "B_LIFTED",
+    "HALF",
+    "LATEX",
+    "SCALARS",
+    "SLOTS",
+    "VARIABLES",
+    "A",
+    "B",
+    "R",
+    "Variable",
+    "elements",
+    "numeric",
+    "pixel_of",
+    "way",
+]

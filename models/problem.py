@@ -84,7 +84,9 @@ class Bound:
     def columns(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
         name, kind = SLOTS[self.family.over][symbol]
-        return self._reach(np.arange(self.problem.blocks[name].count, dtype=np.int32), kind) + np.int32(self.problem.blocks[name].offset)
+        block = self.problem.blocks[name]
+        columns: Ints = self._reach(np.arange(block.offset, block.offset + block.count, dtype=np.int32), kind)
+        return columns
 
     def _reach(self, values: Any, kind: Any) -> Any:
         index = way(self.problem.instance, kind)
@@ -113,10 +115,15 @@ class Bound:
             return None
         if polynomial is None:
             return (Term((), self.data(self.family.body)),)
+        terms = sorted(
+            polynomial.terms(), key=lambda term: (sum(term[0]), tuple(-power for power in term[0]))
+        )
+        return tuple(Term(self._factors(powers), self.data(c)) for powers, c in terms if c != 0)
+
+    def _factors(self, powers: tuple[int, ...]) -> tuple[Ints, ...]:
+        """Columns of the factors of a monomial, each as often as its power says."""
         return tuple(
-            Term(tuple(self.columns(s) for s, power in zip(self.variables, powers, strict=True) for _ in range(power)), self.data(c))
-            for powers, c in sorted(polynomial.terms(), key=lambda term: (sum(term[0]), tuple(-power for power in term[0])))
-            if c != 0
+            self.columns(s) for s, power in zip(self.variables, powers, strict=True) for _ in range(power)
         )
 
     @property
@@ -129,6 +136,14 @@ class Bound:
         return tuple(term for term in self.terms or () if term.degree == degree)
 
     @cached_property
+    def scale(self) -> Floats:
+        """The largest coefficient of each element's monomials, shape (count,): rounding errors are measured by it."""
+        scale = np.zeros(self.count)
+        for term in self.terms or ():
+            scale = np.maximum(scale, np.abs(term.coefficient))
+        return scale
+
+    @cached_property
     def limit(self) -> Floats:
         """Right side of each row once its constant has moved there, shape (count,)."""
         constant = sum((np.asarray(term.coefficient) for term in self.of_degree(0)), np.zeros(()))
@@ -138,7 +153,7 @@ class Bound:
         """The expression (of a row: left minus right side) at a point, one value per element, shape (count,)."""
         symbols = sorted(self.family.body.free_symbols, key=str)
         evaluate = numeric(symbols, self.family.body)
-        given = (point[self.columns(symbol)] if symbol in self.variables else self._datum(symbol) for symbol in symbols)
+        given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
 
 
@@ -171,7 +186,7 @@ class Problem:
     pinned: CrossField | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data."""
+        """Check that jumps are there exactly where they are data, and that fixed integers are of this instance."""
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -181,8 +196,18 @@ class Problem:
         if self.jumps is not None:
             jumps = np.array(self.jumps, dtype=np.int32)
             if jumps.shape != (elements(self.instance, "pairs"),):
-                raise FormulationError(f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs")
+                raise FormulationError(
+                    f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs"
+                )
             object.__setattr__(self, "jumps", jumps)
+        if self.pinned is not None:
+            self._check_instance_of(self.pinned)
+
+    def _check_instance_of(self, field: CrossField) -> None:
+        if field.instance.sha256 != self.instance.sha256:
+            raise InstanceError(
+                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, or under another gauge"
+            )
 
     @property
     def name(self) -> str:
@@ -211,7 +236,8 @@ class Problem:
             variable = VARIABLES[name]
             shape = (elements(self.instance, variable.over),)
             lower, upper = (
-                np.broadcast_to(np.asarray(bound(self.instance), dtype=np.float64), shape) for bound in (variable.lower, variable.upper)
+                np.broadcast_to(np.asarray(bound(self.instance), dtype=np.float64), shape)
+                for bound in (variable.lower, variable.upper)
             )
             integer = variable.integer and not self.formulation.options.relax
             if variable.integer and self.pinned is not None:
@@ -298,15 +324,16 @@ class Problem:
 
         Coefficients that cancel are left out. Shape (1, 0) for the constant.
         """
-        terms = [(term, family.count) for family in self.objective for term in family.of_degree(degree)]
+        terms = [(term, family) for family in self.objective for term in family.of_degree(degree)]
+        coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
         if degree == 0:
-            total = sum(float(np.sum(np.broadcast_to(term.coefficient, (count,)))) for term, count in terms)
+            total = sum(float(np.sum(values)) for values in coefficients)
             return np.zeros((1, 0), np.int32), np.array([total])
         if not terms:
             return np.zeros((0, degree), np.int32), np.zeros(0)
         index = np.concatenate([np.sort(np.stack(term.factors, axis=1), axis=1) for term, _ in terms])
-        coefficient = np.concatenate([np.broadcast_to(term.coefficient, (count,)) for term, count in terms])
-        return _merge(index, coefficient, self.columns)
+        scale = np.concatenate([family.scale for _, family in terms])
+        return _merge(index, np.concatenate(coefficients), scale, self.columns)
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,)."""
@@ -314,7 +341,10 @@ class Problem:
 
     def violation(self, point: Floats) -> Violation:
         """The worst violations of rows, bounds and integrality at a point (columns,)."""
-        worst = {family.family.tag: float(np.max(_excess(family.family.sense, family.values(point)))) for family in self.rows}
+        worst = {
+            family.family.tag: float(np.max(_excess(family.family.sense, family.values(point))))
+            for family in self.rows
+        }
         tag = max(worst, key=lambda name: worst[name], default="")
         bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
         gaps = np.abs(point - np.round(point))[self.integer]
@@ -326,9 +356,11 @@ class Problem:
         )
 
     def point(self, field: CrossField) -> Floats:
-        """The complete point of a field: angles, jumps, and every other column at the value it stands for."""
-        if field.instance.sha256 != self.instance.sha256:
-            raise InstanceError(f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, or under another gauge")
+        """The complete point of a field: angles, jumps, and every other column at the value it stands for.
+
+        Raises InstanceError when the field is on another instance.
+        """
+        self._check_instance_of(field)
         given = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
@@ -339,15 +371,25 @@ class Problem:
         elif "p" in self.blocks:
             jumps = np.round(point[self.blocks["p"].columns]).astype(np.int32)
         else:
-            jumps = np.round(point[self.blocks["p1"].columns] + 2 * np.round(point[self.blocks["p2"].columns])).astype(np.int32)
-        return CrossField(self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps)
+            jumps = np.round(
+                point[self.blocks["p1"].columns] + 2 * np.round(point[self.blocks["p2"].columns])
+            ).astype(np.int32)
+        return CrossField(
+            self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps
+        )
 
     @cached_property
     def sha256(self) -> str:
         """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {self.formulation.lifted}"
-        given = [jumps for jumps in (self.jumps, None if self.pinned is None else self.pinned.p) if jumps is not None]
-        return hashlib.sha256(text.encode() + b"".join(jumps.astype("<i4").tobytes() for jumps in given)).hexdigest()
+        given = [
+            jumps
+            for jumps in (self.jumps, None if self.pinned is None else self.pinned.p)
+            if jumps is not None
+        ]
+        return hashlib.sha256(
+            text.encode() + b"".join(jumps.astype("<i4").tobytes() for jumps in given)
+        ).hexdigest()
 
 
 def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
@@ -374,17 +416,17 @@ def _excess(sense: str, values: Floats) -> Floats:
 
 
 _NOISE: Final = 1e-12
-"""Coefficients that cancel up to rounding, or come from an angle of 1e-16, are noise: no reader would keep them."""
+"""Relative to its element's largest coefficient: what cancels up to rounding, or comes from an angle of 1e-16, is noise."""
 
 
-def _merge(index: Ints, coefficient: Floats, columns: int) -> tuple[Ints, Floats]:
-    """Sum of coefficients over equal rows of `index`, sorted by row."""
+def _merge(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
+    """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out."""
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
     _, place, inverse = np.unique(key, return_index=True, return_inverse=True)
-    total = np.bincount(inverse, weights=coefficient, minlength=len(place))
-    kept = np.abs(total) > _NOISE
+    total: Floats = np.bincount(inverse, weights=coefficient, minlength=len(place)).astype(np.float64)
+    kept = np.abs(total) > _NOISE * np.bincount(inverse, weights=scale, minlength=len(place))
     return index[place[kept]], total[kept]
 
 
@@ -398,7 +440,10 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
 
 
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
-    """The same problem with its integer columns fixed at the jumps of a field: a continuous problem."""
+    """The same problem with its integer columns fixed at the jumps of a field: a continuous problem.
+
+    Raises InstanceError when the field is on another instance.
+    """
     return replace(problem, pinned=field)
 
 
@@ -407,4 +452,14 @@ def lifted(problem: Problem) -> Problem:
     return replace(problem, formulation=lift_products(problem.formulation))
 
 
-__all__ = ["FORMULATIONS", "Block", "Bound", "Problem", "Term", "Violation", "formulate", "lifted", "with_integers_fixed"]
+__all__ = [
+    "FORMULATIONS",
+    "Block",
+    "Bound",
+    "Problem",
+    "Term",
+    "Violation",
+    "formulate",
+    "lifted",
+    "with_integers_fixed",
+]
