@@ -93,7 +93,8 @@ def accuracy() -> None:
 {said("python docs/make.py accuracy")}
 
 Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one; over all pixels. Strokes are
-exact curvature lines of both families. The MILP is given {SECONDS:g} s and the greedy field as its incumbent.
+exact curvature lines of both families. The MILP is given {SECONDS:g} s and the greedy field as its incumbent; it minimises the 1-norm energy,
+and a lower 1-norm energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest 2-norm energy.
 
 {markdown(columns, rows)}
 """
