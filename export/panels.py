@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
+from ..models.combing import combed
 from ..models.errors import InputError
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.instance import Instance
-from ..models.streamlines import combed, streamlines
+from ..models.streamlines import Streamline, streamlines
 
 FAMILIES: Final = ("#00798c", "#e1812c")
 POSITIVE: Final = "#d1242f"
@@ -47,7 +49,7 @@ class Picture:
     @property
     def unit(self) -> float:
         """Points per pixel."""
-        return self.size / max(self.instance.mask.shape)
+        return self.size / max(self.instance.grid.height, self.instance.grid.width)
 
     @property
     def ink(self) -> float:
@@ -58,7 +60,9 @@ class Picture:
     def crosses(self) -> CrossField:
         """The field. Raises InputError where the picture has none."""
         if self.field is None:
-            raise InputError(f"{self.instance.name} is an instance without a field; draw it with kind instance, or solve it first")
+            raise InputError(
+                f"{self.instance.name} is an instance without a field; draw it with kind instance, or solve it first"
+            )
         return self.field
 
     @cached_property
@@ -100,8 +104,7 @@ def draw_streamlines(axes: Any, picture: Picture) -> None:
     spacing = SPACING * picture.ink / picture.unit
     lines = streamlines(picture.crosses, spacing)
     for family, colour in enumerate(FAMILIES):
-        points = [line.points for line in lines if line.family == family]
-        _lines(axes, points, colour, 0.85 * picture.ink)
+        _lines(axes, [run for line in lines for run in _runs(line, family)], colour, 0.85 * picture.ink)
     _singularities(axes, picture)
 
 
@@ -124,7 +127,14 @@ def draw_energy(axes: Any, picture: Picture) -> None:
     image = _image(axes, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds")
     _border(axes, picture)
     _singularities(axes, picture)
-    _bar(axes, image, picture, "smoothness energy in rad²", ticks=[share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)], format="%.2g")
+    _bar(
+        axes,
+        image,
+        picture,
+        "smoothness energy in rad²",
+        ticks=[share**2 * top for share in (0, 0.25, 0.5, 0.75, 1)],
+        format="%.2g",
+    )
 
 
 def legend_of(picture: Picture) -> list[Any]:
@@ -133,11 +143,16 @@ def legend_of(picture: Picture) -> list[Any]:
 
     field = picture.crosses
     index = field.singularities.index
-    keys = [Line2D([], [], color=colour, lw=1.4, label=f"lines {name}") for colour, name in zip(FAMILIES, "uv", strict=True)]
+    keys = [
+        Line2D([], [], color=colour, lw=1.4, label=f"lines {name}")
+        for colour, name in zip(FAMILIES, "uv", strict=True)
+    ]
     for colour, name, some in ((POSITIVE, "+", index > 0), (NEGATIVE, "−", index < 0)):
         if some.any():
-            sizes = "1/4" if (np.abs(index[some]) < 0.5).all() else "1/4, larger dot: 1/2 or more"
-            keys.append(Line2D([], [], ls="", marker="o", ms=5, mew=0, color=colour, label=f"index {name}{sizes}"))
+            sizes = "1/4" if (np.abs(index[some]) < 0.5).all() else "1/4, large: 1/2"
+            keys.append(
+                Line2D([], [], ls="", marker="o", ms=5, mew=0, color=colour, label=f"index {name}{sizes}")
+            )
     if field.degenerate.any():
         keys.append(Line2D([], [], ls="", marker="s", ms=5, mew=0, color=COLLAPSED, label="lines coincide"))
     return keys
@@ -150,10 +165,24 @@ def _under(axes: Any, picture: Picture) -> None:
     _border(axes, picture)
 
 
-def _lines(axes: Any, lines: Any, colour: Any, width: float) -> None:
+def _runs(line: Streamline, family: int) -> list[Floats]:
+    """The stretches of a line on which it belongs to a family; neighbouring stretches share a point."""
+    limits = np.concatenate([[0], np.flatnonzero(np.diff(line.families)) + 1, [len(line.points)]])
+    return [
+        line.points[first : stop + 1]
+        for first, stop in pairwise(limits.tolist())
+        if line.families[first] == family
+    ]
+
+
+def _lines(axes: Any, lines: Any, colour: Any, width: float, *, snap: bool = False) -> None:
     from matplotlib.collections import LineCollection
 
-    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width, capstyle="round", joinstyle="round"), autolim=False)
+    lines = LineCollection(
+        lines, colors=colour, linewidths=width, capstyle="round", joinstyle="round", clip_on=False
+    )
+    lines.set_snap(snap)
+    axes.add_collection(lines, autolim=False)
 
 
 def _sketch(axes: Any, picture: Picture) -> None:
@@ -177,15 +206,25 @@ def _border(axes: Any, picture: Picture) -> None:
     """The outline of the mask, along pixel sides."""
     mask = np.pad(picture.instance.mask, 1)
     row, column = np.nonzero(mask[1:, :] != mask[:-1, :])
-    level = np.stack([np.stack([column - 1.5, 0.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1)
+    level = np.stack(
+        [np.stack([column - 1.5, 0.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1
+    )
     row, column = np.nonzero(mask[:, 1:] != mask[:, :-1])
-    upright = np.stack([np.stack([column - 0.5, 1.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1)
-    _lines(axes, np.concatenate([level, upright]), BORDER, 0.5 * picture.ink)
+    upright = np.stack(
+        [np.stack([column - 0.5, 1.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1
+    )
+    _lines(axes, np.concatenate([level, upright]), BORDER, 0.5 * picture.ink, snap=True)
 
 
 def _image(axes: Any, values: Floats, **style: Any) -> Any:
     height, width = values.shape[:2]
-    return axes.imshow(values, extent=(-0.5, width - 0.5, 0.5 - height, 0.5), origin="upper", interpolation="nearest", **style)
+    return axes.imshow(
+        values,
+        extent=(-0.5, width - 0.5, 0.5 - height, 0.5),
+        origin="upper",
+        interpolation="nearest",
+        **style,
+    )
 
 
 def _singularities(axes: Any, picture: Picture) -> None:
@@ -194,15 +233,26 @@ def _singularities(axes: Any, picture: Picture) -> None:
     crowd = np.clip(40 / np.sqrt(max(len(found.index), 1)), 0.35, 1.0)
     size = np.where(np.abs(found.index) < 0.5, 5.5, 8.0) * picture.ink * crowd
     colours = np.where(found.index > 0, POSITIVE, NEGATIVE)
-    axes.scatter(found.column + 0.5, -found.row - 0.5, s=size**2, c=colours, edgecolors="white", linewidths=0.8 * picture.ink * crowd, zorder=3, clip_on=False)
+    axes.scatter(
+        found.column + 0.5,
+        -found.row - 0.5,
+        s=size**2,
+        c=colours,
+        edgecolors="white",
+        linewidths=0.8 * picture.ink * crowd,
+        zorder=3,
+        clip_on=False,
+    )
 
 
 def _degenerate(axes: Any, picture: Picture) -> None:
     field = picture.crosses
     grid = field.instance.grid
     at = field.degenerate
-    size = max(picture.unit, 2.5 * picture.ink)
-    axes.scatter(grid.columns[at], -grid.rows[at], s=size**2, marker="s", color=COLLAPSED, linewidths=0, zorder=1)
+    size = max(1.15 * picture.unit, 2.5 * picture.ink)  # a little over, or seams show
+    axes.scatter(
+        grid.columns[at], -grid.rows[at], s=size**2, marker="s", color=COLLAPSED, linewidths=0, zorder=1
+    )
 
 
 def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> None:
@@ -210,5 +260,8 @@ def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> N
     inset = axes.inset_axes([1 + 9 / picture.size, 0.0, 8 / picture.size, 1.0])
     bar = axes.figure.colorbar(image, cax=inset, **style)
     bar.outline.set_visible(False)
-    bar.set_label(label, fontsize=7)
+    if picture.unit * picture.instance.grid.height > 100:
+        bar.set_label(label, fontsize=7)
+    else:
+        bar.set_ticks([bar.vmin, bar.vmax])
     inset.tick_params(labelsize=6.5, length=2, width=0.5)

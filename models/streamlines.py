@@ -72,7 +72,7 @@ def streamlines(field: CrossField, separation: float) -> list[Streamline]:
         raise InputError(f"the separation is {separation} pixels; it must be a number of at least {least:g}")
     cells = _Cells(combed(field))
     cover = _Cover(cells, separation)
-    step = min(separation / 4, _LONGEST)
+    step = min(0.4 * separation, _LONGEST)
     pace = _Pace(step, 4.0 * (cells.height + cells.width), CLOSEST * separation, cover.blocked)
     lines: list[Streamline] = []
     for seeds, families in cover.fronts():
@@ -123,11 +123,11 @@ class _Cells:
         held = self._corners(field.instance.mask, fill=False)
         jump, linked = self._walks()
         total = jump.sum(axis=1)
-        self.singular: Bools = linked.all(axis=1) & (total != 0)
+        complete: Bools = np.all(linked, axis=1)
+        self.singular = complete & (total != 0)
         # Diagonal neighbours without a common one have no jump between them: no interpolation, no way through.
-        self.loose: Bools = ~linked.any(axis=1)
-        opened = ~linked.all(axis=1)
-        jump[opened, np.argmin(linked, axis=1)[opened]] = -total[opened]
+        self.loose: Bools = ~np.any(linked, axis=1)
+        jump[~complete, np.argmin(linked, axis=1)[~complete]] = -total[~complete]
         around = np.concatenate([np.zeros_like(jump[:, :1]), np.cumsum(jump[:, :3], axis=1)], axis=1)
         self.steps = around[:, [3, 2, 0, 1]]  # walk order is bottom left, bottom right, top right, top left
         alpha = self._corners(field.image(field.alpha, 0.0), fill=0.0) - HALF * self.steps
