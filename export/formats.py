@@ -33,7 +33,8 @@ def _nl(problem: Problem, _header: list[str], start: Floats | None, dialect: str
 def _gms(problem: Problem, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
     from . import gams, gams_indexed
 
-    return (gams if dialect == "scalar" else gams_indexed).generate(problem, header, start=start)
+    generate = gams.generate if dialect == "scalar" else gams_indexed.generate
+    return generate(problem, header, start=start)
 
 
 def _lp(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
@@ -77,7 +78,7 @@ FORMATS: Final = {
         Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
         Format("mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _mps),
     )
-}
+}  # fmt: skip
 """The table of formats; command line, docs and tests are generated from it."""
 
 
@@ -110,7 +111,10 @@ def format_of(path: str | Path) -> Format:
     name = Path(path).name.removesuffix(".gz")
     suffix = Path(name).suffix.removeprefix(".")
     if suffix not in FORMATS:
-        raise InputError(f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz", file=path)
+        raise InputError(
+            f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz",
+            file=path,
+        )
     return FORMATS[suffix]
 
 
@@ -127,7 +131,9 @@ def carried(problem: Problem, entry: Format) -> Problem:
             return other
     instead = problem.formulation.equivalent
     remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
-    raise UnsupportedByFormatError(f"{entry.name} holds nothing beyond quadratic and cannot carry {problem.name}; {remedy}")
+    raise UnsupportedByFormatError(
+        f"{entry.name} holds nothing beyond quadratic and cannot carry {problem.name}; {remedy}"
+    )
 
 
 def _degree(problem: Problem) -> int:
@@ -145,7 +151,9 @@ def header(problem: Problem) -> list[str]:
     return lines + ([f"lifted: {formulation.lifted}"] if formulation.lifted else [])
 
 
-def write(problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None) -> Written:
+def write(
+    problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
+) -> Written:
     """What was written to `path`: its suffix names the format, `.gz` compresses; .nl gets .row and .col beside it.
 
     dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point is the starting point
@@ -156,7 +164,9 @@ def write(problem: Problem, path: str | Path, *, dialect: str | None = None, sta
     entry = format_of(path)
     chosen = entry.dialects[0] if dialect is None else dialect
     if chosen not in entry.dialects:
-        raise InputError(f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}")
+        raise InputError(
+            f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}"
+        )
     held = carried(problem, entry)
     point = held.point(start) if start is not None and entry.starts else None
     written = Written(entry.name, chosen, held)
@@ -188,6 +198,8 @@ def compressed(stream: IO[bytes], path: Path) -> Iterator[IO[bytes]]:
     if path.suffix != ".gz":
         yield stream
         return
-    with gzip.GzipFile(filename="", mode="wb", fileobj=stream, compresslevel=3, mtime=0) as archive:
-        with io.BufferedWriter(cast("Any", archive), 1 << 20) as buffer:
-            yield buffer
+    with (
+        gzip.GzipFile(filename="", mode="wb", fileobj=stream, compresslevel=3, mtime=0) as archive,
+        io.BufferedWriter(cast("Any", archive), 1 << 20) as buffer,
+    ):
+        yield buffer

@@ -52,7 +52,8 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     for block in problem.blocks.values():
         yield from _bounds(block, names)
     for title, wanted in ((b"Generals\n", False), (b"Binaries\n", True)):
-        chosen = [block for block in problem.blocks.values() if block.integer and is_binary(block) == wanted]
+        integer = (block for block in problem.blocks.values() if block.integer and block.count)
+        chosen = [block for block in integer if is_binary(block) == wanted]
         if chosen:
             yield title
         for block in chosen:
@@ -103,7 +104,14 @@ def _rows(family: Bound, names: Words) -> Iterator[bytes]:
     if products:
         parts.append(b" + [")
         for term in products:
-            parts += [b" ", coefficient(term, family), b" ", names.at(term.factors[0]), b" * ", names.at(term.factors[1])]
+            parts += [
+                b" ",
+                coefficient(term, family),
+                b" ",
+                names.at(term.factors[0]),
+                b" * ",
+                names.at(term.factors[1]),
+            ]
         parts.append(b" ]")
     sense = b" = " if family.family.sense == "==" else f" {family.family.sense} ".encode()
     parts += [sense, words(scalar_when_constant(family.limit)), b"\n"]

@@ -3,21 +3,30 @@
     bottle_n024.instance.json (or .npz)              the instance, once per folder
     bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
     bottle_n024.milp-mccormick.manifest.json         what these are; all that is needed, with the instance, to read a solution
+
+Names come from the instance and the formulation alone, so that a later export replaces an earlier one.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from ..models.errors import CrossfieldError, InputError, InstanceError, SolutionError, UnsupportedByFormatError
+from ..models.errors import (
+    CrossfieldError,
+    FormulationError,
+    InputError,
+    InstanceError,
+    UnsupportedByFormatError,
+)
 from ..models.field import CrossField
 from ..models.formulations import FORMULATIONS
+from ..models.grid import Ints
 from ..models.instance import Instance
 from ..models.instance_file import check_schema, check_version, parse_json, read_instance, write_instance
 from ..models.problem import Problem, formulate
@@ -32,10 +41,10 @@ LARGE: Final = 1 << 16
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a set of files is: the checked document, and the folder it lies in."""
+    """What a set of files is: the checked document, and where it lies."""
 
     document: dict[str, Any]
-    folder: Path
+    path: Path
 
     @property
     def formulation(self) -> str:
@@ -43,25 +52,46 @@ class Manifest:
         return str(self.document["formulation"])
 
     @property
-    def path(self) -> Path:
-        """Where it lies."""
-        return self.folder / f"{self.document['instance']['name']}.{self.formulation}.manifest.json"
+    def folder(self) -> Path:
+        """The folder of the set."""
+        return self.path.parent
 
     def instance(self) -> Instance:
         """The instance beside the manifest. Raises InputError when it is missing, InstanceError when it is another one."""
         path = self.folder / self.document["instance"]["file"]
         instance = read_instance(path)
         if instance.sha256 != self.document["instance"]["sha256"]:
-            raise InstanceError("is another instance than the one the manifest was written for; export again", file=path)
+            raise InstanceError(
+                "is another instance than the one the manifest was written for; export again", file=path
+            )
         return instance
 
     def problem(self) -> Problem:
-        """The problem that the files hold. Raises InputError, InstanceError."""
+        """The problem that the files hold. Raises InputError, InstanceError, FormulationError."""
         instance = self.instance()
-        problem = formulate(instance, self.formulation, p=_jumps(self.document, instance), **self.document["options"])
+        try:
+            problem = formulate(
+                instance, self.formulation, p=self._jumps(instance), **self.document["options"]
+            )
+        except FormulationError as error:
+            raise FormulationError(str(error), file=self.path) from error
         if problem.sha256 != self.document["sha256"]:
-            raise InstanceError("does not fit its own instance, options and jumps; export again", file=self.path)
+            raise InstanceError(
+                "does not fit its own instance, options and jumps; export again", file=self.path
+            )
         return problem
+
+    def _jumps(self, instance: Instance) -> Ints | None:
+        if self.document["jumps"] is None:
+            return None
+        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        listed = np.array(self.document["jumps"], dtype=np.int64).reshape(-1, 2)
+        if (listed[:, 0] >= len(jumps)).any():
+            raise InstanceError(
+                "lists a jump of a pair that the instance does not have; export again", file=self.path
+            )
+        jumps[listed[:, 0]] = listed[:, 1]
+        return jumps
 
 
 def read_manifest(path: str | Path) -> Manifest:
@@ -69,7 +99,7 @@ def read_manifest(path: str | Path) -> Manifest:
     try:
         document = parse_json(read_bytes(path).decode())
         check_version(document, FORMAT, VERSION)
-        return Manifest(check_schema(document, "manifest"), Path(path).parent)
+        return Manifest(check_schema(document, "manifest"), Path(path))
     except UnicodeDecodeError as error:
         raise InstanceError("is not JSON; give the .manifest.json that export wrote", file=path) from error
     except InstanceError as error:
@@ -87,8 +117,10 @@ def write_problem(
 ) -> Manifest:
     """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
 
-    What a format cannot carry is listed in the manifest as refused. dialects: by format. Raises OutputError, InputError.
+    What a format cannot carry is listed in the manifest as refused. dialects: by format. Raises OutputError, and InputError for an
+    unknown format and for a problem that no manifest records: with integers fixed, or with products lifted beforehand.
     """
+    _check_recordable(problem)
     folder = make_folder(folder)
     stem = f"{problem.instance.name}.{problem.name}"
     written: list[Written] = []
@@ -101,9 +133,18 @@ def write_problem(
             written.append(write(problem, path, dialect=(dialects or {}).get(name), start=start))
         except UnsupportedByFormatError as error:
             refused[name] = str(error)
-    manifest = Manifest(_document(problem, _instance_file(problem.instance, folder), written, refused), folder)
+    document = _document(problem, _instance_file(problem.instance, folder), written, refused)
+    manifest = Manifest(document, folder / f"{stem}.manifest.json")
     write_bytes(manifest.path, (json.dumps(manifest.document, indent=1) + "\n").encode())
     return manifest
+
+
+def _check_recordable(problem: Problem) -> None:
+    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
+    if plain.sha256 != problem.sha256:
+        raise InputError(
+            f"a manifest cannot record {problem.name} with integers fixed or products lifted; write it as a single file"
+        )
 
 
 def write_all(
@@ -128,7 +169,9 @@ def write_all(
     for name in formulations:
         progress(name)
         problem = _formulated(instance, name, start, options or {})
-        manifests.append(write_problem(problem, folder, formats, start=start, dialects=dialects, compress=compress))
+        manifests.append(
+            write_problem(problem, folder, formats, start=start, dialects=dialects, compress=compress)
+        )
     return manifests
 
 
@@ -155,10 +198,14 @@ def _instance_file(instance: Instance, folder: Path) -> str:
     return name
 
 
-def _document(problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]) -> dict[str, Any]:
+def _document(
+    problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
+) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
     integer = {name: block for name, block in problem.blocks.items() if block.integer}
-    binary = sum(block.count for block in integer.values() if (block.lower == 0).all() and (block.upper == 1).all())
+    binary = sum(
+        block.count for block in integer.values() if (block.lower == 0).all() and (block.upper == 1).all()
+    )
     files = [
         {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
         for entry in written
@@ -168,10 +215,15 @@ def _document(problem: Problem, instance_file: str, written: list[Written], refu
         "format": FORMAT,
         "version": VERSION,
         "generator": generator(),
-        "instance": {"file": instance_file, "name": instance.name, "gauge": instance.gauge, "sha256": instance.sha256},
+        "instance": {
+            "file": instance_file,
+            "name": instance.name,
+            "gauge": instance.gauge,
+            "sha256": instance.sha256,
+        },
         "formulation": formulation.name,
         "paper": formulation.paper,
-        "options": {"facet": options.facet, "stroke_norm": options.stroke_norm, "beta_norm": options.beta_norm, "relax": options.relax},
+        "options": asdict(options),
         "class": problem.problem_class,
         "convex": problem.convex,
         "counts": {
@@ -183,8 +235,19 @@ def _document(problem: Problem, instance_file: str, written: list[Written], refu
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),
         },
-        "columns": [{"name": block.name, "over": block.over, "first": block.offset, "count": block.count} for block in problem.blocks.values()],
-        "rows": [{"name": family.family.tag, "over": family.family.over, "count": family.count, "paper": family.family.paper} for family in problem.rows],
+        "columns": [
+            {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
+            for block in problem.blocks.values()
+        ],
+        "rows": [
+            {
+                "name": family.family.tag,
+                "over": family.family.over,
+                "count": family.count,
+                "paper": family.family.paper,
+            }
+            for family in problem.rows
+        ],
         "jumps": _nonzero(problem),
         "sha256": problem.sha256,
         "files": files,
@@ -197,15 +260,5 @@ def _nonzero(problem: Problem) -> list[list[int]] | None:
     if problem.jumps is None:
         return None
     at = np.nonzero(problem.jumps)[0]
-    return np.stack([at, problem.jumps[at]], axis=1).tolist()
-
-
-def _jumps(document: dict[str, Any], instance: Instance) -> np.ndarray[Any, Any] | None:
-    if document["jumps"] is None:
-        return None
-    jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
-    listed = np.array(document["jumps"], dtype=np.int64).reshape(-1, 2)
-    if len(listed) and (listed[:, 0].max() >= len(jumps) or listed[:, 0].min() < 0):
-        raise SolutionError("the manifest lists a jump of a pair that the instance does not have; export again")
-    jumps[listed[:, 0]] = listed[:, 1]
-    return jumps
+    listed: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
+    return listed

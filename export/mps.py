@@ -38,7 +38,9 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:
-        yield from render([b" " + _KIND[family.family.sense] + b" ", Words(family_names(family), None), b"\n"], family.count)
+        yield from render(
+            [b" " + _KIND[family.family.sense] + b" ", Words(family_names(family), None), b"\n"], family.count
+        )
     yield b"COLUMNS\n"
     yield from _columns(problem, names)
     yield b"RHS\n"
@@ -57,7 +59,9 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
 def _columns(problem: Problem, names: Words) -> Iterator[bytes]:
     """Matrix entries column by column; entry (0, j) is the cost of column j."""
     entries, distinct = _entries(problem)
-    rows = Words(stacked([table([OBJECTIVE]), row_names(problem)]) if problem.rows else table([OBJECTIVE]), None)
+    rows = Words(
+        stacked([table([OBJECTIVE]), row_names(problem)]) if problem.rows else table([OBJECTIVE]), None
+    )
     values = table([number(value).encode() for value in distinct.tolist()])
     column = np.repeat(np.arange(problem.columns, dtype=np.int32), np.diff(entries.indptr))
     markers = 0
@@ -67,7 +71,10 @@ def _columns(problem: Problem, names: Words) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         value = Words(values, entries.data[part] - 1)
-        yield from render([b" ", names.at(column[part]), b" ", rows.at(entries.indices[part]), b" ", value, b"\n"], last - first)
+        yield from render(
+            [b" ", names.at(column[part]), b" ", rows.at(entries.indices[part]), b" ", value, b"\n"],
+            last - first,
+        )
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
@@ -90,7 +97,9 @@ def _entries(problem: Problem) -> tuple[sparse.csc_matrix, Floats]:
             check_coefficients(term.coefficient, f"row family {family.family.tag}")
             row_parts.append(np.arange(start, start + family.count, dtype=np.int32))
             column_parts.append(term.factors[0])
-            value_parts.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
+            value_parts.append(
+                np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,))
+            )
         start += family.count
     distinct, codes = np.unique(np.concatenate(value_parts) + 0.0, return_inverse=True)
     triplets = (codes.astype(np.int32) + 1, (np.concatenate(row_parts), np.concatenate(column_parts)))
@@ -98,8 +107,9 @@ def _entries(problem: Problem) -> tuple[sparse.csc_matrix, Floats]:
 
 
 def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
+    """Blocks that follow each other and are alike integer or not; empty blocks are left out."""
     runs: list[tuple[bool, list[Block]]] = []
-    for block in problem.blocks.values():
+    for block in filter(lambda block: block.count, problem.blocks.values()):
         if not runs or runs[-1][0] != block.integer:
             runs.append((block.integer, []))
         runs[-1][1].append(block)
@@ -146,7 +156,9 @@ def _objective_matrix(problem: Problem, names: Words) -> Iterator[bytes]:
     check_coefficients(coefficient, "the objective")
     hessian = np.where(index[:, 0] == index[:, 1], 2 * coefficient, coefficient)
     yield b"QUADOBJ\n"
-    yield from render([b" ", names.at(index[:, 0]), b" ", names.at(index[:, 1]), b" ", words(hessian), b"\n"], len(index))
+    yield from render(
+        [b" ", names.at(index[:, 0]), b" ", names.at(index[:, 1]), b" ", words(hessian), b"\n"], len(index)
+    )
 
 
 def _row_matrices(family: Bound, names: Words) -> Iterator[bytes]:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ..models.instance import Instance
-from ..models.notation import IndexSet
+from ..models.notation import IndexSet, pixel_of
 from ..models.problem import Bound, Problem
 from .records import Bytes, digits, table
 
@@ -26,8 +26,7 @@ OBJECTIVE: Final = b"obj"
 def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
     """Names `tag_row_column[_u|_r]` of all elements of an index set, shape (count, width), no padding."""
     grid = instance.grid
-    places = {"pixels": slice(None), "strokes": instance.stroke_index, "pairs": grid.first}
-    at = places[over]
+    at = pixel_of(instance, over)
     width = max(2, len(str(max(grid.height, grid.width) - 1)))
     row, column = digits(grid.rows[at], width), digits(grid.columns[at], width)
     line = np.full((len(row), 1), ord("_"), dtype=np.uint8)
@@ -52,7 +51,9 @@ def stacked(matrices: list[Bytes]) -> Bytes:
 
 def column_names(problem: Problem) -> Bytes:
     """Names of all columns in column order, shape (columns, width), padded with NUL."""
-    return stacked([element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()])
+    return stacked(
+        [element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()]
+    )
 
 
 def family_names(family: Bound) -> Bytes:

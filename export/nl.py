@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -215,8 +216,14 @@ def generate(problem: Problem, *, binary: bool = False, start: Floats | None = N
     yield _header(layout, code)
     first = 0
     for family in layout.rows:
-        body = _sum(code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]) or code.constant(0.0)
-        yield from render([*code.segment(b"C", np.arange(first, first + family.count, dtype=np.int32)), *body], family.count, padded=code.padded)
+        body = _sum(
+            code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]
+        ) or code.constant(0.0)
+        yield from render(
+            [*code.segment(b"C", np.arange(first, first + family.count, dtype=np.int32)), *body],
+            family.count,
+            padded=code.padded,
+        )
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
@@ -270,7 +277,11 @@ def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> 
     if expression.is_Add or expression.is_Mul:
         return _chain(layout, code, family, expression)
     if expression.is_Pow:
-        return [*code.operator(POWER), *_tree(layout, code, family, expression.base), *code.constant(float(expression.exp))]
+        return [
+            *code.operator(POWER),
+            *_tree(layout, code, family, expression.base),
+            *code.constant(float(expression.exp)),
+        ]
     return [*code.operator(_FUNCTIONS[expression.func]), *_tree(layout, code, family, expression.args[0])]
 
 
@@ -318,10 +329,12 @@ def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
 def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
     """Bounds in file order, one stretch of equal kind after the other."""
     lower, upper = layout.problem.lower[layout.order], layout.problem.upper[layout.order]
-    kind = np.select([np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3)
+    kind = np.select(
+        [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
+    )
     cuts = [0, *(np.nonzero(np.diff(kind))[0] + 1).tolist(), len(kind)]
     yield from _once(code, code.segment(b"b"))
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+    for first, last in pairwise(cuts):
         low, high = lower[first:last], upper[first:last]
         values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[first])]
         yield from render(code.bound(int(kind[first]), *values), last - first, padded=code.padded)
@@ -359,7 +372,9 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
             for columns, _ in entries:
                 count += np.bincount(layout.place[columns], minlength=problem.columns)
         yield from _once(code, code.segment(b"k", problem.columns - 1))
-        yield from render(code.integer(np.cumsum(count)[:-1].astype(np.int32)), problem.columns - 1, padded=code.padded)
+        yield from render(
+            code.integer(np.cumsum(count)[:-1].astype(np.int32)), problem.columns - 1, padded=code.padded
+        )
     first = 0
     for family, entries in rows:
         parts = list(code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries)))

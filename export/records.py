@@ -30,7 +30,9 @@ MOST: Final = 1e15
 class Part(Protocol):
     """A hole of a record: `width` bytes, filled for the records start..stop."""
 
-    width: int
+    @property
+    def width(self) -> int:
+        """Bytes of the longest one."""
 
     def fill(self, out: Bytes, start: int, stop: int) -> None:
         """Write the bytes of these records into `out` [stop - start, width], padded with NUL."""
@@ -92,7 +94,9 @@ class Raw:
 
     def fill(self, out: Bytes, start: int, stop: int) -> None:
         """The bytes of these values."""
-        out[:] = np.ascontiguousarray(self.values[start:stop]).view(np.uint8).reshape(stop - start, self.width)
+        out[:] = (
+            np.ascontiguousarray(self.values[start:stop]).view(np.uint8).reshape(stop - start, self.width)
+        )
 
 
 Pieces = Sequence["bytes | Part"]
@@ -131,7 +135,9 @@ def digits(values: NDArray[Any], width: int) -> Bytes:
 def table(words: Sequence[bytes]) -> Bytes:
     """Words as a matrix of bytes padded with NUL."""
     width = max((len(word) for word in words), default=1)
-    return np.frombuffer(b"".join(word.ljust(width, b"\0") for word in words), dtype=np.uint8).reshape(len(words), width)
+    return np.frombuffer(b"".join(word.ljust(width, b"\0") for word in words), dtype=np.uint8).reshape(
+        len(words), width
+    )
 
 
 def number(value: float) -> str:

@@ -19,6 +19,7 @@ GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 
 QUARTER: Final = np.pi / 4
 HALF: Final = np.pi / 2
+_FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
@@ -49,7 +50,8 @@ class Instance:
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
     mask: bool [height, width], row 0 at the top; True = solve for this pixel.
     stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
-    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi.
+    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi, and as 0 below
+    1e-8: a cost that small would be dropped by readers of the files.
     w: float (s,), reliability of each direction in (0, 1].
     w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6).
     gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
@@ -83,7 +85,8 @@ class Instance:
             object.__setattr__(self, name, float(getattr(self, name)))
         self._check_scalars()
         self._check_strokes()
-        self._freeze("theta", wrap(self.theta, 0.0, np.pi))
+        theta = wrap(self.theta, 0.0, np.pi)
+        self._freeze("theta", np.where(theta < _FLAT, 0.0, theta))
 
     def _freeze(self, name: str, value: Any) -> None:
         value = value.copy()
