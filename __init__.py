@@ -9,35 +9,35 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from .models.field import CrossField as CrossField
-    from .models.errors import CrossfieldError as CrossfieldError
-    from .models.instance import Instance as Instance
-    from .export.solvers import Limits as Limits
-    from .models.problem import Problem as Problem
-    from .export.solution import Solution as Solution
-    from .models.analytic import analytic as analytic
     from .export.draw import draw as draw
+    from .export.formats import write as write
+    from .export.manifest import read_manifest as read_manifest
+    from .export.manifest import write_all as write_all
+    from .export.manifest import write_problem as write_problem
+    from .export.pyomo_model import to_pyomo as to_pyomo
+    from .export.run import run as run
+    from .export.solution import Solution as Solution
+    from .export.solution import read_solution as read_solution
+    from .export.solvers import Limits as Limits
+    from .export.solvers import solve as solve
     from .export.stages import fit_angles as fit_angles
-    from .models.problem import formulate as formulate
+    from .export.stages import two_stage as two_stage
+    from .models.analytic import analytic as analytic
+    from .models.errors import CrossfieldError as CrossfieldError
+    from .models.field import CrossField as CrossField
+    from .models.field_file import read_field as read_field
+    from .models.field_file import write_field as write_field
     from .models.greedy import greedy as greedy
     from .models.greedy import power_field as power_field
-    from .models.field_file import read_field as read_field
+    from .models.instance import Instance as Instance
     from .models.instance_file import read_instance as read_instance
-    from .export.manifest import read_manifest as read_manifest
-    from .models.sketch import read_sketch as read_sketch
-    from .export.solution import read_solution as read_solution
-    from .export.run import run as run
+    from .models.instance_file import write_instance as write_instance
+    from .models.problem import Problem as Problem
+    from .models.problem import formulate as formulate
+    from .models.problem import with_integers_fixed as with_integers_fixed
     from .models.samples import sample as sample
     from .models.samples import samples as samples
-    from .export.solvers import solve as solve
-    from .export.pyomo_model import to_pyomo as to_pyomo
-    from .export.stages import two_stage as two_stage
-    from .models.problem import with_integers_fixed as with_integers_fixed
-    from .export.formats import write as write
-    from .export.manifest import write_all as write_all
-    from .models.field_file import write_field as write_field
-    from .models.instance_file import write_instance as write_instance
-    from .export.manifest import write_problem as write_problem
+    from .models.sketch import read_sketch as read_sketch
 
 _HOME: Final = {
     "CrossField": ".models.field",

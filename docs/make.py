@@ -10,10 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from PIL import Image
-
 import crossfield as cf
+import numpy as np
 from crossfield.export.formats import FORMATS
 from crossfield.export.stages import fit_angles, two_stage
 from crossfield.export.tables import sample_rows, tables
@@ -23,6 +21,7 @@ from crossfield.models.instance import GAUGES, Gauge, Instance
 from crossfield.models.latex import latex
 from crossfield.models.notation import VARIABLES
 from crossfield.models.samples import SAMPLES
+from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / "README.md"
@@ -43,14 +42,21 @@ def said(command: str) -> str:
 def formulations() -> None:
     """docs/formulations.md: every formulation as mathematics, and the tables of what goes with what."""
     parts = ["# Formulations", said("python docs/make.py formulations"), INTRODUCTION]
-    parts.append(markdown(("variable", "over", "meaning"), [[f"`{v.name}`", v.over, v.meaning] for v in VARIABLES.values()]))
+    parts.append(
+        markdown(
+            ("variable", "over", "meaning"), [[f"`{v.name}`", v.over, v.meaning] for v in VARIABLES.values()]
+        )
+    )
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
         settable = ", ".join(sorted(recipe.settable)) or "none"
         facts = f"Section {recipe.paper} of the paper. {recipe.kind}. {recipe.summary[0].upper()}{recipe.summary[1:]}. Options: {settable}."
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
-    parts += ["## Who solves what here", markdown(columns, [[str(row[column]) for column in columns] for row in rows])]
+    parts += [
+        "## Who solves what here",
+        markdown(columns, [[str(row[column]) for column in columns] for row in rows]),
+    ]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
 
 
@@ -86,8 +92,27 @@ def accuracy() -> None:
             for method, found in methods(known.instance).items():
                 error = np.degrees(found.cross_error(known.u_angle, known.v_angle))
                 numbers = [error.mean(), np.median(error), np.percentile(error, 95), found.energy(2).total]
-                rows.append([name, str(size), f"{share:.0%}", method, *(f"{value:.2f}" for value in numbers), str(len(found.singularities.index))])
-    columns = ("instance", "size", "stroke pixels", "method", "mean", "median", "95th percentile", "2-norm energy", "singularities")
+                rows.append(
+                    [
+                        name,
+                        str(size),
+                        f"{share:.0%}",
+                        method,
+                        *(f"{value:.2f}" for value in numbers),
+                        str(len(found.singularities.index)),
+                    ]
+                )
+    columns = (
+        "instance",
+        "size",
+        "stroke pixels",
+        "method",
+        "mean",
+        "median",
+        "95th percentile",
+        "2-norm energy",
+        "singularities",
+    )
     text = f"""# Accuracy on surfaces with a known answer
 
 {said("python docs/make.py accuracy")}
@@ -106,12 +131,21 @@ def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes"
     random = np.random.default_rng(seed)
     mask = np.ones((height, width), dtype=bool)
     pixels = np.argwhere(random.random(mask.shape) < 0.4)
-    return Instance(f"random_{seed}", mask, pixels, random.uniform(0, np.pi, len(pixels)), np.ones(len(pixels)), gauge=gauge)
+    return Instance(
+        f"random_{seed}",
+        mask,
+        pixels,
+        random.uniform(0, np.pi, len(pixels)),
+        np.ones(len(pixels)),
+        gauge=gauge,
+    )
 
 
 def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
     """The solution of a formulation, started at the greedy baseline."""
-    return cf.solve(cf.formulate(instance, name, **options), start=cf.greedy(instance), limits=cf.Limits(120.0))
+    return cf.solve(
+        cf.formulate(instance, name, **options), start=cf.greedy(instance), limits=cf.Limits(120.0)
+    )
 
 
 def errata() -> None:
@@ -120,14 +154,31 @@ def errata() -> None:
     for seed in range(3):
         for facet in ("hull", "printed"):
             found = optimum(random_instance(4, 4, seed), "milp-mccormick", facet=facet)
-            facets.append([str(seed), facet, f"{found.objective:.6f}", f"{found.field.energy(1).total:.6f}", str(found.status)])
+            facets.append(
+                [
+                    str(seed),
+                    facet,
+                    f"{found.objective:.6f}",
+                    f"{found.field.energy(1).total:.6f}",
+                    str(found.status),
+                ]
+            )
     gauges = []
     for seed in range(1, 4):
         for gauge in GAUGES:
             instance = random_instance(2, 3, seed, gauge)
             both = [optimum(moved, "miqp-exact") for moved in (instance, instance.turned())]
-            gauges.append([str(seed), gauge, *(f"{found.objective:.6f}" for found in both), " / ".join(found.message.split(": ")[1] for found in both)])
-    single = Instance("single", np.ones((1, 1), bool), np.array([[0, 0]]), np.array([2 * np.pi / 3]), np.ones(1))
+            gauges.append(
+                [
+                    str(seed),
+                    gauge,
+                    *(f"{found.objective:.6f}" for found in both),
+                    " / ".join(found.message.split(": ")[1] for found in both),
+                ]
+            )
+    single = Instance(
+        "single", np.ones((1, 1), bool), np.array([[0, 0]]), np.array([2 * np.pi / 3]), np.ones(1)
+    )
     angles = []
     for gauge in GAUGES:
         field = cf.solve(cf.formulate(single.with_gauge(gauge), "qp-fixed", p=np.zeros(0, np.int32))).field
@@ -168,17 +219,26 @@ def pictures() -> None:
         with Image.open(path) as picture:
             small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
         small.save(path, optimize=True)
-        parts += [f"## `{name}`", f"{entry.description[0].upper()}{entry.description[1:]}.", f"![{name}](pictures/{name}.png)"]
+        parts += [
+            f"## `{name}`",
+            f"{entry.description[0].upper()}{entry.description[1:]}.",
+            f"![{name}](pictures/{name}.png)",
+        ]
     (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
 
 
 def readme() -> None:
     """The tables inside README.md, between their markers."""
-    columns, rows = tables()["formulations"]
+    _, rows = tables()["formulations"]
     shown = ("name", "paper", "class", *FORMATS)
-    replace_between("formulations", markdown(shown, [[f"`{row['name']}`", *(str(row[column]) for column in shown[1:])] for row in rows]))
+    replace_between(
+        "formulations",
+        markdown(shown, [[f"`{row['name']}`", *(str(row[column]) for column in shown[1:])] for row in rows]),
+    )
     shown = ("name", "kind", "description")
-    replace_between("samples", markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows(24)]))
+    replace_between(
+        "samples", markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows(24)])
+    )
 
 
 def replace_between(name: str, text: str) -> None:
@@ -189,7 +249,9 @@ def replace_between(name: str, text: str) -> None:
     README.write_text(f"{head}{begin}\n{text}\n{rest[rest.index(end) :]}")
 
 
-PAGES: dict[str, Callable[[], None]] = {page.__name__: page for page in (formulations, errata, accuracy, pictures, readme)}
+PAGES: dict[str, Callable[[], None]] = {
+    page.__name__: page for page in (formulations, errata, accuracy, pictures, readme)
+}
 
 
 def main() -> None:

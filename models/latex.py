@@ -9,7 +9,11 @@ import sympy as sp
 from .formulations import Family, Formulation
 from .notation import LATEX, VARIABLES, IndexSet, w, w_beta, w_strokes
 
-_SUM: Final[dict[IndexSet, str]] = {"pixels": r"\sum_{i \in I}", "strokes": r"\sum_{i \in S_c}", "pairs": r"\sum_{(i,j) \in E}"}
+_SUM: Final[dict[IndexSet, str]] = {
+    "pixels": r"\sum_{i \in I}",
+    "strokes": r"\sum_{i \in S_c}",
+    "pairs": r"\sum_{(i,j) \in E}",
+}
 _FOR: Final[dict[IndexSet, str]] = {"pixels": r"i \in I", "strokes": r"i \in S_c", "pairs": r"(i,j) \in E"}
 _WEIGHTS: Final = (w_strokes, w_beta, w)
 _SENSE: Final = {">=": r"\ge", "<=": r"\le", "==": "="}
@@ -36,7 +40,10 @@ def expression(value: sp.Expr) -> str:
 
 def latex(formulation: Formulation) -> str:
     """The whole model as one `aligned` environment: objective, rows with their equation numbers, domains."""
-    terms = [f"& {'+' if place else ''} {_SUM[family.over]} {_summand(family)}" for place, family in enumerate(formulation.objective)]
+    terms = [
+        f"& {'+' if place else ''} {_SUM[family.over]} {_summand(family)}"
+        for place, family in enumerate(formulation.objective)
+    ]
     lines = [r"\min\ " + terms[0], *(rf"\quad {term}" for term in terms[1:])]
     lines += [_row(family) for family in formulation.rows]
     lines += [rf"& {_DOMAIN[name]} && {_FOR[VARIABLES[name].over]}" for name in formulation.variables]

@@ -51,6 +51,11 @@ def test_generated_tables_are_up_to_date(tmp_path):
     (copy / "docs").mkdir(parents=True)
     (copy / "README.md").write_text(README)
     (copy / "docs" / "make.py").write_text((ROOT / "docs" / "make.py").read_text())
-    subprocess.run([sys.executable, "docs/make.py", "readme", "formulations"], cwd=copy, check=True, env=os.environ | {"PYTHONHASHSEED": "7"})
+    subprocess.run(
+        [sys.executable, "docs/make.py", "readme", "formulations"],
+        cwd=copy,
+        check=True,
+        env=os.environ | {"PYTHONHASHSEED": "7"},
+    )
     assert (copy / "README.md").read_text() == README
     assert (copy / "docs" / "formulations.md").read_text() == (ROOT / "docs" / "formulations.md").read_text()

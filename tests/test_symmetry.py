@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 import crossfield as cf
+import pytest
 from crossfield.models.samples import SAMPLES
 
 
@@ -25,8 +24,12 @@ def smallest(name):
 def test_optimum_is_the_same_after_quarter_turn_and_mirror(name):
     instance = smallest(name)
     found = [
-        cf.solve(cf.formulate(moved, "milp-mccormick"), "highs", limits=cf.Limits(120.0), start=cf.greedy(moved))
+        cf.solve(
+            cf.formulate(moved, "milp-mccormick"), "highs", limits=cf.Limits(120.0), start=cf.greedy(moved)
+        )
         for moved in (instance, instance.turned(), instance.mirrored())
     ]
     assert all(solution.status == "optimal-global" for solution in found)
-    assert max(s.objective for s in found) - min(s.objective for s in found) <= 1e-5 * max(1.0, found[0].objective)
+    assert max(s.objective for s in found) - min(s.objective for s in found) <= 1e-5 * max(
+        1.0, found[0].objective
+    )
