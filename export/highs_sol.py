@@ -13,8 +13,8 @@ Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
     ...
     # Rows 2                        style 0 alone; rows, dual values and a basis follow and are not needed here
 
-Values below 1e-13 in size are written as 0. Styles 1 to 3 round to some six digits or drop the names: they are
-refused. HiGHS says `Optimal` of local points of non-convex quadratic problems, which it does not take on paper: what
+Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style 2 has GLPK's layout
+and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic problems, which it does not take on paper: what
 class of problem it was given has to be checked where it is called.
 """
 
@@ -34,7 +34,6 @@ NAME: Final = "highs"
 _HEAD: Final = b"Model status\n"
 _OTHER_STYLES: Final = {
     re.compile(rb"Columns\n +Index +Status"): "style 1 (pretty), which has six digits only",
-    re.compile(rb"c Problem:"): "style 2 (GLPK raw), which has no names",
     re.compile(rb"Problem:"): "style 3 (GLPK pretty), which has six digits only",
 }
 _STATUS: Final = {

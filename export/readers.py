@@ -12,7 +12,20 @@ from typing import Final
 
 from ..models.errors import SolutionError
 from ..models.storage import read_bytes
-from . import ampl_sol, highs_sol
+from . import (
+    ampl_sol,
+    baron_sol,
+    cbc_sol,
+    cplex_sol,
+    gams_csv,
+    gams_lst,
+    glpk_sol,
+    gurobi_sol,
+    highs_sol,
+    miplib_sol,
+    scip_sol,
+    xpress_sol,
+)
 from .solution_text import HEAD, RawSolution
 
 _GZIP: Final = b"\x1f\x8b"
@@ -37,9 +50,40 @@ READERS: Final = (
     Reader(
         highs_sol.NAME, "HiGHS, solution style 0 (raw) or 4 (sparse)", highs_sol.recognises, highs_sol.parse
     ),
+    Reader(gurobi_sol.JSON, "Gurobi .json", gurobi_sol.recognises_json, gurobi_sol.parse_json),
+    Reader(
+        gurobi_sol.NAME,
+        "Gurobi .sol, or any list of names and values",
+        gurobi_sol.recognises,
+        gurobi_sol.parse,
+    ),
+    Reader(cplex_sol.NAME, "CPLEX .sol (XML)", cplex_sol.recognises, cplex_sol.parse),
+    Reader(scip_sol.NAME, "SCIP .sol", scip_sol.recognises, scip_sol.parse),
+    Reader(xpress_sol.SLX, "Xpress .slx", xpress_sol.recognises_slx, xpress_sol.parse_slx),
+    Reader(xpress_sol.ASC, "Xpress .asc", xpress_sol.recognises_asc, xpress_sol.parse_asc),
+    Reader(cbc_sol.NAME, "CBC, the file of its command solution", cbc_sol.recognises, cbc_sol.parse),
+    Reader(glpk_sol.NAME, "GLPK, glpsol -w", glpk_sol.recognises, glpk_sol.parse),
+    Reader(
+        gams_csv.NAME,
+        "GAMS, the CSV that our models write with --RESULTS",
+        gams_csv.recognises,
+        gams_csv.parse,
+    ),
+    Reader(gams_lst.NAME, "GAMS listing (.lst), for the status alone", gams_lst.recognises, gams_lst.parse),
+    Reader(
+        baron_sol.RESULTS, "BARON results (res.lst)", baron_sol.recognises_results, baron_sol.parse_results
+    ),
+    Reader(
+        baron_sol.TIMES,
+        "BARON times (tim.lst), for the status alone",
+        baron_sol.recognises_times,
+        baron_sol.parse_times,
+    ),
+    Reader(miplib_sol.NAME, "MIPLIB .sol", miplib_sol.recognises, miplib_sol.parse),
     Reader(ampl_sol.BINARY, "AMPL .sol, binary", ampl_sol.recognises_binary, ampl_sol.parse_binary),
     Reader(ampl_sol.TEXT, "AMPL .sol, text", ampl_sol.recognises_text, ampl_sol.parse_text),
 )
+"""The table of readers: the first that recognises a file reads it; no real file is recognised by two."""
 
 
 def read_raw(path: str | Path) -> RawSolution:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import repeat
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from ..models.grid import Bools, Floats
 Bytes = NDArray[np.bytes_]
 Letters = NDArray[np.uint8]
 Positions = NDArray[np.int64]
+
+Order = Literal["nl", "lp", "mps"]
+"""The kind of file whose columns a positional solution follows: .nl has an order of its own, LP and MPS put ONE first and last."""
 
 TOKEN_LIMIT: Final = 63
 """Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
@@ -65,6 +68,7 @@ class RawSolution:
     on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
+    order: the order of the values where there are no names.
     A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
     """
 
@@ -76,11 +80,20 @@ class RawSolution:
     values: Floats
     omits_zeros: bool = False
     rows: int | None = None
+    order: Order = "nl"
 
     @property
     def has_point(self) -> bool:
         """Whether the file holds a point; one without values is the point 0 where zeros are omitted."""
         return self.values.size > 0 or self.omits_zeros
+
+
+def without_point(
+    reader: str, status: Status, message: bytes | str, *, rows: int | None = None
+) -> RawSolution:
+    """What a file without a point says; the message is put on one line."""
+    words = one_line(message if isinstance(message, bytes) else message.encode())
+    return RawSolution(reader, status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
 
 
 class NamedValues(NamedTuple):
@@ -116,7 +129,7 @@ def _listed(raw: RawSolution) -> Bytes:
     _check_point(raw)
     if raw.names is None:
         raise SolutionError(
-            "the file lists values without names; it must be read by position, in the order of the .nl file"
+            f"the file lists values without names; it must be read by position, in the order of the .{raw.order} file"
         )
     return raw.names
 
@@ -147,6 +160,10 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     _check_point(raw)
     found = raw.values.size
     if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
+        if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
+            raise SolutionError(
+                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); write it with write_solution_style = 0 (raw) or 4 (sparse)"
+            )
         size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
             f"the file is of {size}, the problem has {columns} columns and {rows} rows; give the solution of this very problem"
@@ -168,6 +185,12 @@ def fault(data: bytes, position: int, text: str) -> SolutionError:
     """An error that names the line of a byte position in a text."""
     line = data.count(b"\n", 0, position) + 1
     return SolutionError(f"line {line}: {text}")
+
+
+def line_after(data: bytes, position: int, count: int) -> int:
+    """Where the line begins that comes `count` whole lines after a byte position."""
+    ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=position) == ord("\n"))
+    return position + (int(ends[count - 1]) + 1 if count else 0)
 
 
 @dataclass
@@ -228,6 +251,15 @@ def is_number(text: bytes) -> bool:
     return len(text) <= TOKEN_LIMIT and _NUMBER.fullmatch(text) is not None
 
 
+def number_of(text: bytes) -> float | None:
+    """The number that a word spells as solvers do, or None."""
+    found = _NUMBER.fullmatch(text)
+    if found is None or len(text) > TOKEN_LIMIT:
+        return None
+    sign, digits = found.groups()
+    return float(sign + digits.translate(_FORTRAN)) if digits else float(sign + b"inf")
+
+
 def numbers(data: bytes, start: int, stop: int) -> Floats:
     """The numbers in a text that has one on each line from byte `start` to `stop`; a new line must end the last one.
 
@@ -242,13 +274,47 @@ def named_numbers(data: bytes, start: int, stop: int, per_line: int) -> tuple[By
 
     What follows the value must be numbers too, and is left out. Raises SolutionError with the line at fault.
     """
+    names, values = labelled_numbers(data, start, stop, per_line, label=0, numeric=tuple(range(1, per_line)))
+    return names, values[:, 0].copy()
+
+
+def labelled_numbers(
+    data: bytes, start: int, stop: int, per_line: int, *, label: int, numeric: tuple[int, ...]
+) -> tuple[Bytes, Floats]:
+    """Labels (k,) and numbers (k, len(numeric)) of a text of lines of `per_line` words.
+
+    label, numeric: places of the label and of the numbers among the words of a line; other words are left out.
+    Raises SolutionError with the line at fault.
+    """
     names: list[Bytes] = [np.empty(0, dtype="S1")]
-    values = [np.empty(0)]
+    values = [np.empty((0, len(numeric)))]
+    chosen = np.isin(np.arange(per_line), numeric)
     for piece in _pieces(data, start, stop):
         tokens = _tokens(piece, per_line)
-        names.append(_names(piece.text, tokens.take(slice(0, None, per_line))))
-        values.append(_floats(piece, tokens, per_line)[:: per_line - 1])
+        names.append(_names(piece.text, tokens.take(slice(label, None, per_line))))
+        values.append(_floats(piece, tokens.take(np.tile(chosen, len(names[-1])))).reshape(-1, len(numeric)))
     return np.concatenate(names), np.concatenate(values)
+
+
+def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
+    """The names and values of a parsed document as arrays. Raises SolutionError for a name that is too long, or NaN."""
+    long = next((name for name in names if len(name) > TOKEN_LIMIT), None)
+    if long is not None:
+        raise SolutionError(
+            f"the name {shown(long.encode(errors='replace'))}... has more than {TOKEN_LIMIT} characters; "
+            "give the solution of the file that was written"
+        )
+    numbers_ = np.array(values, dtype=np.float64)
+    if np.isnan(numbers_).any():
+        at = int(np.argmax(np.isnan(numbers_)))
+        raise SolutionError(f"{names[at]} has no value; let the solver write the file again")
+    return np.array([name.encode(errors="replace") for name in names] or np.empty(0, "S1")), numbers_
+
+
+def words_of_line(data: bytes, position: int) -> list[bytes]:
+    """The words of the line that begins at a byte position; none at the end of the text."""
+    end = data.find(b"\n", position)
+    return data[position : len(data) if end < 0 else end].split()
 
 
 class _Piece(NamedTuple):
@@ -321,13 +387,9 @@ def _names(text: Letters, tokens: _Tokens) -> Bytes:
     return letters.view(f"S{len(offset)}").ravel()
 
 
-def _floats(piece: _Piece, tokens: _Tokens, per_line: int = 1) -> Floats:
-    """All words as numbers; with more than one word per line all but the first of each line."""
-    text = piece.text
-    if per_line > 1:
-        names = tokens.take(slice(0, None, per_line))
-        tokens = tokens.take(np.arange(len(tokens.starts)) % per_line > 0)
-        text = np.where(_inside(names, len(text)), np.uint8(ord(" ")), text)
+def _floats(piece: _Piece, tokens: _Tokens) -> Floats:
+    """The given words of a piece as numbers."""
+    text = np.where(_inside(tokens, len(piece.text)), piece.text, np.uint8(ord(" ")))
     values = _fast_floats(text.tobytes())
     if values is not None and len(values) == len(tokens.starts) and not np.isnan(values).any():
         return values
@@ -336,10 +398,10 @@ def _floats(piece: _Piece, tokens: _Tokens, per_line: int = 1) -> Floats:
 
 
 def _inside(tokens: _Tokens, size: int) -> Bools:
-    change = np.zeros(size, dtype=np.int8)
+    change = np.zeros(size + 1, dtype=np.int8)  # the last word may end where the piece does
     change[tokens.starts] = 1
     change[tokens.ends] = -1
-    return np.cumsum(change, dtype=np.int8).view(bool)
+    return np.cumsum(change[:size], dtype=np.int8).view(bool)
 
 
 def _fast_floats(text: bytes) -> Floats | None:
@@ -356,8 +418,7 @@ def _fast_floats(text: bytes) -> Floats | None:
 
 
 def _number(data: bytes, position: int, text: bytes) -> float:
-    found = _NUMBER.fullmatch(text)
-    if found is None:
+    value = number_of(text)
+    if value is None:
         raise fault(data, position, f"{shown(text)} is not a number; let the solver write the file again")
-    sign, digits = found.groups()
-    return float(sign + digits.translate(_FORTRAN)) if digits else float(sign + b"inf")
+    return value

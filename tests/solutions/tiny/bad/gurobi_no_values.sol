@@ -1,0 +1,2 @@
+# Solution for model obj
+# Objective value = 5.5653608284593448e-01
