@@ -1,16 +1,22 @@
 """A solver driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
 Run as a child process, `python -m crossfield.export.casadi_driver ipopt model.nl model.sol seconds gap`: a crash of a solver takes
-the child alone, and its log is the child's output. On an interrupt (SIGINT) the best point so far is left.
+the child alone, and its log is the child's output. The log's first line says that the solver starts now; from then on an
+interrupt (SIGINT) ends the search and leaves the best point so far.
+
+Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better points only, and the
+start is the answer when there is none.
 """
 
 from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -36,9 +42,14 @@ _CODES: Final = {
     "USER_INTERRUPT": 400,
 }
 _FAILURE: Final = 500
+_STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
+_FEASIBLE: Final = 1e-6
+"""Violation up to which a start counts as feasible: the solvers' own tolerance."""
+_NO_POINT: Final = 1e49
+"""Bonmin's objective when it has no incumbent is 1e50."""
 
 
-class Stop(ca.Callback):  # type: ignore[misc]
+class Stop(ca.Callback):
     """Called by Ipopt at every iterate; asks it to stop once an interrupt has come."""
 
     def __init__(self, columns: int, rows: int) -> None:
@@ -72,45 +83,128 @@ class Stop(ca.Callback):  # type: ignore[misc]
         """Shape of an input."""
         return ca.Sparsity.dense(self.sizes[str(ca.nlpsol_out(i))], 1)
 
-    def eval(self, _arguments: list[Any]) -> list[int]:
+    def eval(self, _arguments: Sequence[Any]) -> list[int]:
         """1 to stop, 0 to go on."""
         return [int(self.wanted)]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What a .nl file holds, as CasADi reads it: the problem, bounds, the start (zeros where the file has none), integrality."""
+
+    problem: dict[str, Any]
+    bounds: dict[str, Any]
+    start: np.ndarray[Any, Any]
+    discrete: list[bool]
+    rows: int
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return len(self.start)
+
+    def value_of_start(self) -> float | None:
+        """The objective at the start, or None when the start is not feasible."""
+        evaluate = ca.Function("evaluate", [self.problem["x"]], [self.problem["f"], self.problem["g"]])
+        objective, rows = (np.array(value).ravel() for value in evaluate(self.start))
+        bounds = {name: np.array(values, dtype=float) for name, values in self.bounds.items()}
+        gaps = np.abs(self.start - np.round(self.start))[np.array(self.discrete, dtype=bool)]
+        excess = (
+            bounds["lbx"] - self.start,
+            self.start - bounds["ubx"],
+            bounds["lbg"] - rows,
+            rows - bounds["ubg"],
+            gaps,
+        )
+        return float(objective[0]) if max(part.max(initial=0.0) for part in excess) <= _FEASIBLE else None
+
+
+class Ending(NamedTuple):
+    """The solver's own words, AMPL's solve code, and the point in .nl order, empty when there is none."""
+
+    words: str
+    code: int
+    point: np.ndarray[Any, Any]
+
+
+def read_model(path: Path) -> Model:
+    """The content of a .nl file."""
+    builder = ca.NlpBuilder()
+    builder.import_nl(str(path))
+    return Model(
+        problem={"x": ca.vertcat(*builder.x), "f": builder.f, "g": ca.vertcat(*builder.g)},
+        bounds={"lbx": builder.x_lb, "ubx": builder.x_ub, "lbg": builder.g_lb, "ubg": builder.g_ub},
+        start=np.array(builder.x_init, dtype=float),
+        discrete=list(builder.discrete),
+        rows=len(builder.g),
+    )
 
 
 def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
     """Options of the solver for a time limit and a relative gap."""
     if solver == "ipopt":
-        return {"ipopt.max_wall_time": seconds, "ipopt.tol": 1e-10, "ipopt.max_iter": 10000, "ipopt.bound_relax_factor": 0.0, "ipopt.sb": "yes"}
-    return {"bonmin.time_limit": seconds, "bonmin.allowable_fraction_gap": gap, "bonmin.algorithm": "B-BB"}
+        return {
+            "ipopt.max_wall_time": seconds,
+            "ipopt.tol": 1e-10,
+            "ipopt.max_iter": 10000,
+            # Fixed integers make equations of the facets. Without a little room Ipopt then stops early and says optimal.
+            "ipopt.bound_relax_factor": 1e-9,
+            "ipopt.honor_original_bounds": "yes",
+            "ipopt.sb": "yes",
+        }
+    return {
+        "bonmin.time_limit": seconds,
+        "bonmin.allowable_fraction_gap": gap,
+        "bonmin.algorithm": "B-BB",
+        # These two start a search in the search, which heeds neither a limit nor an interrupt.
+        "bonmin.heuristic_dive_MIP_fractional": "no",
+        "bonmin.heuristic_dive_MIP_vectorLength": "no",
+    }
 
 
-def solve(solver: str, model: Path, seconds: float, gap: float) -> tuple[str, int, np.ndarray[Any, Any], tuple[int, int]]:
-    """The solver's own words, AMPL's solve code, the point in .nl order, and the numbers of columns and rows."""
-    builder = ca.NlpBuilder()
-    builder.import_nl(str(model))
-    problem = {"x": ca.vertcat(*builder.x), "f": builder.f, "g": ca.vertcat(*builder.g)}
+def solve(
+    solver: str, model: Model, seconds: float, gap: float, started: Callable[[], object] = lambda: None
+) -> Ending:
+    """How the solver ended. `started` is called when it is about to begin.
+
+    Must run in the main thread of a process of its own: it takes over the handling of SIGINT.
+    """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
-    rows = len(builder.g)
-    stop = Stop(len(builder.x), rows)
+    stop = Stop(model.columns, model.rows)
+    signal.signal(signal.SIGINT, stop.on_signal)  # Bonmin puts a handler of its own in its place
+    best = None
     if solver == "ipopt":
         chosen["iteration_callback"] = stop
-        signal.signal(signal.SIGINT, stop.on_signal)  # Bonmin installs a handler of its own
     else:
-        chosen["discrete"] = builder.discrete
-    run = ca.nlpsol("solver", solver, problem, chosen)
-    answer = run(x0=builder.x_init, lbx=builder.x_lb, ubx=builder.x_ub, lbg=builder.g_lb, ubg=builder.g_ub)
+        chosen["discrete"] = model.discrete
+        best = model.value_of_start()
+        chosen |= {} if best is None else {"bonmin.cutoff": best}
+    run = ca.nlpsol("solver", solver, model.problem, chosen)
+    started()
+    answer = run(x0=model.start, **model.bounds)
     words = str(run.stats()["return_status"])
     code = _CODES.get(words, _FAILURE)
-    lacks_point = solver == "bonmin" and float(answer["f"]) >= 1e49  # Bonmin's infinity: no incumbent
-    point = np.zeros(0) if lacks_point or code in {220, 300} else np.array(answer["x"]).ravel()
-    return f"{solver} through CasADi {ca.__version__}: {words}", code + 70 * (lacks_point and code == 400), point, (len(builder.x), rows)
+    words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
+    if solver == "bonmin" and float(answer["f"]) >= _NO_POINT:
+        return _without_better(words, code, model, best)
+    return Ending(words, code, np.zeros(0) if code == 300 else np.array(answer["x"]).ravel())
+
+
+def _without_better(words: str, code: int, model: Model, best: float | None) -> Ending:
+    """The ending of a search by Bonmin that found nothing: the start is the best point, where it is feasible."""
+    if best is None:
+        return Ending(words, 470 if code == 400 else code, np.zeros(0))
+    return Ending(f"{words}, nothing better than the start", 0 if code == 220 else code, model.start)
 
 
 def main(arguments: list[str]) -> int:
     """0 when a .sol was written; the solver's status stands in it."""
-    solver, model, solution, seconds, gap = arguments
-    message, code, point, (columns, rows) = solve(solver, Path(model), float(seconds), float(gap))
-    write_ampl_sol(solution, message, point, rows, code, columns=columns)
+    solver, path, solution, seconds, gap = arguments
+    model = read_model(Path(path))
+    line = f"{solver}: {model.columns} columns, {model.rows} rows, at most {float(seconds):g} s"
+    ending = solve(solver, model, float(seconds), float(gap), started=lambda: print(line, flush=True))  # noqa: T201 - the log
+    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {ending.words}"
+    write_ampl_sol(solution, message, ending.point, model.rows, ending.code, columns=model.columns)
     return 0
 
 

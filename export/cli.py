@@ -5,23 +5,53 @@ Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Heavy libraries are imp
 
 from __future__ import annotations
 
-import json
+import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 import typer
 
 from ..models.errors import CrossfieldError, InputError
+from .arguments import (
+    BetaNorm,
+    Facet,
+    Folder,
+    Formats,
+    GamsLayout,
+    Gap,
+    GaugeName,
+    Json,
+    Mask,
+    Names,
+    NlForm,
+    Output,
+    Quiet,
+    Relax,
+    Seconds,
+    Size,
+    Start,
+    StrokeNorm,
+    Threads,
+    What,
+)
+from .console import (
+    complain,
+    described,
+    progress,
+    say,
+    say_json,
+    show_lists,
+    show_manifests,
+    show_report,
+    show_samples,
+    show_solution,
+)
 
 if TYPE_CHECKING:
+    from ..models.field import CrossField
     from ..models.instance import Gauge, Instance
-    from .run import Report
     from .solution import Solution
-
-Progress = Callable[[str], None]
 
 app = typer.Typer(
     name="crossfield",
@@ -32,53 +62,30 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the files; made when it is not there.")]
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix decides the kind.")]
-Size = Annotated[int, typer.Option("--size", help="Pixels on the longer side of the grid.")]
-Mask = Annotated[Path | None, typer.Option("--mask", metavar="FILE", help="Picture of the sketch's size: white = solve.")]
-GaugeName = Annotated[
-    Literal["strokes", "box"] | None, typer.Option("--gauge", help="Window of alpha: round each stroke (exact), or [0, pi/2] as printed.")
-]
-Facet = Annotated[Literal["hull", "printed"] | None, typer.Option("--facet", help="Facet (26) of z: of the hull (exact), or as printed.")]
-StrokeNorm = Annotated[int | None, typer.Option("--stroke-norm", min=1, max=2, help="Norm of the stroke term where it is open.")]
-BetaNorm = Annotated[int | None, typer.Option("--beta-norm", min=1, max=2, help="Norm of the skew term where it is open.")]
-Relax = Annotated[bool, typer.Option("--relax", help="Drop integrality.")]
-Seconds = Annotated[float, typer.Option("--time-limit", min=0.1, help="Seconds for each solve.")]
-Gap = Annotated[float, typer.Option("--gap", min=0.0, help="Relative gap at which a discrete search may stop.")]
-Threads = Annotated[int, typer.Option("--threads", min=0, help="Threads of a solver; 0: its own choice.")]
-Start = Annotated[Path | None, typer.Option("--start", metavar="FIELD", help="Field (.npz, .json) as starting point, and for the jumps of qp-fixed.")]
-GamsLayout = Annotated[Literal["indexed", "scalar"] | None, typer.Option("--gams-layout", help="Sets and equations, or MINLPLib's scalar style.")]
-NlForm = Annotated[Literal["text", "binary"] | None, typer.Option("--nl-form", help="Text or binary .nl.")]
-Names = Annotated[list[str] | None, typer.Option("-f", "--formulation", metavar="NAME", help="Formulation, may be repeated; all by default.")]
-Formats = Annotated[list[str] | None, typer.Option("-F", "--format", metavar="NAME", help="Format, may be repeated; all by default.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no tables.")]
-Json = Annotated[bool, typer.Option("--json", help="The result as JSON on standard output.")]
-
 _DEFAULT_SIZE: Final = 24
+_STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
 
 
 @app.callback(invoke_without_command=True)
 def root(
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    *,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,  # noqa: ARG001 - `invoke` looks at it
     version: Annotated[bool, typer.Option("--version", help="Show the version.", is_eager=True)] = False,
 ) -> None:
     """Options before the command."""
-    _STATE["debug"] = debug
     if version:
         from importlib.metadata import version as installed
 
-        _print(f"crossfield {installed('crossfield')}")
+        say(f"crossfield {installed('crossfield')}")
         raise typer.Exit
-
-
-_STATE: Final = {"debug": False}
 
 
 @app.command("run")
 def run_command(
-    sketch: Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE")],
+    sketch: What,
     output: Folder,
-    size: Size = _DEFAULT_SIZE,
+    *,
+    size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
     facet: Facet = None,
@@ -94,23 +101,26 @@ def run_command(
     from .run import run
     from .solvers import Limits
 
-    with _progress(quiet=quiet) as progress:
-        progress("reading the sketch")
+    limits = Limits(time_limit, gap, threads)
+    with progress(quiet=quiet) as show:
+        show("reading the sketch")
         instance = _load(sketch, size, mask, gauge)
+        dialects = _dialects(gams_layout, nl_form)
         report = run(
-            instance, output, limits=Limits(time_limit, gap, threads), options={"facet": facet}, dialects=_dialects(gams_layout, nl_form), progress=progress
+            instance, output, limits=limits, options={"facet": facet}, dialects=dialects, progress=show
         )
     if as_json:
-        _print_json(report.document())
+        say_json(report.document())
     elif not quiet:
-        _show_report(report, output)
+        show_report(report, output)
 
 
 @app.command("instance")
 def instance_command(
-    sketch: Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE")],
+    sketch: What,
     output: Output,
-    size: Size = _DEFAULT_SIZE,
+    *,
+    size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
     quiet: Quiet = False,
@@ -118,22 +128,24 @@ def instance_command(
     """Turn a sketch (SVG, bitmap, .scap) or a built-in sample into an instance file (.json or .npz)."""
     from ..models.instance_file import write_instance
 
-    with _progress(quiet=quiet) as progress:
-        progress("reading the sketch")
+    _require_suffix(output, (".json", ".npz"))
+    with progress(quiet=quiet) as show:
+        show("reading the sketch")
         instance = _load(sketch, size, mask, gauge)
-        _require_suffix(output, (".json", ".npz"))
         write_instance(instance, output)
     if not quiet:
-        _print(f"{output}: {_described(instance)}")
+        say(f"{output}: {described(instance)}")
 
 
 @app.command("export")
 def export_command(
-    instance: Annotated[str, typer.Argument(metavar="INSTANCE")],
+    instance: What,
     output: Folder,
+    *,
     formulation: Names = None,
     file_format: Formats = None,
-    size: Size = _DEFAULT_SIZE,
+    size: Size = None,
+    mask: Mask = None,
     gauge: GaugeName = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
@@ -142,41 +154,54 @@ def export_command(
     start: Start = None,
     gams_layout: GamsLayout = None,
     nl_form: NlForm = None,
-    compress: Annotated[bool, typer.Option("--gzip", help="Compress every file.")] = False,
+    compress: Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Write an instance (or sketch, or sample) as solver files: every formulation in every format, with manifests."""
-    from ..models.field_file import read_field
     from ..models.formulations import FORMULATIONS
     from .formats import FORMATS
     from .manifest import write_all
 
-    with _progress(quiet=quiet) as progress:
+    formulations, formats = (
+        _known(formulation, FORMULATIONS, "formulation"),
+        _known(file_format, FORMATS, "format"),
+    )
+    with progress(quiet=quiet) as show:
+        loaded = _load(instance, size, mask, gauge)
         manifests = write_all(
-            _load(instance, size, None, gauge),
+            loaded,
             output,
-            formulation or FORMULATIONS,
-            file_format or FORMATS,
-            start=None if start is None else read_field(start),
-            options={"facet": facet, "stroke_norm": stroke_norm, "beta_norm": beta_norm, "relax": relax or None},
+            formulations,
+            formats,
+            start=None if start is None else _start(start, loaded),
+            options=_options(facet, stroke_norm, beta_norm, relax=relax),
             dialects=_dialects(gams_layout, nl_form),
             compress=compress,
-            progress=progress,
+            progress=show,
         )
     if as_json:
-        _print_json([manifest.document for manifest in manifests])
+        say_json([manifest.document for manifest in manifests])
     elif not quiet:
-        _show_manifests(manifests, output)
+        show_manifests(manifests, output)
 
 
 @app.command("solve")
 def solve_command(
-    instance: Annotated[str, typer.Argument(metavar="INSTANCE")],
+    instance: What,
     output: Folder,
-    formulation: Annotated[str, typer.Option("-f", "--formulation", metavar="NAME", help="Formulation to solve.")],
-    solver: Annotated[str | None, typer.Option("--solver", metavar="NAME", help="highs, ipopt or bonmin; by default the one for the class.")] = None,
-    size: Size = _DEFAULT_SIZE,
+    *,
+    formulation: Annotated[
+        str, typer.Option("-f", "--formulation", metavar="NAME", help="Formulation to solve.")
+    ],
+    solver: Annotated[
+        str | None,
+        typer.Option(
+            "--solver", metavar="NAME", help="highs, ipopt or bonmin; by default the one for the class."
+        ),
+    ] = None,
+    size: Size = None,
+    mask: Mask = None,
     gauge: GaugeName = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
@@ -189,35 +214,52 @@ def solve_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Solve one formulation here, started from the greedy baseline; leaves file, log, solution and field in the folder."""
-    from ..models.field_file import read_field, write_field
+    """Solve one formulation here, started from the greedy baseline; leaves file, log, solution and field in the folder.
+
+    Ctrl-C ends the search and keeps the best point so far.
+    """
+    from ..models.field_file import write_field
     from ..models.formulations import FORMULATIONS
     from ..models.greedy import greedy
     from ..models.problem import formulate
     from .solvers import Limits, solve
 
-    with _progress(quiet=quiet) as progress:
-        loaded = _load(instance, size, None, gauge)
-        progress("greedy start" if start is None else "reading the start")
-        first = greedy(loaded) if start is None else read_field(start)
-        fixed = formulation in FORMULATIONS and FORMULATIONS[formulation].fixed
-        options = {"facet": facet, "stroke_norm": stroke_norm, "beta_norm": beta_norm, "relax": relax or None}
-        problem = formulate(loaded, formulation, p=first.p if fixed else None, **options)
-        progress(f"solving {formulation}, at most {time_limit:g} s")
-        solution = solve(problem, solver, output, limits=Limits(time_limit, gap, threads), start=first)
-        target = output / f"{loaded.name}.{formulation}.field.npz"
-        if solution.point is not None:
+    limits = Limits(time_limit, gap, threads)
+    (name,) = _known([formulation], FORMULATIONS, "formulation")
+    with progress(quiet=quiet) as show:
+        loaded = _load(instance, size, mask, gauge)
+        show("greedy start" if start is None else "reading the start")
+        first = greedy(loaded) if start is None else _start(start, loaded)
+        jumps = first.p if FORMULATIONS[name].fixed else None
+        problem = formulate(loaded, name, p=jumps, **_options(facet, stroke_norm, beta_norm, relax=relax))
+        show(f"solving {name}, at most {time_limit:g} s; Ctrl-C keeps the best point so far")
+        solution = solve(problem, solver, output, limits=limits, start=first)
+        target = output / f"{loaded.name}.{name}.field.npz"
+        if solution.point is None:
+            target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one
+        else:
             write_field(solution.field, target)
-    _report_solution(solution, quiet=quiet, as_json=as_json)
+    _tell(solution, target, quiet=quiet, as_json=as_json)
+    if solution.interrupted:
+        complain("interrupted; the best point so far was kept")
     if solution.point is None:
-        raise InputError(f"the solver found no point: {solution.status}; give it more time or another start")
+        words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
+        raise InputError(
+            f"the solver found no point ({words}); give it more time or another start, and see its log",
+            file=output,
+        )
 
 
 @app.command("read")
 def read_command(
-    solution: Annotated[Path, typer.Argument(metavar="SOLUTION")],
-    manifest: Annotated[Path, typer.Option("--manifest", metavar="FILE", help="The .manifest.json that export wrote.")],
+    solution: Annotated[
+        Path, typer.Argument(metavar="SOLUTION", help="HiGHS solution file or AMPL .sol, plain or .gz.")
+    ],
+    manifest: Annotated[
+        Path, typer.Option("--manifest", metavar="FILE", help="The .manifest.json that export wrote.")
+    ],
     output: Output,
+    *,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -226,226 +268,209 @@ def read_command(
     from .manifest import read_manifest
     from .solution import read_solution
 
-    with _progress(quiet=quiet) as progress:
-        progress("reading the solution")
+    _require_suffix(output, (".npz", ".json", ".rawfield"))
+    with progress(quiet=quiet) as show:
+        show("reading the solution")
         found = read_solution(solution, read_manifest(manifest).problem())
         if found.point is None:
-            raise InputError(f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution)
+            raise InputError(
+                f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution
+            )
         write_field(found.field, output)
-    _report_solution(found, quiet=quiet, as_json=as_json)
+    _tell(found, output, quiet=quiet, as_json=as_json)
 
 
 @app.command("draw")
 def draw_command(
-    what: Annotated[Path, typer.Argument(metavar="FIELD|INSTANCE")],
+    what: Annotated[
+        Path, typer.Argument(metavar="FIELD|INSTANCE", help="File (.npz, .json) of a field or an instance.")
+    ],
     output: Output,
-    kind: Annotated[str | None, typer.Option("--kind", metavar="NAME", help="instance, crosses, field, angle, energy or overview.")] = None,
+    *,
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", metavar="NAME", help="instance, crosses, field, angle, energy or overview."),
+    ] = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw a field or an instance as PNG, SVG or PDF."""
-    from .draw import draw
+    from ..models.field import CrossField
+    from .draw import SUFFIXES, draw
 
-    with _progress(quiet=quiet) as progress:
-        progress("reading")
+    _require_suffix(output, tuple(SUFFIXES))
+    with progress(quiet=quiet) as show:
+        show("reading")
         subject = _field_or_instance(what)
-        is_field = hasattr(subject, "alpha")
-        progress("drawing")
-        draw(subject, output, kind=kind or ("field" if is_field else "instance"), title=title)
+        show("drawing")
+        draw(
+            subject,
+            output,
+            kind=kind or ("field" if isinstance(subject, CrossField) else "instance"),
+            title=title,
+        )
     if not quiet:
-        _print(str(output))
+        say(str(output))
 
 
 @app.command("list")
-def list_command(as_json: Json = False) -> None:
+def list_command(*, as_json: Json = False) -> None:
     """List formulations, formats and solvers, and which go together."""
     from .tables import tables
 
+    found = tables()
     if as_json:
-        _print_json({name: rows for name, (_, rows) in tables().items()})
-        return
-    for name, (columns, rows) in tables().items():
-        _show_table(name, columns, [[str(row[column]) for column in columns] for row in rows])
+        say_json({name: rows for name, (_, rows) in found.items()})
+    else:
+        show_lists(found)
 
 
 @app.command("samples")
-def samples_command(as_json: Json = False) -> None:
+def samples_command(*, as_json: Json = False) -> None:
     """List the built-in samples."""
     from .tables import sample_rows
 
     rows = sample_rows(_DEFAULT_SIZE)
     if as_json:
-        _print_json(rows)
-        return
-    _show_table("samples", tuple(rows[0]), [[str(value) for value in row.values()] for row in rows])
+        say_json(rows)
+    else:
+        show_samples(rows)
 
 
 def main() -> NoReturn:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and leave with its exit code; asked to end (SIGTERM), nothing half done is left either."""
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(invoke(sys.argv[1:]))
 
 
 def invoke(arguments: list[str]) -> int:
-    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage. Errors are one line on standard error."""
+    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage. Errors are one line on standard error.
+
+    With --debug the error itself is raised.
+    """
     try:
-        app(arguments, standalone_mode=True)
+        app(arguments, prog_name="crossfield")
     except SystemExit as stop:
-        return int(stop.code or 0)
-    except CrossfieldError as error:
-        if _STATE["debug"]:
+        if stop.code != _STOPPED:
+            return int(stop.code or 0)
+        complain("interrupted")
+    except Exception as error:
+        if "--debug" in arguments:
             raise
-        _complain(str(error))
-    except (KeyboardInterrupt, BrokenPipeError):
-        _complain("interrupted")
-    except MemoryError:
-        _complain("there is not enough memory; choose a smaller --size")
-    except OSError as error:
-        if _STATE["debug"]:
-            raise
-        _complain(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+        complain(_line(error))
     return 1
 
 
-def _load(what: str, size: int, mask: Path | None, gauge: Gauge | None) -> Instance:
+def _line(error: Exception) -> str:
+    """What is said of an error."""
+    if isinstance(error, CrossfieldError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; choose a smaller --size"
+    if isinstance(error, OSError):
+        return f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check the path and the free space"
+    return f"this should not happen, please report it: {type(error).__name__}: {error} (crossfield --debug ... shows where)"
+
+
+def _tell(solution: Solution, field: Path, *, quiet: bool, as_json: bool) -> None:
+    """Print the facts of a solution whose field lies in a file."""
+    from .run import facts_with_energies
+
+    facts = facts_with_energies(solution)
+    if as_json:
+        say_json(facts)
+    elif not quiet:
+        show_solution(solution, facts, field)
+
+
+def _load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
+    """The instance, of a size that can be written. Raises InputError."""
+    from ..models.sketch import available_memory, check_memory
+
+    instance = _found(what, size, mask, gauge)
+    check_memory(instance.grid.size, available_memory())
+    return instance
+
+
+def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
     """The instance of an instance file, a sketch file or a built-in sample, in this order."""
     from ..models.instance_file import read_instance
     from ..models.samples import SAMPLES, sample
     from ..models.sketch import read_sketch
 
     path = Path(what)
-    if not path.exists() and what in SAMPLES:
+    pixels = _DEFAULT_SIZE if size is None else size
+    if not path.is_file() and what in SAMPLES:
         if mask is not None:
             raise InputError(f"the sample {what} has its own mask; leave --mask out")
-        return sample(what, size, gauge or "strokes")
+        return sample(what, pixels, gauge or "strokes")
     if not path.exists():
-        raise InputError(f"there is no such file and no such sample; `crossfield samples` lists the samples", file=what)
-    if path.suffix in {".json", ".npz"}:
-        instance = read_instance(path)
-        return instance if gauge is None else instance.with_gauge(gauge)
-    return read_sketch(path, size=size, mask=mask, gauge=gauge or "strokes")
+        raise InputError(
+            "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
+        )
+    if path.suffix.lower() not in {".json", ".npz"}:
+        return read_sketch(path, size=pixels, mask=mask, gauge=gauge or "strokes")
+    if size is not None or mask is not None:
+        raise InputError(
+            "is an instance, which has its own grid and mask; leave --size and --mask out", file=what
+        )
+    instance = read_instance(path)
+    return instance if gauge is None else instance.with_gauge(gauge)
 
 
-def _field_or_instance(path: Path) -> Any:
+def _start(path: Path, instance: Instance) -> CrossField:
+    """The field in a file, which must be on the instance."""
+    from ..models.field_file import read_field
+
+    field = read_field(path)
+    if field.instance.sha256 != instance.sha256:
+        raise InputError(
+            f"is a field on another instance ({described(field.instance)}), not on this one ({described(instance)}); "
+            "give a field of the same sketch, size and gauge",
+            file=path,
+        )
+    return field
+
+
+def _field_or_instance(path: Path) -> CrossField | Instance:
     from ..models.field_file import read_field
     from ..models.instance_file import read_instance
 
+    if not path.is_file():
+        raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
+    _require_suffix(path, (".npz", ".json"))
     try:
         return read_field(path)
-    except CrossfieldError as field_error:
+    except CrossfieldError as as_field:
         try:
             return read_instance(path)
-        except CrossfieldError as error:
-            raise InputError(f"is neither a field nor an instance: {field_error}") from error
+        except CrossfieldError as as_instance:
+            first, second = (str(error).removeprefix(f"{path}: ") for error in (as_field, as_instance))
+            raise InputError(f"is no field ({first}) and no instance ({second})", file=path) from as_field
+
+
+def _known(names: list[str] | None, table: dict[str, Any], kind: str) -> list[str]:
+    """The names, each of which is in the table; all of the table when there are none."""
+    for name in names or ():
+        if name not in table:
+            raise InputError(f"there is no {kind} {name!r}; choose one of {', '.join(table)}")
+    return list(dict.fromkeys(names or table))
 
 
 def _require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
-    if path.suffix not in allowed:
-        raise InputError(f"has the suffix {path.suffix!r}; use {' or '.join(allowed)}", file=path)
+    if path.suffix.lower() not in allowed:
+        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise InputError(f"has {has}, which does not say what it is; use {', '.join(allowed)}", file=path)
+
+
+def _options(
+    facet: str | None, stroke_norm: int | None, beta_norm: int | None, *, relax: bool
+) -> dict[str, Any]:
+    return {"facet": facet, "stroke_norm": stroke_norm, "beta_norm": beta_norm, "relax": relax or None}
 
 
 def _dialects(gams_layout: str | None, nl_form: str | None) -> dict[str, str]:
     return {name: value for name, value in (("gms", gams_layout), ("nl", nl_form)) if value}
-
-
-def _described(instance: Instance) -> str:
-    grid = instance.grid
-    parts = f", {grid.parts} separate parts" if grid.parts > 1 else ""
-    return f"{instance.name}, {grid.width} x {grid.height}, {grid.size} pixels, {len(instance.theta)} of them with strokes{parts}, gauge {instance.gauge}"
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[Progress]:
-    """A function that shows what is being done; on a terminal a spinner with the time, else nothing."""
-    from rich.console import Console
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bar
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield lambda _: None
-        return
-    with Bar(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True) as bar:
-        task = bar.add_task("starting")
-        yield lambda text: bar.update(task, description=text)
-
-
-def _show_report(report: Report, output: Path) -> None:
-    rows = []
-    for candidate in report.candidates:
-        facts = candidate.facts()
-        mark = "*" if candidate is report.best else ""
-        rows.append(
-            [
-                f"{facts['method']}{mark}",
-                f"{facts['energy_2_norm']:.6g}",
-                f"{facts['energy_1_norm']:.6g}",
-                str(facts["singularities"]),
-                f"{facts['mean_abs_beta_degrees']:.2f}",
-                f"{facts['seconds']:.2f}",
-                str(facts.get("status", "")),
-            ]
-        )
-    columns = ("method", "2-norm energy", "1-norm energy", "singularities", "mean |beta| (deg)", "seconds", "status")
-    _show_table(_described(report.instance), columns, rows)
-    document = report.document()
-    for name, reason in report.failures.items():
-        _complain(f"{name}: {reason}")
-    _print(f"{document['files']} solver files in {output / 'models'}; * kept as {output / 'field.npz'}, drawn in {output / 'overview.png'}; facts in {output / 'report.json'}")
-
-
-def _show_manifests(manifests: list[Any], output: Path) -> None:
-    rows = []
-    for manifest in manifests:
-        document = manifest.document
-        sizes = {f["format"]: f["bytes"] for f in document["files"] if not f["name"].endswith((".row", ".col"))}
-        written = ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items())
-        counts = document["counts"]
-        rows.append([document["formulation"], document["class"], str(counts["columns"]), str(counts["rows"]), written, ", ".join(document["refused"])])
-    _show_table(str(output), ("formulation", "class", "columns", "rows", "written", "refused"), rows)
-
-
-def _report_solution(solution: Solution, *, quiet: bool, as_json: bool) -> None:
-    from .run import solution_facts
-
-    facts = solution_facts(solution)
-    if solution.point is not None:
-        facts |= {"energy_2_norm": solution.field.energy(2).total, "energy_1_norm": solution.field.energy(1).total}
-    if as_json:
-        _print_json(facts)
-    elif not quiet:
-        _show_table(solution.problem.instance.name, ("", "value"), [[key.replace("_", " "), _text(value)] for key, value in facts.items()])
-
-
-def _text(value: object) -> str:
-    return f"{value:.10g}" if isinstance(value, float) else "" if value is None else str(value)
-
-
-def _show_table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=escape(title), title_justify="left", header_style="bold")
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*map(escape, row))
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=160)
-    console.print(table)
-
-
-def _print(text: str) -> None:
-    typer.echo(text)
-
-
-def _print_json(value: object) -> None:
-    typer.echo(json.dumps(value, indent=1))
-
-
-def _complain(text: str) -> None:
-    typer.echo(f"crossfield: {text}", err=True)
 
 
 if __name__ == "__main__":

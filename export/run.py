@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -21,10 +21,11 @@ from .formats import generator
 from .manifest import Manifest, write_all
 from .solution import Solution
 from .solvers import Limits
-from .stages import fit_angles, two_stage
+from .stages import find_jumps, fit_angles
 
 Progress = Callable[[str], None]
 PICTURES: Final = ("overview", "field", "crosses", "angle")
+REPORT: Final = "report.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Candidate:
 def solution_facts(solution: Solution) -> dict[str, Any]:
     """What a solution file claims, beside what was recomputed from the instance."""
     violation = solution.violation
-    return {
+    facts = {
         "formulation": solution.problem.name,
         "status": str(solution.status),
         "message": solution.message,
@@ -65,7 +66,26 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
         "worst_family": None if violation is None else violation.worst_family,
         "furthest_rounding": solution.rounded,
         "unknown_names": solution.unknown,
+        "interrupted": solution.interrupted,
+        "seconds": None if solution.seconds is None else round(solution.seconds, 3),
     }
+    return {key: _finite(value) for key, value in facts.items()}
+
+
+def facts_with_energies(solution: Solution) -> dict[str, Any]:
+    """The facts of a solution and, where it has a point, the energies of its field in both norms."""
+    facts = solution_facts(solution)
+    if solution.point is None:
+        return facts
+    return facts | {
+        "energy_2_norm": solution.field.energy(2).total,
+        "energy_1_norm": solution.field.energy(1).total,
+    }
+
+
+def _finite(value: Any) -> Any:
+    """The value; None for an infinity, which JSON has not."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +101,12 @@ class Report:
     def best(self) -> Candidate:
         """The field that is kept and drawn."""
         return self.candidates[0]
+
+    @property
+    def files(self) -> int:
+        """Number of solver files, lists of names not counted."""
+        names = [entry["name"] for manifest in self.manifests for entry in manifest.document["files"]]
+        return sum(not name.removesuffix(".gz").endswith((".row", ".col")) for name in names)
 
     def document(self) -> dict[str, Any]:
         """The report as JSON: instance, methods, files."""
@@ -105,8 +131,10 @@ class Report:
             "best": self.best.method,
             "methods": [candidate.facts() for candidate in self.candidates],
             "failures": self.failures,
-            "files": sum(len([f for f in m.document["files"] if f["name"].split(".")[-1] not in {"row", "col"}]) for m in self.manifests),
-            "refused": {m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]},
+            "files": self.files,
+            "refused": {
+                m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
+            },
         }
 
 
@@ -123,28 +151,39 @@ def run(
 
         DIR/models     every formulation in every format, manifests, the instance
         DIR/solve      what the local solvers read and left
-        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...; report.json
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/report.json   written last: where it is, the run is complete
 
-    A solver that fails is noted in the report; the fields that were found stand. Raises OutputError.
+    A solver that fails is noted in the report; the fields that were found stand. Ctrl-C during a solve ends that solve with
+    its best point. Raises OutputError.
     """
     folder = make_folder(folder)
+    (folder / REPORT).unlink(missing_ok=True)
     limits = limits or Limits()
     progress("greedy baseline")
     baseline = _timed("greedy", lambda: greedy(instance))
     manifests = write_all(
-        instance, folder / "models", start=baseline.field, options=options, dialects=dialects, progress=lambda name: progress(f"writing {name}")
+        instance,
+        folder / "models",
+        start=baseline.field,
+        options=options,
+        dialects=dialects,
+        progress=lambda name: progress(f"writing {name}"),
     )
     candidates, failures = [baseline], dict[str, str]()
-    for search in (_fitted, _power, _two_stages):
+    for method, search in SEARCHES.items():
         try:
-            candidates += search(baseline.field, folder / "solve", limits, options or {}, progress)
+            for candidate in search(baseline.field, folder / "solve", limits, options or {}, progress):
+                candidates.append(candidate)  # noqa: PERF402 - those before a failure count
         except CrossfieldError as error:
-            failures[search.__name__.strip("_")] = str(error)
-    report = Report(instance, tuple(sorted(candidates, key=lambda c: c.field.energy(2).total)), tuple(manifests), failures)
+            failures[method] = str(error)
+    # Equal but for rounding: the one that was found first.
+    ranked = sorted(candidates, key=lambda candidate: float(f"{candidate.field.energy(2).total:.9g}"))
+    report = Report(instance, tuple(ranked), tuple(manifests), failures)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
-    write_bytes(folder / "report.json", (json.dumps(report.document(), indent=1) + "\n").encode())
     _draw(report, folder, progress)
+    write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
     return report
 
 
@@ -167,18 +206,40 @@ def _of(method: str, solution: Solution) -> Candidate:
     return Candidate(method, solution.field, solution.seconds or 0.0, solution)
 
 
-def _fitted(start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress) -> list[Candidate]:
+Search = Callable[[CrossField, Path, Limits, dict[str, Any], Progress], Iterator[Candidate]]
+"""From the baseline, a folder, limits and options to the fields of a method, one by one: a later one may fail."""
+
+
+def _fitted(
+    start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress
+) -> Iterator[Candidate]:
     progress("Ipopt: angles for the greedy jumps")
-    return [_of("greedy + QP", fit_angles(start, folder / "greedy", limits=limits))]
+    yield _of("greedy + QP", fit_angles(start, folder / "greedy", limits=limits))
 
 
-def _power(start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress) -> list[Candidate]:
+def _power(
+    start: CrossField, folder: Path, limits: Limits, _options: dict[str, Any], progress: Progress
+) -> Iterator[Candidate]:
     progress("power field")
     power = _timed("power field", lambda: power_field(start.instance))
-    return [power, _of("power field + QP", fit_angles(power.field, folder / "power", limits=limits))]
+    yield power
+    progress("Ipopt: angles for the jumps of the power field")
+    yield _of("power field + QP", fit_angles(power.field, folder / "power", limits=limits))
 
 
-def _two_stages(start: CrossField, folder: Path, limits: Limits, options: dict[str, Any], progress: Progress) -> list[Candidate]:
-    progress(f"HiGHS: MILP for the jumps, at most {limits.seconds:g} s")
-    both = two_stage(start.instance, folder / "two-stage", limits=limits, start=start, **options)
-    return [_of("MILP", both.milp), _of("MILP + QP (two stages)", both.qp)]
+def _two_stages(
+    start: CrossField, folder: Path, limits: Limits, options: dict[str, Any], progress: Progress
+) -> Iterator[Candidate]:
+    progress(f"HiGHS: MILP for the jumps, at most {limits.seconds:g} s; Ctrl-C keeps the best point so far")
+    milp = find_jumps(start.instance, folder / "two-stage", limits=limits, start=start, **options)
+    yield _of("MILP", milp)
+    progress("Ipopt: angles for the jumps of the MILP")
+    yield _of("MILP + QP", fit_angles(milp.field, folder / "two-stage", limits=limits))
+
+
+SEARCHES: Final[dict[str, Search]] = {
+    "greedy + QP": _fitted,
+    "power field + QP": _power,
+    "MILP + QP": _two_stages,
+}
+"""What a run tries beyond the baseline, by the method it ends with."""

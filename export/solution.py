@@ -16,6 +16,7 @@ from ..models.errors import SolutionError
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem, Violation, lifted
+from .lp import needs_one
 from .names import column_names
 from .nl import Layout
 from .readers import read_raw
@@ -31,7 +32,7 @@ class Solution:
 
     problem: as the file's columns have it (with products lifted, where the format needed it); point: float (columns,), or None.
     status, message, reported: claims of the file; bound: the solver's dual bound, where one is known.
-    rounded: the furthest that rounding moved an integer column.
+    rounded: the furthest that rounding moved an integer column. interrupted: whether the user ended the search.
     """
 
     problem: Problem
@@ -44,6 +45,7 @@ class Solution:
     rounded: float = 0.0
     unknown: int = 0
     seconds: float | None = None
+    interrupted: bool = False
 
     @cached_property
     def objective(self) -> float | None:
@@ -59,7 +61,9 @@ class Solution:
     def field(self) -> CrossField:
         """The cross field of the point. Raises SolutionError when there is none."""
         if self.point is None:
-            raise SolutionError(f"there is no point in the solution ({self.status}): {self.message or 'no message'}")
+            raise SolutionError(
+                f"there is no point in the solution ({self.status}): {self.message or 'no message'}"
+            )
         return self.problem.field(self.point)
 
 
@@ -67,7 +71,7 @@ def read_solution(path: str | Path, problem: Problem) -> Solution:
     """The solution that a file holds for the problem; the format is found by content.
 
     Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
-    by the column order of the .nl file. A file without a point gives a Solution without one.
+    by the column order of the .nl, LP or MPS file. A file without a point gives a Solution without one.
     Raises SolutionError, naming the file, when it is malformed or of another problem.
     """
     raw = read_raw(path)
@@ -82,14 +86,25 @@ def read_solution(path: str | Path, problem: Problem) -> Solution:
 def _mapped(raw: RawSolution, problem: Problem) -> Solution:
     unknown = 0
     if raw.names is None:
-        point = np.empty(problem.columns)
-        point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
+        point = _by_position(raw, problem)
     else:
         problem, point, unknown = _by_name(raw, problem)
-    if np.isnan(point).any():
-        raise SolutionError("holds values that are not numbers; let the solver write it again")
+    if not np.isfinite(point).all():
+        raise SolutionError("holds values that are not finite numbers; let the solver write it again")
     point, moved = _rounded(point, problem)
-    return Solution(problem, point, raw.status, raw.message, raw.reader, raw.objective, rounded=moved, unknown=unknown)
+    return Solution(
+        problem, point, raw.status, raw.message, raw.reader, raw.objective, rounded=moved, unknown=unknown
+    )
+
+
+def _by_position(raw: RawSolution, problem: Problem) -> Floats:
+    if raw.order == "nl":
+        point = np.empty(problem.columns)
+        point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
+        return point
+    one = int(needs_one(problem))  # a model without rows has the row c_ONE in LP and MPS
+    point = values_in_order(problem.columns + one, max(problem.row_count, 1), raw)
+    return point[one:] if raw.order == "lp" else point[: problem.columns]
 
 
 def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
@@ -105,7 +120,9 @@ def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
             "it is of another instance, formulation or option"
         )
     if held.unknown > len(raw.values) // 2:
-        raise SolutionError(f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation")
+        raise SolutionError(
+            f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+        )
     return problem, held.values, held.unknown
 
 

@@ -6,8 +6,6 @@ Each leaves a solution file, which goes through the same readers as anybody's.
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,17 +17,25 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ..models.errors import InputError, MissingSolverError, SolverError, UnsupportedBySolverError
+from ..models.errors import (
+    InputError,
+    MissingSolverError,
+    OutputError,
+    SolutionError,
+    SolverError,
+    UnsupportedBySolverError,
+)
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem
 from ..models.storage import make_folder
+from .child import run_child
 from .formats import FORMATS, carried, write
 from .names import ONE, column_names
 from .solution import Solution, read_solution
 
-GRACE: Final = 5.0
-"""Seconds that a child may take beyond its limit, for reading the file; then it is interrupted, and later killed."""
+_TICK: Final = 0.1
+"""Seconds between two looks at a running solver."""
 
 
 @dataclass(frozen=True)
@@ -42,18 +48,32 @@ class Limits:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not (self.seconds > 0 and self.gap >= 0 and self.threads >= 0):
-            raise InputError(f"time limit {self.seconds}, gap {self.gap}, threads {self.threads}: they must be positive numbers")
+        if not (0 < self.seconds < np.inf and 0 <= self.gap < np.inf and self.threads >= 0):
+            raise InputError(
+                f"a time limit of {self.seconds} s, a gap of {self.gap} and {self.threads} threads cannot be; "
+                "give a positive number of seconds, and the others not negative"
+            )
+
+
+class Job(NamedTuple):
+    """What a solver is to do: read `model`, leave `solution` and `log`; start: a complete point (columns,), or None."""
+
+    model: Path
+    solution: Path
+    log: Path
+    problem: Problem
+    start: Floats | None
+    limits: Limits
 
 
 class Answer(NamedTuple):
-    """What a run left: the solution file, and the solver's dual bound where it tells one."""
+    """What is not in the solution file: the solver's dual bound where it tells one, and whether the user interrupted it."""
 
-    solution: Path
     bound: float | None
+    interrupted: bool
 
 
-Run = Callable[[Path, Floats | None, Problem, Limits], Answer]
+Run = Callable[[Job], Answer]
 
 
 @dataclass(frozen=True)
@@ -76,34 +96,54 @@ class Solver:
         return ""
 
 
-def _run_highs(model: Path, start: Floats | None, problem: Problem, limits: Limits) -> Answer:
+def _run_highs(job: Job) -> Answer:
     import highspy
 
-    highs = highspy.Highs()
-    log = model.with_suffix(".highs.log")
-    log.unlink(missing_ok=True)
-    highs.setOptionValue("log_to_console", False)
-    highs.setOptionValue("log_file", str(log))
-    if highs.readModel(str(model)) == highspy.HighsStatus.kError:
-        raise SolverError("HiGHS cannot read it; see the .log beside it", file=model)
-    for option, value in (("time_limit", limits.seconds), ("mip_rel_gap", limits.gap), ("threads", limits.threads)):
+    limits = job.limits
+    highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
+    highs.setOptionValue("log_to_console", "false")
+    highs.setOptionValue("log_file", str(job.log))
+    if highs.readModel(str(job.model)) == highspy.HighsStatus.kError:
+        raise SolverError(f"HiGHS cannot read it; see {job.log.name} beside it", file=job.model)
+    for option, value in (
+        ("time_limit", limits.seconds),
+        ("mip_rel_gap", limits.gap),
+        ("threads", limits.threads),
+    ):
         highs.setOptionValue(option, value)
-    if start is not None:
-        highs.setSolution(_highs_start(highs, problem, start))
-    highs.HandleKeyboardInterrupt = True
-    _highs_solve(highs)
-    solution = model.with_suffix(".highs.sol")
-    highs.writeSolution(str(solution), 0)
-    bound = highs.getInfo().mip_dual_bound if problem.integer.any() else None
-    return Answer(solution, bound if bound is not None and np.isfinite(bound) else None)
+    if limits.threads:
+        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - one for the process, else kept from an earlier solve
+    if job.start is not None:
+        highs.setSolution(_highs_start(highs, job.problem, job.start))
+    interrupted = _highs_solve(highs)
+    if highs.writeSolution(str(job.solution), 0) == highspy.HighsStatus.kError:
+        raise OutputError(
+            "HiGHS cannot write it; free some space or choose another folder", file=job.solution
+        )
+    bound = highs.getInfo().mip_dual_bound if job.problem.integer.any() else None
+    return Answer(bound if bound is not None and np.isfinite(bound) else None, interrupted)
 
 
-def _highs_solve(highs: Any) -> None:
-    """Solve; an interrupt ends the search and keeps the incumbent."""
+def _highs_solve(highs: Any) -> bool:
+    """Solve. Whether the user interrupted: that ends the search and keeps the incumbent."""
+    import highspy
+
+    highs.HandleUserInterrupt = True
+    highs.startSolve()
     try:
-        highs.solve()
+        _wait_for(highs)
     except KeyboardInterrupt:
         highs.cancelSolve()
+        _wait_for(highs)
+    finally:  # the thread must have ended before this process can
+        highs.cancelSolve()
+        highs.wait()
+    return bool(highs.getModelStatus() == highspy.HighsModelStatus.kInterrupt)
+
+
+def _wait_for(highs: Any) -> None:
+    while not highs.wait(_TICK)[0]:
+        pass
 
 
 def _highs_start(highs: Any, problem: Problem, start: Floats) -> Any:
@@ -117,35 +157,30 @@ def _highs_start(highs: Any, problem: Problem, start: Floats) -> Any:
 
 
 def _casadi(solver: str) -> Run:
-    def run(model: Path, _start: Floats | None, _problem: Problem, limits: Limits) -> Answer:
-        solution, log = model.with_suffix(f".{solver}.sol"), model.with_suffix(f".{solver}.log")
-        solution.unlink(missing_ok=True)
-        arguments = [solver, str(model), str(solution), repr(float(limits.seconds)), repr(float(limits.gap))]
-        code = _child([sys.executable, "-m", "crossfield.export.casadi_driver", *arguments], log, limits.seconds)
-        if not solution.exists():
-            last = log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
-            raise SolverError(f"{solver} left no answer (exit code {code}): {last[0][:200]}", file=model)
-        return Answer(solution, None)
+    def run(job: Job) -> Answer:
+        limits = (repr(float(job.limits.seconds)), repr(float(job.limits.gap)))
+        # -P: a folder `crossfield` or a file casadi.py where the user happens to be is not meant.
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "crossfield.export.casadi_driver",
+            solver,
+            str(job.model),
+            str(job.solution),
+            *limits,
+        ]
+        ending = run_child(command, job.log, job.limits.seconds)
+        if not job.solution.exists():
+            last = job.log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
+            how = "interrupted" if ending.interrupted else f"exit code {ending.code}"
+            raise SolverError(
+                f"{solver} left no answer ({how}): {last[0][:200]}; see {job.log.name} beside it",
+                file=job.model,
+            )
+        return Answer(None, ending.interrupted)
 
     return run
-
-
-def _child(command: list[str], log: Path, seconds: float) -> int:
-    """The exit code of a child, its output in `log`; interrupted when the limit has passed or the user interrupts."""
-    with log.open("wb") as output:
-        child = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True)
-        try:
-            return child.wait(seconds + GRACE)
-        except (KeyboardInterrupt, subprocess.TimeoutExpired):
-            child.send_signal(signal.SIGINT)
-            try:
-                return child.wait(4 * GRACE)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                return child.wait()
-        finally:
-            if child.poll() is None:
-                child.kill()
 
 
 SOLVERS: Final = {
@@ -174,15 +209,23 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
     """
     if name is not None and name not in SOLVERS:
         raise InputError(f"there is no solver {name!r}; choose one of {', '.join(SOLVERS)}")
-    candidates = [name] if name else ["ipopt", "bonmin"] if problem.problem_class == "QP" else list(_PREFERRED)
+    candidates = (
+        [name] if name else ["ipopt", "bonmin"] if problem.problem_class == "QP" else list(_PREFERRED)
+    )
     refusals = {candidate: refusal(problem, SOLVERS[candidate]) for candidate in candidates}
     willing = [SOLVERS[candidate] for candidate, reason in refusals.items() if not reason]
     if not willing:
         reasons = "; ".join(refusals.values())
-        raise UnsupportedBySolverError(f"{problem.name} is {_described(problem)}: {reasons}; see `crossfield list` for who takes what, or relax it")
-    if find_spec(willing[0].package) is None:
-        raise MissingSolverError(f"{willing[0].name} needs the package {willing[0].package}; install it with pip")
-    return willing[0]
+        raise UnsupportedBySolverError(
+            f"{problem.name} is {_described(problem)}: {reasons}; see `crossfield list` for who takes what, or relax it"
+        )
+    installed = [solver for solver in willing if find_spec(solver.package) is not None]
+    if not installed:
+        first = willing[0]
+        raise MissingSolverError(
+            f"{first.name} needs the Python package {first.package}, which is not installed; pip install {first.package}"
+        )
+    return installed[0]
 
 
 def refusal(problem: Problem, solver: Solver) -> str:
@@ -219,10 +262,25 @@ def solve(
     return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start)
 
 
-def _solve_in(folder: Path, problem: Problem, solver: Solver, limits: Limits, start: CrossField | None) -> Solution:
-    model = folder / f"{problem.instance.name}.{problem.name}{FORMATS[solver.format].suffix}"
+def _solve_in(
+    folder: Path, problem: Problem, solver: Solver, limits: Limits, start: CrossField | None
+) -> Solution:
+    stem = f"{problem.instance.name}.{problem.name}"
+    model, solution, log = (
+        folder / f"{stem}{suffix}"
+        for suffix in (FORMATS[solver.format].suffix, f".{solver.name}.sol", f".{solver.name}.log")
+    )
     held = write(problem, model, start=start).problem
+    for stale in (solution, log):
+        stale.unlink(missing_ok=True)
     begin = time.perf_counter()
-    answer = solver.run(model, None if start is None else held.point(start), held, limits)
+    answer = solver.run(Job(model, solution, log, held, None if start is None else held.point(start), limits))
     seconds = time.perf_counter() - begin
-    return replace(read_solution(answer.solution, held), bound=answer.bound, seconds=seconds)
+    try:
+        found = read_solution(solution, held)
+    except SolutionError:
+        solution.unlink(
+            missing_ok=True
+        )  # cut off by a full disk, most likely: nobody shall take it for an answer
+        raise
+    return replace(found, bound=answer.bound, interrupted=answer.interrupted, seconds=seconds)

@@ -28,9 +28,31 @@ class TwoStage:
         return self.qp.field if self.qp.point is not None else self.milp.field
 
 
-def fit_angles(field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None) -> Solution:
+def fit_angles(
+    field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None
+) -> Solution:
     """The solution of `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage."""
-    return solve(formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field)
+    return solve(
+        formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field
+    )
+
+
+def find_jumps(
+    instance: Instance,
+    folder: str | Path | None = None,
+    *,
+    limits: Limits | None = None,
+    start: CrossField | None = None,
+    **options: Any,
+) -> Solution:
+    """The solution of `milp-mccormick` by HiGHS: the first stage.
+
+    start: the incumbent handed to HiGHS, the greedy baseline when None: cold, HiGHS is lost beyond 10 x 10 pixels.
+    options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
+    """
+    chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
+    problem = formulate(instance, "milp-mccormick", **chosen)
+    return solve(problem, None, folder, limits=limits, start=start or greedy(instance))
 
 
 def two_stage(
@@ -43,9 +65,7 @@ def two_stage(
 ) -> TwoStage:
     """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
 
-    start: the incumbent handed to HiGHS, the greedy baseline when None: cold, HiGHS is lost beyond 10 x 10 pixels.
-    options: facet, stroke_norm, beta_norm of the MILP. limits: for each stage. Raises SolverError, SolutionError.
+    start, options: as in find_jumps. limits: for each stage. Raises SolverError, SolutionError.
     """
-    chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
-    milp = solve(formulate(instance, "milp-mccormick", **chosen), None, folder, limits=limits, start=start or greedy(instance))
+    milp = find_jumps(instance, folder, limits=limits, start=start, **options)
     return TwoStage(milp, fit_angles(milp.field, folder, limits=limits))

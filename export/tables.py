@@ -22,10 +22,19 @@ Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
 def tables() -> Tables:
     """For each table its columns and its rows, computed from the code, never typed."""
     return {
-        "formulations": (("name", "paper", "class", "summary", *FORMATS), [_formulation_row(problem) for problem in smallest_problems()]),
+        "formulations": (
+            ("name", "paper", "class", "summary", *FORMATS),
+            [_formulation_row(problem) for problem in smallest_problems()],
+        ),
         "formats": (("name", "dialects", "summary"), [_format_row(name) for name in FORMATS]),
-        "solvers": (("formulation", *SOLVERS), [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()]),
-        "readers": (("name", "description"), [{"name": reader.name, "description": reader.description} for reader in READERS]),
+        "solvers": (
+            ("formulation", *SOLVERS),
+            [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
+        ),
+        "readers": (
+            ("name", "description"),
+            [{"name": reader.name, "description": reader.description} for reader in READERS],
+        ),
     }
 
 
@@ -36,7 +45,13 @@ def sample_rows(size: int) -> list[Row]:
         instance = sample(entry.name, size)
         grid = instance.grid
         share = len(instance.theta) / grid.size
-        row = {"name": entry.name, "kind": entry.kind, "grid": f"{grid.width} x {grid.height}", "pixels": grid.size, "strokes": f"{share:.0%}"}
+        row = {
+            "name": entry.name,
+            "kind": entry.kind,
+            "grid": f"{grid.width} x {grid.height}",
+            "pixels": grid.size,
+            "strokes": f"{share:.0%}",
+        }
         rows.append(row | {"description": entry.description})
     return rows
 
@@ -47,7 +62,9 @@ def smallest_problems() -> list[Problem]:
 
 
 def _smallest(name: str, *, relax: bool | None = None) -> Problem:
-    instance = Instance("smallest", np.ones((1, 2), dtype=bool), np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
+    instance = Instance(
+        "smallest", np.ones((1, 2), dtype=bool), np.array([[0, 0]]), np.array([1.0]), np.array([1.0])
+    )
     jumps = np.zeros(1, dtype=np.int32) if FORMULATIONS[name].fixed else None
     return formulate(instance, name, p=jumps, relax=relax)
 
