@@ -21,6 +21,7 @@ from .arguments import (
     GamsLayout,
     Gap,
     GaugeName,
+    Jobs,
     Json,
     Mask,
     Names,
@@ -47,6 +48,7 @@ from .console import (
     show_samples,
     show_solution,
 )
+from .verify_command import verify_command
 
 if TYPE_CHECKING:
     from ..models.field import CrossField
@@ -92,6 +94,7 @@ def run_command(
     time_limit: Seconds = 60.0,
     gap: Gap = 1e-6,
     threads: Threads = 0,
+    jobs: Jobs = 1,
     gams_layout: GamsLayout = None,
     nl_form: NlForm = None,
     quiet: Quiet = False,
@@ -107,7 +110,13 @@ def run_command(
         instance = _load(sketch, size, mask, gauge)
         dialects = _dialects(gams_layout, nl_form)
         report = run(
-            instance, output, limits=limits, options={"facet": facet}, dialects=dialects, progress=show
+            instance,
+            output,
+            limits=limits,
+            options={"facet": facet},
+            dialects=dialects,
+            jobs=jobs,
+            progress=show,
         )
     if as_json:
         say_json(report.document())
@@ -155,6 +164,7 @@ def export_command(
     gams_layout: GamsLayout = None,
     nl_form: NlForm = None,
     compress: Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")] = False,
+    jobs: Jobs = 1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -162,6 +172,7 @@ def export_command(
     from ..models.formulations import FORMULATIONS
     from .formats import FORMATS
     from .manifest import write_all
+    from .starts import write_starts
 
     formulations, formats = (
         _known(formulation, FORMULATIONS, "formulation"),
@@ -169,17 +180,25 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         loaded = _load(instance, size, mask, gauge)
+        field = None if start is None else _start(start, loaded)
         manifests = write_all(
             loaded,
             output,
             formulations,
             formats,
-            start=None if start is None else _start(start, loaded),
+            start=field,
             options=_options(facet, stroke_norm, beta_norm, relax=relax),
             dialects=_dialects(gams_layout, nl_form),
             compress=compress,
+            jobs=jobs,
             progress=show,
         )
+        if field is not None:
+            show("starting points")
+            for manifest in manifests:
+                write_starts(
+                    manifest.problem(), field, output, manifest.path.name.removesuffix(".manifest.json")
+                )
     if as_json:
         say_json([manifest.document for manifest in manifests])
     elif not quiet:
@@ -240,8 +259,6 @@ def solve_command(
         else:
             write_field(solution.field, target)
     _tell(solution, target, quiet=quiet, as_json=as_json)
-    if solution.interrupted:
-        complain("interrupted; the best point so far was kept")
     if solution.point is None:
         words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
         raise InputError(
@@ -337,6 +354,9 @@ def samples_command(*, as_json: Json = False) -> None:
         show_samples(rows)
 
 
+app.command("verify")(verify_command)
+
+
 def main() -> NoReturn:
     """Run the command line and leave with its exit code; asked to end (SIGTERM), nothing half done is left either."""
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
@@ -381,6 +401,8 @@ def _tell(solution: Solution, field: Path, *, quiet: bool, as_json: bool) -> Non
         say_json(facts)
     elif not quiet:
         show_solution(solution, facts, field)
+    if solution.interrupted:
+        complain("interrupted; the best point so far was kept")
 
 
 def _load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:

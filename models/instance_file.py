@@ -50,7 +50,7 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
     Same instance, same bytes. Raises OutputError.
     """
     path = Path(path)
-    return write_bytes(path, _npz(instance) if path.suffix == ".npz" else to_json(instance).encode())
+    return write_bytes(path, _npz(instance) if path.suffix.lower() == ".npz" else to_json(instance).encode())
 
 
 def read_instance(path: str | Path) -> Instance:
