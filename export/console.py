@@ -206,7 +206,15 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
         [row[solvers[0][0]], *("yes" if row[name] == "yes" else "-" for name in solvers[0][1:])]
         for row in solvers[1]
     ]
+    externals = tables["externals"]
     show_table("which solver solves what here (--json: why not)", solvers[0], marked)
+    takes = [
+        [name, ", ".join(row["formulation"] for row in externals[1] if row[name] == "yes")]
+        for name in externals[0][1:]
+    ]
+    show_table(
+        "which solver proves optima from our files (--json: why not others)", ("solver", "takes"), takes
+    )
     show_table("formats", formats[0], _cells(formats[1], formats[0]))
     readers = tables["readers"]
     show_table("solution files that are read", readers[0], _cells(readers[1], readers[0]))

@@ -11,6 +11,7 @@ from ..models.formulations import FORMULATIONS
 from ..models.instance import Instance
 from ..models.problem import Problem, formulate
 from ..models.samples import sample, samples
+from .capabilities import EXTERNALS, takers
 from .formats import FORMATS, carried
 from .readers import READERS
 from .solvers import SOLVERS, refusal
@@ -30,6 +31,10 @@ def tables() -> Tables:
         "solvers": (
             ("formulation", *SOLVERS),
             [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
+        ),
+        "externals": (
+            ("formulation", *EXTERNALS),
+            [_external_row(problem) for problem in smallest_problems()],
         ),
         "readers": (
             ("name", "description"),
@@ -100,3 +105,8 @@ def _format_row(name: str) -> Row:
 def _solver_row(problem: Problem, relaxed: bool) -> Row:
     answers = {name: refusal(problem, solver) or "yes" for name, solver in SOLVERS.items()}
     return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
+
+
+def _external_row(problem: Problem) -> Row:
+    answers = {name: taking.reason or taking.answer for name, taking in takers(problem).items()}
+    return {"formulation": problem.name} | answers

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -26,13 +27,28 @@ def test_python_block_runs(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} >= {"bottle.mps", "bottle.png"}
 
 
+def run_line_by_line(block, folder):
+    for line in block.splitlines():
+        words = shlex.split(line)
+        command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
+        subprocess.run(command, cwd=folder, check=True, timeout=200, stdout=subprocess.DEVNULL)
+
+
 @pytest.mark.solver
 def test_tour_runs_line_by_line(tmp_path):
-    (tour,) = (block for block in blocks("sh") if block.startswith("crossfield"))
-    for line in tour.splitlines():
-        command = [sys.executable, "-m", *shlex.split(line)]
-        subprocess.run(command, cwd=tmp_path, check=True, timeout=200, stdout=subprocess.DEVNULL)
+    run_line_by_line(blocks("sh")[2], tmp_path)
     assert (tmp_path / "field.png").stat().st_size > 10_000
+
+
+@pytest.mark.solver
+def test_files_are_verified_and_an_answer_read_back(tmp_path):
+    verify, glpk = blocks("sh")[3:]
+    run_line_by_line(verify, tmp_path)
+    assert (tmp_path / "checked" / "verify.json").exists()
+    if shutil.which("glpsol") is None:
+        pytest.skip("glpsol is not installed: apt-get install glpk-utils")
+    run_line_by_line(glpk, tmp_path)
+    assert (tmp_path / "skew.npz").exists()
 
 
 def test_first_command_names_what_it_makes():
