@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from .errors import FormulationError, InstanceError
 from .field import CrossField
@@ -48,15 +49,21 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A monomial of a family: column index arrays of its factors and its coefficient (a number or one per element)."""
+    """A monomial of a family: its symbols, each as often as its power says, and its coefficient (a number or one per element)."""
 
-    factors: tuple[Ints, ...]
+    family: Bound
+    symbols: tuple[sp.Symbol, ...]
     coefficient: Coefficient
+
+    @property
+    def factors(self) -> tuple[Ints, ...]:
+        """Columns of its symbols, one array (count,) each; made anew at every call, so that none stays in memory."""
+        return tuple(map(self.family.columns, self.symbols))
 
     @property
     def degree(self) -> int:
         """Number of factors."""
-        return len(self.factors)
+        return len(self.symbols)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +90,27 @@ class Bound:
 
     def columns(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
-        name, kind = SLOTS[self.family.over][symbol]
-        block = self.problem.blocks[name]
-        columns: Ints = self._reach(np.arange(block.offset, block.offset + block.count, dtype=np.int32), kind)
-        return columns
+        block, inside = self.block(symbol), self.inside(symbol)
+        offset = np.int32(block.offset)
+        if inside is None:
+            return np.arange(offset, offset + block.count, dtype=np.int32)
+        return offset + inside
+
+    def block(self, symbol: sp.Symbol) -> Block:
+        """The block of columns that a symbol means."""
+        return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
+
+    def inside(self, symbol: sp.Symbol) -> Ints | None:
+        """Place in its block of the symbol at each element, shape (count,); None where it is the element's own place."""
+        index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
+        if isinstance(index, slice):
+            return None if self.everywhere else self.elements
+        return index if self.everywhere else index[self.elements]
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether its elements are the whole index set."""
+        return self.family.only is None
 
     def _reach(self, values: Any, kind: Any) -> Any:
         index = way(self.problem.instance, kind)
@@ -114,17 +138,15 @@ class Bound:
         except sp.PolynomialError:
             return None
         if polynomial is None:
-            return (Term((), self.data(self.family.body)),)
+            return (Term(self, (), self.data(self.family.body)),)
         terms = sorted(
             polynomial.terms(), key=lambda term: (sum(term[0]), tuple(-power for power in term[0]))
         )
-        return tuple(Term(self._factors(powers), self.data(c)) for powers, c in terms if c != 0)
+        return tuple(Term(self, self._factors(powers), self.data(c)) for powers, c in terms if c != 0)
 
-    def _factors(self, powers: tuple[int, ...]) -> tuple[Ints, ...]:
-        """Columns of the factors of a monomial, each as often as its power says."""
-        return tuple(
-            self.columns(s) for s, power in zip(self.variables, powers, strict=True) for _ in range(power)
-        )
+    def _factors(self, powers: tuple[int, ...]) -> tuple[sp.Symbol, ...]:
+        """The symbols of a monomial, each as often as its power says."""
+        return tuple(s for s, power in zip(self.variables, powers, strict=True) for _ in range(power))
 
     @property
     def degree(self) -> int:
@@ -331,7 +353,7 @@ class Problem:
             return np.zeros((1, 0), np.int32), np.array([total])
         if not terms:
             return np.zeros((0, degree), np.int32), np.zeros(0)
-        index = np.concatenate([np.sort(np.stack(term.factors, axis=1), axis=1) for term, _ in terms])
+        index = np.concatenate([_ordered(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
         return _merge(index, np.concatenate(coefficients), scale, self.columns)
 
@@ -419,15 +441,30 @@ _NOISE: Final = 1e-12
 """Relative to its element's largest coefficient: what cancels up to rounding, or comes from an angle of 1e-16, is noise."""
 
 
+def _ordered(factors: tuple[Ints, ...]) -> Ints:
+    """Columns of each monomial in ascending order, shape (count, degree)."""
+    if len(factors) == 2:  # nearly all: three times as fast as sorting rows
+        return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
+    return np.sort(np.stack(factors, axis=1), axis=1)
+
+
 def _merge(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
     """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out."""
+    rows, number = _numbered(index, columns)
+    total = np.bincount(number, weights=coefficient, minlength=len(rows)).astype(np.float64)
+    kept = np.abs(total) > _NOISE * np.bincount(number, weights=scale, minlength=len(rows))
+    return rows[kept], total[kept]
+
+
+def _numbered(index: Ints, columns: int) -> tuple[Ints, NDArray[Any]]:
+    """Sorted rows, all rows of `index` among them and each once, and the number of each row of `index` among them."""
+    if index.shape[1] == 1:
+        return np.arange(columns, dtype=np.int32)[:, None], index[:, 0]
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
-    _, place, inverse = np.unique(key, return_index=True, return_inverse=True)
-    total: Floats = np.bincount(inverse, weights=coefficient, minlength=len(place)).astype(np.float64)
-    kept = np.abs(total) > _NOISE * np.bincount(inverse, weights=scale, minlength=len(place))
-    return index[place[kept]], total[kept]
+    _, place, number = np.unique(key, return_index=True, return_inverse=True)
+    return index[place], number
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from crossfield.models.box_qp import fitted
 from crossfield.models.field import CrossField
 from crossfield.models.greedy import greedy, power_field, stroke_cells
 from crossfield.models.instance import HALF, QUARTER, Instance
@@ -105,6 +106,20 @@ def test_frame_of_strokes_round_one_singularity(solve, index):
     assert field.singularities.column[0] == pytest.approx(5, abs=1)
 
 
+def test_large_grids_are_grown_by_local_updates():
+    # More than 8192 pixels. Two families are constant; a frame of strokes turns round one singularity.
+    rows, columns = np.mgrid[0:91, 0:92]
+    theta = np.where((rows == 20) | (rows == 60), np.radians(77), np.nan)
+    theta[(columns == 30) & (rows > 60)] = np.radians(127)
+    field = greedy(sketch(np.ones(theta.shape, bool), theta))
+    assert field.energy().total < 91 * 92 * 1e-6 * QUARTER**2
+    assert np.degrees(field.angle_between) == pytest.approx(50, abs=0.1)
+    around = np.arctan2(-(rows - 45.5), columns - 45.5) / 4
+    around[12:-12, 12:-12] = np.nan
+    field = greedy(sketch(np.ones(theta.shape, bool), around))
+    assert field.singularities.index.tolist() == [0.25]
+
+
 MOVES = {"turned": np.rot90, "mirrored": np.fliplr, "transposed": np.transpose}
 
 
@@ -204,6 +219,12 @@ def test_progress_counts_up_to_all_jumps():
     known = [first for first, _ in seen]
     assert known == sorted(set(known))
     assert seen[-1] == (len(field.p), len(field.p))
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_answer_is_the_optimum_for_its_jumps(gauge):
+    field = greedy(some_curves().with_gauge(gauge))
+    assert fitted(field).energy().total == pytest.approx(field.energy().total, rel=1e-12)
 
 
 def test_answer_is_stationary_for_its_jumps():
