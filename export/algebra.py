@@ -13,9 +13,7 @@ from collections.abc import Sequence
 import sympy as sp
 
 from ..models.notation import SCALARS, VARIABLES
-from .records import Part, Pieces
-
-Piece = bytes | Part
+from .records import Piece, Pieces
 
 
 class Language(ABC):

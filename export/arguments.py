@@ -48,6 +48,7 @@ Seconds = Annotated[
 Gap = Annotated[
     float, typer.Option("--gap", min=0.0, help="Relative gap at which a discrete search may stop.")
 ]
+Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Solver files written at once, in threads.")]
 Threads = Annotated[int, typer.Option("--threads", min=0, help="Threads of HiGHS; 0: its own choice.")]
 Start = Annotated[
     Path | None,

@@ -5,21 +5,18 @@ A format states what it carries; what it cannot carry is lifted where that is ex
 
 from __future__ import annotations
 
-import gzip
-import io
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import IO, Any, Final, cast
+from typing import Any, Final
 
 from ..models.errors import InputError, UnsupportedByFormatError
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem, lifted
-from ..models.storage import replacing, sha256_of
+from .sink import save
 
 ANY_DEGREE: Final = 99
 
@@ -170,7 +167,7 @@ def write(
     held = carried(problem, entry)
     point = held.point(start) if start is not None and entry.starts else None
     written = Written(entry.name, chosen, held)
-    _save(path, entry.generate(held, header(held), point, chosen), written)
+    written.files[path.name] = save(path, entry.generate(held, header(held), point, chosen))
     if entry.name == "nl":
         _save_names(path, held, written)
     return written
@@ -181,25 +178,6 @@ def _save_names(path: Path, problem: Problem, written: Written) -> None:
 
     layout = nl.Layout(problem)
     stub = path.with_name(path.name.removesuffix(".gz").removesuffix(".nl"))
-    for suffix, names in ((".row", layout.row_names()), (".col", layout.column_names())):
-        _save(stub.with_name(stub.name + suffix), nl.names_file(names), written)
-
-
-def _save(path: Path, chunks: Iterator[bytes], written: Written) -> None:
-    with replacing(path) as stream, compressed(stream, path) as sink:
-        for chunk in chunks:
-            sink.write(chunk)
-    written.files[path.name] = {"bytes": path.stat().st_size, "sha256": sha256_of(path)}
-
-
-@contextmanager
-def compressed(stream: IO[bytes], path: Path) -> Iterator[IO[bytes]]:
-    """The stream, through gzip when the path ends in .gz; without name and time, so that the bytes are stable."""
-    if path.suffix != ".gz":
-        yield stream
-        return
-    with (
-        gzip.GzipFile(filename="", mode="wb", fileobj=stream, compresslevel=3, mtime=0) as archive,
-        io.BufferedWriter(cast("Any", archive), 1 << 20) as buffer,
-    ):
-        yield buffer
+    for suffix, names in ((".row", layout.row_file()), (".col", layout.column_file())):
+        path = stub.with_name(stub.name + suffix)
+        written.files[path.name] = save(path, names)

@@ -33,10 +33,22 @@ from numpy.typing import NDArray
 from ..models.grid import Floats
 from ..models.problem import Block, Bound, Problem
 from ..templates import stream
-from .algebra import Language, Piece, wrapped
+from .algebra import Language, wrapped
 from .lp import is_binary, scalar_when_constant
-from .names import column_names, family_names, row_names
-from .records import Bytes, Words, check_coefficients, number, render, table, words
+from .names import Names
+from .records import (
+    Piece,
+    Tagged,
+    Texts,
+    Words,
+    bounds,
+    check_coefficients,
+    number,
+    numbers,
+    render,
+    table,
+    words,
+)
 from .records import signed as with_sign
 
 MODEL_TYPES: Final = {
@@ -62,15 +74,15 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
 
     header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
     """
-    names = Words(column_names(problem), None)
+    names = Names(problem)
     blocks = {
         "variables": _variables(problem, names),
-        "equations": _declared(b"Equations", row_names(problem)) if problem.rows else (),
+        "equations": _equations(problem, names),
         "objective": _objective(problem, names),
         "rows": _rows(problem, names),
         "bounds": _bounds(problem, names),
-        "start": () if start is None else render([names, b".l = ", words(start), b";\n"], problem.columns),
-        "results": render([b"put '", names, b",' ", names, b".l:0 /;\n"], problem.columns),
+        "start": () if start is None else _start(problem, names, start),
+        "results": _results(problem, names),
     }
     objective = None if start is None else number(problem.objective_value(start))
     yield from stream(
@@ -87,21 +99,22 @@ def power(base: list[Piece], exponent: int) -> list[Piece]:
     return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
 
 
-def bracketed(value: float) -> str:
-    """A number, in brackets when it is negative: `3`, `(-0.5)`."""
-    return f"({number(value)})" if value < 0 else number(value)
+def bracketed(values: Floats) -> Texts:
+    """Numbers, in brackets when negative: `3`, `(-0.5)`."""
+    texts = numbers(values)
+    return np.where(values < 0, np.strings.add(np.strings.add(b"(", texts), b")"), texts)
 
 
 class _Scalar(Language):
     """The language of one family: symbols are column names, data are numbers, one per record."""
 
-    def __init__(self, family: Bound, names: Words) -> None:
+    def __init__(self, family: Bound, names: Names) -> None:
         self._family = family
         self._names = names
         self._variables = set(family.variables)
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
-        return self._names.at(self._family.columns(symbol))
+        return self._names.at(self._family, symbol)
 
     def is_data(self, expression: sp.Expr) -> bool:
         return not expression.free_symbols & self._variables
@@ -123,21 +136,28 @@ def _number_words(values: Floats | float, *, signed: bool) -> Piece:
     return words(given, with_sign if signed else bracketed)
 
 
-def _declared(keyword: bytes, names: Bytes) -> Iterator[bytes]:
-    """A statement that declares the names, as a wrapped list."""
-    count, width = names.shape
-    per_line = WIDTH // (width + 2)
-    separator = np.zeros(count, dtype=np.uint8)
-    separator[per_line - 1 :: per_line] = 1
-    separator[-1] = 2
+def _declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
+    """A statement that declares names, given as lists with their lengths, as one wrapped list."""
+    per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
+    total = sum(count for _, count in lists)
     yield keyword + b"\n  "
-    yield from render([Words(names, None), Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
+    start = 0
+    for name, count in lists:
+        place = np.arange(start + 1, start + count + 1)
+        separator = np.where(place == total, 2, place % per_line == 0)
+        yield from render([name, Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
+        start += count
 
 
-def _variables(problem: Problem, names: Words) -> Iterator[bytes]:
+def _variables(problem: Problem, names: Names) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
-            yield from _declared(_keyword(block), names.table[block.columns])
+            yield from _declared(_keyword(block), [(names.of(block), block.count)])
+
+
+def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
+    if problem.rows:
+        yield from _declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
 
 
 def _keyword(block: Block) -> bytes:
@@ -146,19 +166,19 @@ def _keyword(block: Block) -> bytes:
     return b"Binary Variables" if is_binary(block) else b"Integer Variables"
 
 
-def _objective(problem: Problem, names: Words) -> Iterator[bytes]:
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     """The terms of the objective, one line an element (more when it is long)."""
     for family in problem.objective:
         terms = _Scalar(family, names).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
-def _rows(problem: Problem, names: Words) -> Iterator[bytes]:
+def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
         language, relation = _Scalar(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
         parts = [
-            Words(family_names(family), None),
+            names.row(family),
             b".. ",
             *left,
             SENSES[family.family.sense],
@@ -168,7 +188,7 @@ def _rows(problem: Problem, names: Words) -> Iterator[bytes]:
         yield from render(parts, family.count)
 
 
-def _bounds(problem: Problem, names: Words) -> Iterator[bytes]:
+def _bounds(problem: Problem, names: Names) -> Iterator[bytes]:
     for block in problem.blocks.values():
         fixed = block.lower == block.upper
         for chosen, suffixes in ((fixed, ("fx",)), (~fixed, ("lo", "up"))):
@@ -176,13 +196,14 @@ def _bounds(problem: Problem, names: Words) -> Iterator[bytes]:
             yield from render(_bound_parts(block, names, at, suffixes), len(at))
 
 
-def _bound_parts(block: Block, names: Words, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:
+def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:
+    name = names.of(block) if len(at) == block.count else names.of(block).at(at)
     parts: list[Piece] = []
     for suffix in suffixes:
         values = (block.upper if suffix == "up" else block.lower)[at]
-        text = words(scalar_when_constant(values), bound) if len(at) else b""
+        text = words(scalar_when_constant(values), bounds) if len(at) else b""
         parts += [
-            names.at(block.offset + at),
+            name,
             f".{suffix} = ".encode(),
             text,
             b"; " if suffix == "lo" else b";\n",
@@ -190,6 +211,13 @@ def _bound_parts(block: Block, names: Words, at: NDArray[Any], suffixes: tuple[s
     return parts
 
 
-def bound(value: float) -> str:
-    """A bound: a number, `-inf` or `+inf` (G12)."""
-    return number(value) if np.isfinite(value) else ("+inf" if value > 0 else "-inf")
+def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
+    for block in problem.blocks.values():
+        level = words(start[block.columns])
+        yield from render([names.of(block), b".l = ", level, b";\n"], block.count)
+
+
+def _results(problem: Problem, names: Names) -> Iterator[bytes]:
+    for block in problem.blocks.values():
+        name = names.of(block)
+        yield from render([b"put '", name, b",' ", name, b".l:0 /;\n"], block.count)

@@ -21,15 +21,16 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
+from ..models.errors import UnsupportedByFormatError
 from ..models.grid import Floats
 from ..models.instance import QUARTER, Instance
 from ..models.notation import SCALARS, SLOTS, VARIABLES, IndexSet
 from ..models.problem import Block, Bound, Problem
 from ..templates import stream
-from .algebra import Language, Piece, wrapped
-from .gams import MODEL_TYPES, SENSES, bound, power
+from .algebra import Language, wrapped
+from .gams import MODEL_TYPES, SENSES, power
 from .names import element_names
-from .records import Bytes, Words, check_coefficients, number, render, words
+from .records import Bytes, Piece, Words, bounds, check_coefficients, number, render, words
 
 SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,side"}
@@ -51,9 +52,13 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
     """The bytes of the GAMS file in indexed layout, block by block.
 
     header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
-    Raises UnsupportedByFormatError for a weight that solvers would drop.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with integers fixed.
     """
     instance = problem.instance
+    if problem.pinned is not None:
+        raise UnsupportedByFormatError(
+            "gms in indexed layout has no place for integers fixed one by one; write the scalar layout"
+        )
     for name, values in (("w", instance.w), ("w_strokes", instance.w_strokes), ("w_beta", instance.w_beta)):
         check_coefficients(values, f"{name} of {instance.name}")
     blocks = {
@@ -168,7 +173,7 @@ def _variable(block: Block) -> dict[str, str]:
 def _number_bound(values: Floats) -> str:
     value = float(values[0])
     assert (values == value).all()  # else it belongs into BOUNDS
-    return ANGLES.get(value) or bound(value)
+    return ANGLES.get(value) or bytes(bounds(values[:1])[0]).decode()
 
 
 def _described(family: Bound) -> dict[str, str]:

@@ -27,19 +27,19 @@ import numpy as np
 
 from ..models.grid import Floats
 from ..models.problem import Block, Bound, Problem, Term
-from .names import column_names, family_names, with_one
-from .records import Pieces, Words, check_coefficients, number, render, signed, words
+from .names import Names
+from .records import Piece, Pieces, Words, bounds, check_coefficients, render, signed, words
 
 
 def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
-    names = Words(with_one(column_names(problem)), None)
+    names = Names(problem)
     constant = float(problem.merged_objective(0)[1][0])
     has_one = needs_one(problem)
     for line in header:
         yield f"\\ {line}\n".encode()
     yield b"Minimize\n obj:"
-    yield f" {signed(constant)} ONE\n".encode() if has_one else b"\n"
+    yield from render([b" ", words(constant, signed), b" ONE\n"] if has_one else [b"\n"], 1)
     yield from _objective(problem, names)
     yield b"Subject To\n"
     if not problem.rows:
@@ -57,7 +57,7 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
         if chosen:
             yield title
         for block in chosen:
-            yield from render([b" ", _named(block, names), b"\n"], block.count)
+            yield from render([b" ", names.of(block), b"\n"], block.count)
     yield b"End\n"
 
 
@@ -80,9 +80,11 @@ def linear_costs(problem: Problem) -> Floats:
     return costs
 
 
-def _objective(problem: Problem, names: Words) -> Iterator[bytes]:
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     costs = linear_costs(problem)
-    yield from render([b" ", words(costs, signed), b" ", names, b"\n"], problem.columns)
+    for block in problem.blocks.values():
+        cost = words(scalar_when_constant(costs[block.columns]), signed)
+        yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
     index, coefficient = problem.merged_objective(2)
     if not len(coefficient):
         return
@@ -91,15 +93,15 @@ def _objective(problem: Problem, names: Words) -> Iterator[bytes]:
     yield b" + [\n"
     for chosen in (square, ~square):
         pair, value = index[chosen], words(2 * coefficient[chosen], signed)
-        tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.at(pair[:, 1]), b"\n"]
-        yield from render([b" ", value, b" ", names.at(pair[:, 0]), *tail], len(pair))
+        tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
+        yield from render([b" ", value, b" ", names.all.at(pair[:, 0]), *tail], len(pair))
     yield b" ] / 2\n"
 
 
-def _rows(family: Bound, names: Words) -> Iterator[bytes]:
-    parts: list[bytes | Words] = [b" ", Words(family_names(family), None), b":"]
+def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+    parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
-        parts += [b" ", coefficient(term, family), b" ", names.at(term.factors[0])]
+        parts += [b" ", coefficient(term, family), b" ", names.at(family, term.symbols[0])]
     products = family.of_degree(2)
     if products:
         parts.append(b" + [")
@@ -108,9 +110,9 @@ def _rows(family: Bound, names: Words) -> Iterator[bytes]:
                 b" ",
                 coefficient(term, family),
                 b" ",
-                names.at(term.factors[0]),
+                names.at(family, term.symbols[0]),
                 b" * ",
-                names.at(term.factors[1]),
+                names.at(family, term.symbols[1]),
             ]
         parts.append(b" ]")
     sense = b" = " if family.family.sense == "==" else f" {family.family.sense} ".encode()
@@ -129,14 +131,6 @@ def scalar_when_constant(values: Floats) -> Floats | float:
     return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
 
 
-def _named(block: Block, names: Words) -> Words:
-    return names.at(np.arange(block.offset, block.offset + block.count))
-
-
-def _bounds(block: Block, names: Words) -> Iterator[bytes]:
-    lower, upper = (words(scalar_when_constant(bound), _bound) for bound in (block.lower, block.upper))
-    yield from render([b" ", lower, b" <= ", _named(block, names), b" <= ", upper, b"\n"], block.count)
-
-
-def _bound(value: float) -> str:
-    return number(value) if np.isfinite(value) else ("+inf" if value > 0 else "-inf")
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
+    lower, upper = (words(scalar_when_constant(end), bounds) for end in (block.lower, block.upper))
+    yield from render([b" ", lower, b" <= ", names.of(block), b" <= ", upper, b"\n"], block.count)

@@ -10,7 +10,9 @@ Names come from the instance and the formulation alone, so that a later export r
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -114,29 +116,75 @@ def write_problem(
     start: CrossField | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
+    jobs: int = 1,
 ) -> Manifest:
     """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
 
-    What a format cannot carry is listed in the manifest as refused. dialects: by format. Raises OutputError, and InputError for an
-    unknown format and for a problem that no manifest records: with integers fixed, or with products lifted beforehand.
+    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats written at once. Raises
+    OutputError, and InputError for an unknown format and for a problem that no manifest records: with integers fixed, or with
+    products lifted beforehand.
     """
     _check_recordable(problem)
-    folder = make_folder(folder)
-    stem = f"{problem.instance.name}.{problem.name}"
-    written: list[Written] = []
-    refused: dict[str, str] = {}
-    for name in formats:
-        if name not in FORMATS:
-            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
-        path = folder / f"{stem}{FORMATS[name].suffix}{'.gz' if compress else ''}"
+    with _pool(jobs) as pool:
+        return _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress).begin(
+            problem
+        )()
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that write files: nearly all the time is spent in NumPy, zlib and hashlib, where threads run side by side.
+
+    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is whole.
+    """
+    with ThreadPoolExecutor(jobs) as pool:
         try:
-            written.append(write(problem, path, dialect=(dialects or {}).get(name), start=start))
-        except UnsupportedByFormatError as error:
-            refused[name] = str(error)
-    document = _document(problem, _instance_file(problem.instance, folder), written, refused)
-    manifest = Manifest(document, folder / f"{stem}.manifest.json")
-    write_bytes(manifest.path, (json.dumps(manifest.document, indent=1) + "\n").encode())
-    return manifest
+            yield pool
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+@dataclass(frozen=True)
+class _Sets:
+    """What sets of files have in common: threads, folder, formats, start, dialects by format, and whether files are compressed."""
+
+    pool: ThreadPoolExecutor
+    folder: Path
+    formats: tuple[str, ...]
+    start: CrossField | None
+    dialects: dict[str, str]
+    compress: bool
+
+    def __post_init__(self) -> None:
+        """Check that the formats are known."""
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+
+    def begin(self, problem: Problem) -> Callable[[], Manifest]:
+        """Hand the files of a problem to the threads; a function that waits for them and gives their manifest."""
+        stem = self.folder / f"{problem.instance.name}.{problem.name}"
+        files = {name: self._submit(problem, stem, name) for name in self.formats}
+
+        def manifest() -> Manifest:
+            written: list[Written] = []
+            refused: dict[str, str] = {}
+            for name, file in files.items():
+                try:
+                    written.append(file.result())
+                except UnsupportedByFormatError as error:
+                    refused[name] = str(error)
+            document = _document(problem, _instance_file(problem.instance, self.folder), written, refused)
+            path = stem.with_name(f"{stem.name}.manifest.json")
+            write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
+            return Manifest(document, path)
+
+        return manifest
+
+    def _submit(self, problem: Problem, stem: Path, name: str) -> Future[Written]:
+        path = stem.with_name(f"{stem.name}{FORMATS[name].suffix}{'.gz' if self.compress else ''}")
+        return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
 
 
 def _check_recordable(problem: Problem) -> None:
@@ -157,21 +205,24 @@ def write_all(
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
+    jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Manifest]:
     """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
 
     start: a field, for starting points and for the jumps of `qp-fixed`; without one the greedy baseline gives the jumps.
-    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. progress: called with each name.
+    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written at once.
+    progress: called with each name.
     """
     manifests = []
-    formats = tuple(formats)
-    for name in formulations:
-        progress(name)
-        problem = _formulated(instance, name, start, options or {})
-        manifests.append(
-            write_problem(problem, folder, formats, start=start, dialects=dialects, compress=compress)
-        )
+    with _pool(jobs) as pool:
+        sets = _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress)
+        waiting = {}
+        for name in formulations:
+            waiting[name] = sets.begin(_formulated(instance, name, start, options or {}))
+        for name in list(waiting):
+            progress(name)
+            manifests.append(waiting.pop(name)())
     return manifests
 
 

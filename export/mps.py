@@ -18,33 +18,31 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import sparse
 
-from ..models.grid import Bools, Floats
-from ..models.problem import Block, Bound, Problem
+from ..models.grid import Bools, Grid, Ints
+from ..models.notation import SLOTS
+from ..models.problem import Block, Bound, Problem, Term
 from .lp import linear_costs, needs_one, scalar_when_constant
-from .names import OBJECTIVE, column_names, family_names, row_names, stacked, with_one
-from .records import Words, check_coefficients, number, render, table, words
+from .names import Names
+from .records import OnlyWhere, Piece, Pieces, Tagged, check_coefficients, number, render, words
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
 
 
 def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
-    names = Words(with_one(column_names(problem)), None)
+    names = Names(problem)
     for line in header:
         yield f"* {line}\n".encode()
     yield f"NAME {problem.instance.name} FREE\nROWS\n N obj\n".encode()
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:
-        yield from render(
-            [b" " + _KIND[family.family.sense] + b" ", Words(family_names(family), None), b"\n"], family.count
-        )
+        yield from render([b" " + _KIND[family.family.sense] + b" ", names.row(family), b"\n"], family.count)
     yield b"COLUMNS\n"
     yield from _columns(problem, names)
     yield b"RHS\n"
-    yield from _right_sides(problem)
+    yield from _right_sides(problem, names)
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
         yield from _bounds(block, names)
@@ -56,25 +54,22 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     yield b"ENDATA\n"
 
 
-def _columns(problem: Problem, names: Words) -> Iterator[bytes]:
-    """Matrix entries column by column; entry (0, j) is the cost of column j."""
-    entries, distinct = _entries(problem)
-    rows = Words(
-        stacked([table([OBJECTIVE]), row_names(problem)]) if problem.rows else table([OBJECTIVE]), None
-    )
-    values = table([number(value).encode() for value in distinct.tolist()])
-    column = np.repeat(np.arange(problem.columns, dtype=np.int32), np.diff(entries.indptr))
+def _columns(problem: Problem, names: Names) -> Iterator[bytes]:
+    """Matrix entries column by column; a record is a column with all its entries, the cost first, then by row."""
+    costs = linear_costs(problem)
+    rows = {family.family.tag: names.row(family) for family in problem.rows}
     markers = 0
     for integer, blocks in _runs(problem):
-        first, last = entries.indptr[blocks[0].offset], entries.indptr[blocks[-1].columns.stop]
-        part = slice(first, last)
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
-        value = Words(values, entries.data[part] - 1)
-        yield from render(
-            [b" ", names.at(column[part]), b" ", rows.at(entries.indices[part]), b" ", value, b"\n"],
-            last - first,
-        )
+        for block in blocks:
+            name, cost = names.of(block), words(scalar_when_constant(costs[block.columns]))
+            entries = [
+                entry
+                for family in problem.rows
+                for entry in _entries(family, block, name, rows[family.family.tag])
+            ]
+            yield from render([b" ", name, b" obj ", cost, b"\n", *entries], block.count)
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
@@ -85,25 +80,51 @@ def _columns(problem: Problem, names: Words) -> Iterator[bytes]:
             yield b" ONE c_ONE 1\n"
 
 
-def _entries(problem: Problem) -> tuple[sparse.csc_matrix, Floats]:
-    """Costs (row 0) and coefficients as a matrix of codes, 1 + index into the distinct values, which come second."""
-    costs = linear_costs(problem)
-    row_parts = [np.zeros(problem.columns, dtype=np.int32)]
-    column_parts = [np.arange(problem.columns, dtype=np.int32)]
-    value_parts: list[Floats] = [costs]
-    start = 1
-    for family in problem.rows:
-        for term in family.of_degree(1):
-            check_coefficients(term.coefficient, f"row family {family.family.tag}")
-            row_parts.append(np.arange(start, start + family.count, dtype=np.int32))
-            column_parts.append(term.factors[0])
-            value_parts.append(
-                np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,))
-            )
-        start += family.count
-    distinct, codes = np.unique(np.concatenate(value_parts) + 0.0, return_inverse=True)
-    triplets = (codes.astype(np.int32) + 1, (np.concatenate(row_parts), np.concatenate(column_parts)))
-    return sparse.coo_matrix(triplets, shape=(start, problem.columns)).tocsc(), distinct
+def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+    """The lines of a column of a block for the rows of a family, in the order of rows."""
+    chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
+    lines = [line for term in chosen for line in _incident(family, term)]
+    for _, row, term in sorted(lines, key=lambda line: line[0]):
+        check_coefficients(term.coefficient, f"row family {family.family.tag}")
+        value = words(term.coefficient)
+        if row is None:
+            line: Pieces = [b" ", name, b" ", rows, b" ", value, b"\n"]
+            yield from line
+        else:
+            at_row = value if isinstance(value, bytes) else value.at(row)
+            yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
+
+
+def _incident(family: Bound, term: Term) -> list[tuple[int, Ints | None, Term]]:
+    """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
+
+    None where row and column have the same number. Pairs are numbered by their first pixel, the upper before the right one,
+    so that the rows of a pixel are those of its pairs to the left, upwards, to the right and downwards, in this order.
+    """
+    instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
+    if kind == "itself":
+        own = None if family.everywhere else _inverse(family.elements, family.block(term.symbols[0]).count)
+        return [(0, own, term)]
+    assert family.everywhere  # families on a part of the pairs have terms of those pairs alone
+    if kind == "stroke":
+        return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
+    left, upper, right, lower = _pairs_round(instance.grid)
+    return [(1, upper, term), (2, right, term)] if kind == "first" else [(0, left, term), (3, lower, term)]
+
+
+def _inverse(index: Ints, count: int) -> Ints:
+    """Place in `index` of each number below `count`, -1 where it is not there."""
+    place = np.full(count, -1, dtype=np.int32)
+    place[index] = np.arange(len(index), dtype=np.int32)
+    return place
+
+
+def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
+    """Number of the pair of each pixel with its left, upper, right and lower neighbour, -1 where there is none."""
+    upper, right = grid.pair_number
+    left, lower = np.full_like(right, -1), np.full_like(upper, -1)
+    left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]
+    return left[grid.mask], upper[grid.mask], right[grid.mask], lower[grid.mask]
 
 
 def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
@@ -116,16 +137,16 @@ def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
     return runs
 
 
-def _right_sides(problem: Problem) -> Iterator[bytes]:
+def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
     if not problem.rows:
         yield b" RHS1 c_ONE 1\n"
     for family in problem.rows:
         at = np.nonzero(family.limit)[0]
         value = words(scalar_when_constant(family.limit[at]))
-        yield from render([b" RHS1 ", Words(family_names(family), None).at(at), b" ", value, b"\n"], len(at))
+        yield from render([b" RHS1 ", names.row(family).at(at), b" ", value, b"\n"], len(at))
 
 
-def _bounds(block: Block, names: Words) -> Iterator[bytes]:
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
     """Bounds kind by kind; within a kind one record a column, two lines where both ends are named."""
     low, high = np.isfinite(block.lower), np.isfinite(block.upper)
     fixed = block.lower == block.upper
@@ -138,8 +159,8 @@ def _bounds(block: Block, names: Words) -> Iterator[bytes]:
     ]
     for chosen, first, second in kinds:
         at = np.nonzero(chosen)[0]
-        name = names.at(block.offset + at)
-        parts: list[bytes | Words] = []
+        name = names.of(block) if len(at) == block.count else names.of(block).at(at)
+        parts: list[Piece] = []
         for kind in filter(None, (first, second)):
             value = {b"FX": block.lower, b"LO": block.lower, b"UP": block.upper}.get(kind)
             parts += [b" " + kind + b" BND1 ", name]
@@ -149,7 +170,7 @@ def _bounds(block: Block, names: Words) -> Iterator[bytes]:
         yield from render(parts, len(at))
 
 
-def _objective_matrix(problem: Problem, names: Words) -> Iterator[bytes]:
+def _objective_matrix(problem: Problem, names: Names) -> Iterator[bytes]:
     index, coefficient = problem.merged_objective(2)
     if not len(coefficient):
         return
@@ -157,18 +178,19 @@ def _objective_matrix(problem: Problem, names: Words) -> Iterator[bytes]:
     hessian = np.where(index[:, 0] == index[:, 1], 2 * coefficient, coefficient)
     yield b"QUADOBJ\n"
     yield from render(
-        [b" ", names.at(index[:, 0]), b" ", names.at(index[:, 1]), b" ", words(hessian), b"\n"], len(index)
+        [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", words(hessian), b"\n"],
+        len(index),
     )
 
 
-def _row_matrices(family: Bound, names: Words) -> Iterator[bytes]:
+def _row_matrices(family: Bound, names: Names) -> Iterator[bytes]:
     products = family.of_degree(2)
     if not products:
         return
-    parts: list[bytes | Words] = [b"QCMATRIX ", Words(family_names(family), None), b"\n"]
+    parts: list[Piece] = [b"QCMATRIX ", names.row(family), b"\n"]
     for term in products:
         check_coefficients(term.coefficient, f"row family {family.family.tag}")
-        first, second = (names.at(factor) for factor in term.factors)
+        first, second = (names.at(family, symbol) for symbol in term.symbols)
         half = words(np.asarray(term.coefficient) / 2)
         parts += [b" ", first, b" ", second, b" ", half, b"\n", b" ", second, b" ", first, b" ", half, b"\n"]
     yield from render(parts, family.count)

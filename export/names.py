@@ -7,14 +7,16 @@ neighbour. Zero-padded to the grid's width: at most 15 characters, no leading e,
 
 from __future__ import annotations
 
-from typing import Final
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
+import sympy as sp
 
 from ..models.instance import Instance
-from ..models.notation import IndexSet, pixel_of
-from ..models.problem import Bound, Problem
-from .records import Bytes, digits, table
+from ..models.notation import SLOTS, IndexSet, pixel_of
+from ..models.problem import Block, Bound, Problem
+from .records import Bytes, Piece, Tagged, Words, digits, filled, table
 
 ONE: Final = b"ONE"
 """The column fixed to 1 that carries the objective's constant in LP and MPS."""
@@ -23,19 +25,70 @@ OBJECTIVE: Final = b"obj"
 """Name of the objective row."""
 
 
+class Names:
+    """Names of a problem's columns and rows as pieces of records: a tag, and words for where the elements lie.
+
+    The words are the same for all blocks and families over an index set, so that there are few of them and each is made once.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._places: dict[IndexSet, Words] = {}
+        self._reached: dict[tuple[Any, ...], Words] = {}
+
+    def of(self, block: Block) -> Tagged:
+        """Names of a block's columns in order."""
+        return Tagged(block.name.encode(), self._of(block.over))
+
+    def row(self, family: Bound) -> Tagged:
+        """Names of the rows of a family in order."""
+        words = self._of(family.family.over)
+        return Tagged(family.family.tag.encode(), words if family.everywhere else words.at(family.elements))
+
+    def at(self, family: Bound, symbol: sp.Symbol) -> Tagged:
+        """Name of the symbol's column at each element of a family."""
+        block, (_, way) = family.block(symbol), SLOTS[family.family.over][symbol]
+        key = (family.family.over, way, family.family.only)
+        if key not in self._reached:
+            words, inside = self._of(block.over), family.inside(symbol)
+            self._reached[key] = words if inside is None else words.at(inside)
+        return Tagged(block.name.encode(), self._reached[key])
+
+    def _of(self, over: IndexSet) -> Words:
+        if over not in self._places:
+            self._places[over] = Words(element_names(self._problem.instance, "", over), None)
+        return self._places[over]
+
+    @cached_property
+    def all(self) -> Words:
+        """Names of all columns in order, padded to one length."""
+        return Words(column_names(self._problem), None)
+
+
 def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
     """Names `tag_row_column[_u|_r]` of all elements of an index set, shape (count, width), no padding."""
     grid = instance.grid
     at = pixel_of(instance, over)
-    width = max(2, len(str(max(grid.height, grid.width) - 1)))
-    row, column = digits(grid.rows[at], width), digits(grid.columns[at], width)
-    line = np.full((len(row), 1), ord("_"), dtype=np.uint8)
-    stem = np.broadcast_to(np.frombuffer(tag.encode(), dtype=np.uint8), (len(row), len(tag)))
-    parts = [stem, line, row, line, column]
+    labels = digits(np.arange(max(grid.height, grid.width)), _digits(instance))
+    parts: list[Piece] = [
+        tag.encode() + b"_",
+        Words(labels, grid.rows[at]),
+        b"_",
+        Words(labels, grid.columns[at]),
+    ]
     if over == "pairs":
-        side = np.where(grid.upward, ord("u"), ord("r")).astype(np.uint8)
-        parts += [line, side[:, None]]
-    return np.concatenate(parts, axis=1)
+        parts.append(Words(table([b"_r", b"_u"]), grid.upward.view(np.uint8)))
+    return filled(parts, len(at))
+
+
+def name_length(instance: Instance, tag: str, over: IndexSet) -> int:
+    """Length of each of these names."""
+    return len(tag) + 2 * (1 + _digits(instance)) + (2 if over == "pairs" else 0)
+
+
+def _digits(instance: Instance) -> int:
+    """Digits of a row or column number: as many as the largest has, at least two."""
+    return max(2, len(str(max(instance.grid.height, instance.grid.width) - 1)))
 
 
 def stacked(matrices: list[Bytes]) -> Bytes:
@@ -58,14 +111,10 @@ def column_names(problem: Problem) -> Bytes:
 
 def family_names(family: Bound) -> Bytes:
     """Names of the rows of a family, shape (count, width), no padding."""
-    return element_names(family.problem.instance, family.family.tag, family.family.over)[family.elements]
+    names = element_names(family.problem.instance, family.family.tag, family.family.over)
+    return names if family.everywhere else names[family.elements]
 
 
 def row_names(problem: Problem) -> Bytes:
     """Names of all rows in row order, shape (rows, width), padded with NUL."""
     return stacked([family_names(family) for family in problem.rows])
-
-
-def with_one(names: Bytes) -> Bytes:
-    """The names and ONE after them."""
-    return stacked([names, table([ONE])])

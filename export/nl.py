@@ -30,11 +30,13 @@ from typing import Any, Final
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from ..models.grid import Bools, Floats, Ints
-from ..models.problem import Bound, Problem, Term
-from .names import OBJECTIVE, column_names, family_names, stacked
-from .records import Bytes, Decimals, Pieces, Raw, Words, check_coefficients, render, table, words
+from ..models.problem import Block, Bound, Problem, Term
+from .lp import scalar_when_constant
+from .names import OBJECTIVE, Names, name_length
+from .records import Decimals, Pieces, Raw, check_coefficients, render, words
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
 _FUNCTIONS: Final = {sp.cos: COSINE}
@@ -171,13 +173,13 @@ class Layout:
         return found
 
     @cached_property
-    def group(self) -> Ints:
-        """Group 0..8 of each column."""
+    def group(self) -> NDArray[np.int8]:
+        """Group 0..8 of each column; small integers are sorted by counting."""
         problem, rows, objective = self.problem, self.in_rows, self.in_objective
         binary = problem.integer & (problem.lower == 0) & (problem.upper == 1)
         nonlinear = np.where(rows & objective, 0, np.where(rows, 2, 4)) + problem.integer
         linear = np.where(binary, 7, np.where(problem.integer, 8, 6))
-        return np.where(rows | objective, nonlinear, linear).astype(np.int32)
+        return np.where(rows | objective, nonlinear, linear).astype(np.int8)
 
     @cached_property
     def order(self) -> Ints:
@@ -191,23 +193,42 @@ class Layout:
         place[self.order] = np.arange(len(place), dtype=np.int32)
         return place
 
-    def column_names(self) -> Bytes:
-        """Names of columns in file order: the .col file."""
-        return column_names(self.problem)[self.order]
+    @cached_property
+    def stretches(self) -> list[tuple[Block, slice]]:
+        """Runs of places that hold columns of one block, in file order."""
+        blocks = [block for block in self.problem.blocks.values() if block.count]
+        number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
+        return [(blocks[number[self.order[run.start]]], run) for run in _runs(number[self.order])]
 
-    def row_names(self) -> Bytes:
-        """Names of rows in file order, then of the objective: the .row file."""
-        return stacked([*map(family_names, self.rows), table([OBJECTIVE])])
+    def places(self, family: Bound, symbol: sp.Symbol) -> Ints:
+        """Place in the file of the symbol's column at each element of a family."""
+        places, inside = self.place[family.block(symbol).columns], family.inside(symbol)
+        return places if inside is None else places[inside]
+
+    def column_file(self) -> Iterator[bytes]:
+        """The bytes of the .col file: names of columns in file order, one a line."""
+        names = Names(self.problem)
+        for block, run in self.stretches:
+            inside = self.order[run] - block.offset
+            yield from render([names.of(block).at(inside), b"\n"], len(inside))
+
+    def row_file(self) -> Iterator[bytes]:
+        """The bytes of the .row file: names of rows in file order, then of the objective, one a line."""
+        names = Names(self.problem)
+        for family in self.rows:
+            yield from render([names.row(family), b"\n"], family.count)
+        yield OBJECTIVE + b"\n"
+
+
+def _runs(values: NDArray[Any]) -> list[slice]:
+    """Stretches of equal values."""
+    cuts = [0, *(np.nonzero(np.diff(values))[0] + 1).tolist(), len(values)]
+    return [slice(first, last) for first, last in pairwise(cuts)]
 
 
 def nonlinear_terms(family: Bound) -> tuple[Term, ...]:
     """The monomials of degree two and more."""
     return tuple(term for term in family.terms or () if term.degree > 1)
-
-
-def names_file(names: Bytes) -> Iterator[bytes]:
-    """The bytes of a .row or .col file: one name a line."""
-    yield from render([Words(names, None), b"\n"], len(names))
 
 
 def generate(problem: Problem, *, binary: bool = False, start: Floats | None = None) -> Iterator[bytes]:
@@ -240,7 +261,8 @@ def _header(layout: Layout, code: Encoder) -> bytes:
     nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
     equations = sum(family.count for family in layout.rows if family.family.sense == "==")
     entries = sum(family.count * len(_entries(family)) for family in layout.rows)
-    longest = [names.shape[1] for names in (layout.row_names(), column_names(problem))]
+    rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in layout.rows)
+    columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
         code.letter + b"3 1 1 0",
         b" %d %d 1 0 %d" % (problem.columns, problem.row_count, equations),
@@ -250,7 +272,7 @@ def _header(layout: Layout, code: Encoder) -> bytes:
         b" 0 0 %d 1" % code.arith,
         b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
         b" %d %d" % (entries, len(_gradient(layout)[0])),
-        b" %d %d" % tuple(longest),
+        b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),
         b" 0 0 0 0 0",
     ]
     return b"\n".join(lines) + b"\n"
@@ -273,7 +295,7 @@ def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> 
     if not expression.free_symbols & set(family.variables):
         return code.constant(family.data(expression))
     if expression.is_Symbol:
-        return code.variable(layout.place[family.columns(expression)])
+        return code.variable(layout.places(family, expression))
     if expression.is_Add or expression.is_Mul:
         return _chain(layout, code, family, expression)
     if expression.is_Pow:
@@ -312,9 +334,10 @@ def _sum(code: Encoder, summands: list[Pieces]) -> Pieces:
 def _monomial(layout: Layout, code: Encoder, term: Term) -> Pieces:
     check_coefficients(term.coefficient, "a nonlinear row")
     parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(term.coefficient)]
-    for factor in term.factors[:-1]:
-        parts += [*code.operator(MULTIPLY), *code.variable(layout.place[factor])]
-    return [*parts, *code.variable(layout.place[term.factors[-1]])]
+    *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
+    for factor in others:
+        parts += [*code.operator(MULTIPLY), *code.variable(factor)]
+    return [*parts, *code.variable(last)]
 
 
 def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
@@ -323,31 +346,32 @@ def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
     yield from _once(code, code.segment(b"r"))
     for family in layout.rows:
         kind = {">=": 2, "<=": 1, "==": 4}[family.family.sense]
-        yield from render(code.bound(kind, family.limit), family.count, padded=code.padded)
+        yield from render(
+            code.bound(kind, scalar_when_constant(family.limit)), family.count, padded=code.padded
+        )
 
 
 def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
-    """Bounds in file order, one stretch of equal kind after the other."""
-    lower, upper = layout.problem.lower[layout.order], layout.problem.upper[layout.order]
-    kind = np.select(
-        [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
-    )
-    cuts = [0, *(np.nonzero(np.diff(kind))[0] + 1).tolist(), len(kind)]
+    """Bounds in file order, one stretch of one block and of equal kind after the other."""
     yield from _once(code, code.segment(b"b"))
-    for first, last in pairwise(cuts):
-        low, high = lower[first:last], upper[first:last]
-        values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[first])]
-        yield from render(code.bound(int(kind[first]), *values), last - first, padded=code.padded)
+    for block, run in layout.stretches:
+        inside = layout.order[run] - block.offset
+        lower, upper = block.lower[inside], block.upper[inside]
+        kind = np.select(
+            [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
+        )
+        for part in _runs(kind):
+            low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
+            values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
+            yield from render(
+                code.bound(int(kind[part.start]), *values), part.stop - part.start, padded=code.padded
+            )
 
 
-def _entries(family: Bound) -> list[tuple[Ints, Floats | float]]:
-    """Columns and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
-    entries = [(term.factors[0], term.coefficient) for term in family.of_degree(1)]
-    for symbol in family.variables:
-        columns = family.columns(symbol)
-        if not any(np.array_equal(columns, other) for other, _ in entries):
-            entries.append((columns, 0.0))
-    return entries
+def _entries(family: Bound) -> list[tuple[sp.Symbol, Floats | float]]:
+    """Symbols and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
+    linear = {term.symbols[0]: term.coefficient for term in family.of_degree(1)}
+    return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 
 
 def _gradient(layout: Layout) -> tuple[Ints, Floats]:
@@ -367,20 +391,23 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
     problem = layout.problem
     rows = [(family, _entries(family)) for family in layout.rows]
     if rows:
-        count = np.zeros(problem.columns, dtype=np.int64)
-        for _, entries in rows:
-            for columns, _ in entries:
-                count += np.bincount(layout.place[columns], minlength=problem.columns)
+        count = np.zeros(problem.columns, dtype=np.int32)
+        for family, entries in rows:
+            for symbol, _ in entries:
+                block, inside = family.block(symbol), family.inside(symbol)
+                count[block.columns] += 1 if inside is None else np.bincount(inside, minlength=block.count)
         yield from _once(code, code.segment(b"k", problem.columns - 1))
         yield from render(
-            code.integer(np.cumsum(count)[:-1].astype(np.int32)), problem.columns - 1, padded=code.padded
+            code.integer(np.cumsum(count[layout.order])[:-1].astype(np.int32)),
+            problem.columns - 1,
+            padded=code.padded,
         )
     first = 0
     for family, entries in rows:
         parts = list(code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries)))
-        for columns, value in entries:
+        for symbol, value in entries:
             check_coefficients(value, f"row family {family.family.tag}")
-            parts += code.entry(layout.place[columns], value)
+            parts += code.entry(layout.places(family, symbol), value)
         yield from render(parts, family.count, padded=code.padded)
         first += family.count
     place, costs = _gradient(layout)

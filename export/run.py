@@ -145,6 +145,7 @@ def run(
     limits: Limits | None = None,
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
+    jobs: int = 1,
     progress: Progress = lambda _: None,
 ) -> Report:
     """The report of a run; the folder then holds instance, solver files, the best field, pictures and report.json.
@@ -168,6 +169,7 @@ def run(
         start=baseline.field,
         options=options,
         dialects=dialects,
+        jobs=jobs,
         progress=lambda name: progress(f"writing {name}"),
     )
     candidates, failures = [baseline], dict[str, str]()

@@ -15,7 +15,13 @@ import pytest
 from cases import make_field, make_instance, make_problem
 from crossfield.export.formats import FORMATS, format_of, write
 from crossfield.export.manifest import read_manifest, write_all, write_problem
-from crossfield.models.errors import FormulationError, InputError, InstanceError, OutputError
+from crossfield.models.errors import (
+    FormulationError,
+    InputError,
+    InstanceError,
+    OutputError,
+    UnsupportedByFormatError,
+)
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance import Instance
 from crossfield.models.instance_file import read_instance, write_instance
@@ -303,6 +309,11 @@ def test_problems_that_no_manifest_records(tmp_path):
             write_problem(other, tmp_path / "set")
     assert list(tmp_path.iterdir()) == []
     write(lifted(problem), tmp_path / "single.lp")
+    fixed = with_integers_fixed(problem, make_field(problem.instance))
+    with pytest.raises(UnsupportedByFormatError, match="write the scalar layout"):
+        write(fixed, tmp_path / "fixed.gms")
+    assert [path.name for path in tmp_path.iterdir()] == ["single.lp"]
+    write(fixed, tmp_path / "fixed.gms", dialect="scalar")
 
 
 def test_unknown_formats_dialects_and_folders(tmp_path):

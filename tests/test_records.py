@@ -12,11 +12,15 @@ from crossfield.export import gams, gams_indexed, lp, mps, nl, records
 from crossfield.export.formats import write
 from crossfield.export.records import (
     Decimals,
+    OnlyWhere,
     Raw,
+    Tagged,
     Words,
+    bounds,
     check_coefficients,
     digits,
     number,
+    numbers,
     render,
     signed,
     table,
@@ -45,7 +49,7 @@ def text(parts, count, **options) -> bytes:
 def test_numbers_survive(value):
     assert float(number(value)) == value
     assert not number(value).startswith("-0") or value != 0
-    sign, rest = signed(value).split(" ")
+    sign, rest = words(value, signed).decode().split(" ")
     assert sign in "+-"
     assert not rest.startswith(("+", "-"))
     assert float(sign + rest) == value
@@ -55,7 +59,7 @@ def test_numbers_survive(value):
 def test_any_number_survives_and_none_is_longer_than_needed(value):
     assert float(number(value)) == value
     assert len(number(value)) <= len(repr(value))
-    assert float(signed(value).replace(" ", "")) == value
+    assert float(words(value, signed).replace(b" ", b"")) == value
 
 
 def test_numbers_look_as_people_write_them():
@@ -70,7 +74,7 @@ def test_numbers_look_as_people_write_them():
         "1e+22",
         "100000000000000",
     ]
-    assert [signed(value) for value in given[:4]] == ["+ 0", "+ 0", "+ 3", "- 2"]
+    assert signed(np.array(given[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
     assert number(np.float64(0.1)) == "0.1"
     assert number(np.int32(7)) == "7"
 
@@ -125,6 +129,58 @@ def test_raw_values_keep_their_zero_bytes():
 def test_no_records_and_no_parts():
     assert text([b"x"], 0) == b""
     assert text([], 3) == b""
+
+
+def test_any_numbers_at_once_are_the_numbers_one_by_one():
+    values = np.array([*NASTY, math.inf])
+    assert [found.decode() for found in numbers(values)] == [number(value) for value in values]
+    assert [found.decode() for found in bounds(np.array([-math.inf, -1.5, math.inf]))] == [
+        "-inf",
+        "-1.5",
+        "+inf",
+    ]
+
+
+@given(
+    st.lists(st.integers(-60, 60), min_size=1, max_size=20), st.sampled_from([0.0, 1e14, 1e16, 2.0**60, 0.25])
+)
+def test_whole_numbers_close_together_are_words_too(steps, first):
+    """They are numbered without sorting, where that is exact."""
+    values = first + np.array(steps, dtype=float)
+    assert text([words(values), b" "], len(values)).decode().split() == [number(value) for value in values]
+
+
+def test_a_tag_stands_before_every_word():
+    key = Words(table([b"_1", b"_2", b"_3"]), None)
+    name = Tagged(b"alpha", key)
+    assert name.width == 7
+    assert (
+        text([name, b"=", Tagged(b"p", key.at(np.array([2, 0, 1]))), b";"], 3)
+        == b"alpha_1=p_3;alpha_2=p_1;alpha_3=p_2;"
+    )
+    assert text([name.at(np.array([2])), b"!"], 1) == b"alpha_3!"
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 7, 100])
+def test_pieces_that_some_records_have(block, monkeypatch):
+    """Also in the block after one that lacked them: what was blanked comes back."""
+    monkeypatch.setattr(records, "BLOCK", block)
+    present = np.array([True, False, False, True, True, False, True])
+    key = Words(table([b"%d" % value for value in range(7)]), None)
+    parts = [b"<", key, OnlyWhere(present, [b" and ", key, b"!"]), b">", OnlyWhere(~present, [b"?"])]
+    expected = [f"<{at} and {at}!>" if there else f"<{at}>?" for at, there in enumerate(present)]
+    assert text(parts, 7).decode() == "".join(expected)
+
+
+@pytest.mark.parametrize("first", [0, 7, 95, 9_990, 99_999_990])
+def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypatch):
+    values = np.arange(first, first + 20, dtype=np.int32)
+    for block in (1, 3, 10, 100):
+        monkeypatch.setattr(records, "BLOCK", block)
+        chunks = list(render([b"v", Decimals(values), b" ", Decimals(values[::-1]), b"\n"], 20))
+        assert b"".join(chunks) == b"".join(
+            b"v%d %d\n" % pair for pair in zip(values, values[::-1], strict=True)
+        )
 
 
 # blocks

@@ -1,0 +1,361 @@
+"""One measurement in its own process: `python work.py JSON` prints seconds, CPU seconds, bytes and peak memory as JSON.
+
+A task is a function that prepares what is not measured and gives the function that is. The same small model goes through it first,
+so that imports and compiled expressions, which a process pays once, count for nobody.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from crossfield.export.formats import FORMATS, carried, write
+from crossfield.models.instance import Instance
+from crossfield.models.problem import Problem, formulate
+
+Measured = Callable[[], object]
+WARM = 6
+"""Pixels a side of the model that goes first."""
+ONCE = 5.0
+"""What takes longer is measured once, the rest three times."""
+
+
+def square(size: int) -> Instance:
+    """A full square of pixels, a fifth of them with a stroke, each in a direction of its own."""
+    row, column = np.mgrid[:size, :size]
+    pixels = np.argwhere((7 * row + 3 * column) % 5 == 0)
+    theta = (2 * np.arctan2(pixels[:, 0] + 0.5, pixels[:, 1] + 0.5) + 1e-3 * pixels[:, 0]) % np.pi
+    w = 0.1 + 0.9 * ((13 * pixels[:, 0] + 7 * pixels[:, 1]) % 101) / 101
+    return Instance("square", np.ones((size, size), dtype=bool), pixels, theta, w)
+
+
+def formulated(name: str, instance: Instance) -> Problem:
+    """The problem; where jumps are data, they are 0."""
+    pairs = len(instance.grid.first)
+    return formulate(instance, name, p=np.zeros(pairs, np.int32) if name == "qp-fixed" else None)
+
+
+def ours(
+    instance: Instance, formulation: str, suffix: str, path: Path, dialect: str | None = None
+) -> Measured:
+    """From the instance to the closed file, with names, hash and, for .nl, the files of names."""
+    return lambda: write(formulated(formulation, instance), path, dialect=dialect)
+
+
+def rendered(instance: Instance, formulation: str, suffix: str, path: Path, dialect: str) -> Measured:
+    """The bytes of the file, neither hashed nor written."""
+
+    def run() -> None:
+        for _ in chunks_of(formulated(formulation, instance), suffix, dialect):
+            pass
+
+    return run
+
+
+def chunks_of(problem: Problem, suffix: str, dialect: str) -> Any:
+    """The chunks of a file."""
+    held = carried(problem, FORMATS[suffix])
+    return FORMATS[suffix].generate(held, [], None, dialect or FORMATS[suffix].dialects[0])
+
+
+def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """Pyomo: building the model, and its own writer with numbered names."""
+    from crossfield.export.pyomo_model import to_pyomo
+
+    def run() -> None:
+        problem = formulated(formulation, instance)
+        held = carried(problem, FORMATS[suffix]) if suffix in {"lp", "mps"} else problem
+        form = {"nl": "nl_v2", "lp": "lp_v2", "mps": "mps", "gms": "gams"}[suffix]
+        to_pyomo(held).write(str(path.with_suffix(f".{form}")), format=form)
+        path.with_suffix(f".{form}").replace(path)
+
+    return run
+
+
+def linopy(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """linopy: building the model from whole arrays, and its LP writer or, for MPS, that of HiGHS behind it."""
+    import linopy as lib
+    import xarray as xr
+
+    def expression(model: Any, dim: str, terms: list[tuple[Any, Any]], count: int) -> Any:
+        columns = np.stack([column for column, _ in terms], axis=1)
+        values = np.stack([np.broadcast_to(value, (count,)) for _, value in terms], axis=1).astype(float)
+        data = {"coeffs": ((dim, "_term"), values), "vars": ((dim, "_term"), columns)}
+        return lib.LinearExpression(xr.Dataset(data, coords={dim: np.arange(count)}), model)
+
+    def run() -> None:
+        problem = formulated(formulation, instance)
+        model = lib.Model()
+        for block in problem.blocks.values():
+            lower, upper = (xr.DataArray(end, dims=block.over) for end in (block.lower, block.upper))
+            model.add_variables(lower, upper, name=block.name, integer=block.integer)
+        for family in problem.rows:
+            terms = [(term.factors[0], term.coefficient) for term in family.of_degree(1)]
+            left = expression(model, family.family.tag, terms, family.count)
+            sense = {"==": "="}.get(family.family.sense, family.family.sense)
+            right = xr.DataArray(family.limit, dims=family.family.tag)
+            model.add_constraints(left, sense, right, name=family.family.tag)
+        index, cost = problem.merged_objective(1)
+        model.add_objective(expression(model, "cost", [(index[:, 0], cost)], len(cost)).sum())
+        model.to_file(path, progress=False)
+
+    return run
+
+
+def highs(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """HiGHS: a model passed as whole arrays, with our names left out, and its writeModel."""
+    import highspy
+    from scipy import sparse
+
+    def run() -> None:
+        problem = formulated(formulation, instance)
+        rows, columns, values, low, high, start = [], [], [], [], [], 0
+        for family in problem.rows:
+            for term in family.of_degree(1):
+                rows.append(np.arange(start, start + family.count, dtype=np.int32))
+                columns.append(term.factors[0])
+                values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=float), (family.count,)))
+            low.append(family.limit if family.family.sense != "<=" else np.full(family.count, -np.inf))
+            high.append(family.limit if family.family.sense != ">=" else np.full(family.count, np.inf))
+            start += family.count
+        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        matrix = sparse.coo_matrix(triplets, shape=(start, problem.columns)).tocsc()
+        lp = highspy.HighsLp()
+        lp.num_col_, lp.num_row_ = problem.columns, start
+        lp.col_cost_ = np.zeros(problem.columns)
+        index, cost = problem.merged_objective(1)
+        costs = np.zeros(problem.columns)
+        costs[index[:, 0]] = cost
+        lp.col_cost_, lp.col_lower_, lp.col_upper_ = costs, problem.lower, problem.upper
+        lp.row_lower_, lp.row_upper_ = np.concatenate(low), np.concatenate(high)
+        lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+        lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = (
+            matrix.indptr,
+            matrix.indices,
+            matrix.data,
+        )
+        kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
+        lp.integrality_ = [kinds[integer] for integer in problem.integer.tolist()]
+        solver = highspy.Highs()
+        solver.setOptionValue("output_flag", False)
+        solver.passModel(lp)
+        solver.writeModel(str(path))
+
+    return run
+
+
+def pyoptinterface(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """PyOptInterface: building the model row by row over HiGHS, and its writer."""
+    import pyoptinterface as poi
+    from pyoptinterface import highs as backend
+
+    def run() -> None:
+        problem = formulated(formulation, instance)
+        model = backend.Model()
+        model.set_model_attribute(poi.ModelAttribute.Silent, True)
+        kinds = (poi.VariableDomain.Continuous, poi.VariableDomain.Integer)
+        given = zip(problem.lower.tolist(), problem.upper.tolist(), problem.integer.tolist(), strict=True)
+        variables = [
+            model.add_variable(lb=low, ub=high, domain=kinds[integer]) for low, high, integer in given
+        ]
+        senses = {
+            ">=": poi.ConstraintSense.GreaterEqual,
+            "<=": poi.ConstraintSense.LessEqual,
+            "==": poi.ConstraintSense.Equal,
+        }
+        for family in problem.rows:
+            terms = family.of_degree(1)
+            columns = np.stack([term.factors[0] for term in terms], axis=1).tolist()
+            values = np.stack([np.broadcast_to(term.coefficient, (family.count,)) for term in terms], axis=1)
+            sense = senses[family.family.sense]
+            for row, coefficients, limit in zip(columns, values.tolist(), family.limit.tolist(), strict=True):
+                left = poi.ScalarAffineFunction(coefficients, row)
+                model.add_linear_constraint(left, sense, limit)
+        index, cost = problem.merged_objective(1)
+        assert len(variables) == problem.columns
+        model.set_objective(poi.ScalarAffineFunction(cost.tolist(), index[:, 0].tolist()))
+        model.write(str(path))
+
+    return run
+
+
+def copied(
+    instance: Instance, formulation: str, suffix: str, path: Path, dialect: str | None = None
+) -> Measured:
+    """The bytes of the finished file with one write: no writer can be faster."""
+    write(formulated(formulation, instance), path, dialect=dialect)
+    data = path.read_bytes()
+    copy = path.with_name("copy")
+
+    def run() -> None:
+        copy.unlink(missing_ok=True)
+        with copy.open("wb") as stream:
+            stream.write(data)
+
+    return run
+
+
+def everything(instance: Instance, formulation: str, suffix: str, path: Path, jobs: int = 1) -> Measured:
+    """Every format of one formulation, or of all, as `crossfield export` writes them."""
+    from crossfield.export.manifest import write_all
+    from crossfield.models.formulations import FORMULATIONS
+
+    names = [formulation] if formulation != "all" else list(FORMULATIONS)
+    dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
+    return lambda: write_all(instance, path.with_name("set"), names, dialects=dialects, jobs=jobs)
+
+
+TITLES = {
+    "lp": (b"Minimize", b"Subject To", b"Bounds", b"Generals", b"Binaries"),
+    "mps": (b"NAME", b"COLUMNS", b"RHS", b"BOUNDS"),
+    "nl": (b"C", b"O", b"r", b"b", b"k", b"J", b"G"),
+}
+
+
+def sections(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """Seconds and bytes of each section, as its chunks come; preparation counts for the section that needs it first."""
+
+    def run() -> dict[str, Any]:
+        found: dict[str, list[float]] = {}
+        title, last = "head", time.perf_counter()
+        for chunk in chunks_of(formulated(formulation, instance), suffix, ""):
+            title = next((name.decode() for name in TITLES[suffix] if chunk.startswith(name)), title)
+            now = time.perf_counter()
+            entry = found.setdefault(title, [0.0, 0])
+            entry[0], entry[1], last = entry[0] + now - last, entry[1] + len(chunk), now
+        return {"sections": found}
+
+    return run
+
+
+def hashed(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """SHA-256 of the finished file's bytes."""
+    import hashlib
+
+    write(formulated(formulation, instance), path)
+    data = path.read_bytes()
+    return lambda: hashlib.sha256(data).digest()
+
+
+def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """A drawing as a bitmap of four times the size to an instance."""
+    from crossfield.models.sketch import read_sketch
+    from PIL import Image, ImageDraw
+
+    size = instance.grid.height
+    side = 4 * size
+    image = Image.new("RGB", (side, side), "white")
+    pen = ImageDraw.Draw(image)
+    pen.rectangle((side // 50, side // 50, side - side // 50, side - side // 50), outline="black", width=3)
+    for place in np.linspace(0.07, 0.93, 15) * side:
+        pen.arc(
+            (place - side / 2, side / 30, place + side / 2, side - side / 30), 300, 60, fill="red", width=3
+        )
+        pen.line((side / 30, place, side - side / 30, place), fill="red", width=3)
+    image.save(path.with_suffix(".png"))
+    return lambda: read_sketch(path.with_suffix(".png"), size=size)
+
+
+def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
+    """A solution file, `highs` or `ampl`, to a field: read, mapped, rounded, cut into angles and jumps."""
+    from crossfield.export.solution import read_solution
+
+    problem = formulated(formulation, instance)
+    point = np.random.default_rng(1).normal(size=problem.columns)
+    point[problem.integer] = np.round(point[problem.integer])
+    (write_highs if suffix == "highs" else write_ampl)(path, problem, point)
+    return lambda: read_solution(path, formulated(formulation, instance)).field
+
+
+def write_highs(path: Path, problem: Problem, point: Any) -> None:
+    """A solution file as HiGHS writes it."""
+    from crossfield.export.names import Names
+    from crossfield.export.records import render, words
+
+    head = (
+        f"Model status\nOptimal\n\n# Primal solution values\nFeasible\nObjective 0\n# Columns {len(point)}\n"
+    )
+    names = Names(problem)
+    with path.open("wb") as stream:
+        stream.write(head.encode())
+        for block in problem.blocks.values():
+            parts = [names.of(block), b" ", words(point[block.columns]), b"\n"]
+            stream.writelines(render(parts, block.count))
+        stream.write(b"# Rows 0\n")
+
+
+def write_ampl(path: Path, problem: Problem, point: Any) -> None:
+    """A solution file as the AMPL Solver Library writes it."""
+    from crossfield.export.nl import Layout
+    from crossfield.export.records import render, words
+
+    counts = (3, 1, 1, 0, problem.row_count, 0, len(point), len(point))
+    with path.open("wb") as stream:
+        stream.write(b"optimal solution found\n\nOptions\n" + b"".join(b"%d\n" % count for count in counts))
+        stream.writelines(render([words(point[Layout(problem).order]), b"\n"], len(point)))
+        stream.write(b"objno 0 0\n")
+
+
+TASKS = {
+    task.__name__: task
+    for task in (
+        ours,
+        rendered,
+        sections,
+        hashed,
+        pyomo,
+        linopy,
+        highs,
+        pyoptinterface,
+        copied,
+        everything,
+        picture,
+        solution,
+    )
+}
+
+
+def peak_memory() -> int:
+    """The largest resident size of this process so far, in bytes."""
+    status = Path("/proc/self/status")
+    if status.exists():  # ru_maxrss counts what the parent had before this program was loaded
+        return 1024 * int(status.read_text().split("VmHWM:")[1].split()[0])
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def measured(task: str, size: int, folder: str, *, once: bool = False, **given: Any) -> dict[str, Any]:
+    """What a task took: after the small model, and after what is not measured. Median of three, or one run when it is long.
+
+    once: one run, and no small model first.
+    """
+    path = Path(folder) / f"model.{given['suffix']}"
+    if not once:
+        TASKS[task](square(WARM), path=path, **given)()
+    run = TASKS[task](square(size), path=path, **given)
+    first = timed(run)
+    memory = peak_memory()
+    runs = [first] if once or first["seconds"] > ONCE else [first, timed(run), timed(run)]
+    middle = sorted(runs, key=lambda found: float(found["seconds"]))[len(runs) // 2]
+    written = path.stat().st_size if path.exists() else 0
+    return middle | {"memory": memory, "bytes": written, "runs": len(runs), "load": os.getloadavg()[0]}
+
+
+def timed(run: Measured) -> dict[str, Any]:
+    """Wall and CPU seconds of one run, and what it found."""
+    gc.collect()
+    cpu, wall = time.process_time(), time.perf_counter()
+    result = run()
+    found = {"seconds": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+    return found | (result if isinstance(result, dict) else {})
+
+
+if __name__ == "__main__":
+    print(json.dumps(measured(**json.loads(sys.argv[1]))))
