@@ -11,7 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
+import numpy as np
+
 from ..models.errors import UnsupportedByFormatError
+from ..models.formulations import Formulation
+from ..models.instance import Instance
 from ..models.problem import Problem
 from .formats import FORMATS, carried
 
@@ -122,3 +126,10 @@ def _takes(problem: Problem, solver: External, name: str) -> Taking:
 def takers(problem: Problem) -> dict[str, Taking]:
     """What each solver says to a problem."""
     return {name: takes(problem, name) for name in EXTERNALS}
+
+
+def smallest(formulation: Formulation) -> Problem:
+    """The formulation on an instance of two pixels: enough to ask what a format carries and a solver takes."""
+    pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
+    instance = Instance("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)
+    return Problem(instance, formulation, np.zeros(1, dtype=np.int32) if formulation.fixed else None)

@@ -33,6 +33,7 @@ from ..models.instance import Instance
 from ..models.instance_file import check_schema, check_version, parse_json, read_instance, write_instance
 from ..models.problem import Problem, formulate
 from ..models.storage import make_folder, read_bytes, write_bytes
+from .capabilities import smallest, takers
 from .formats import FORMATS, Written, generator, write
 
 FORMAT: Final = "crossfield-manifest"
@@ -303,6 +304,7 @@ def _document(
         "sha256": problem.sha256,
         "files": files,
         "refused": refused,
+        "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
     }
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..models.errors import UnsupportedByFormatError
-from ..models.formulations import FORMULATIONS
-from ..models.instance import Instance
-from ..models.problem import Problem, formulate
+from ..models.formulations import FORMULATIONS, declare
+from ..models.problem import Problem
 from ..models.samples import sample, samples
-from .capabilities import EXTERNALS, takers
+from .capabilities import EXTERNALS, smallest, takers
 from .formats import FORMATS, carried
 from .readers import READERS
 from .solvers import SOLVERS, refusal
@@ -62,24 +59,16 @@ def sample_rows(size: int) -> list[Row]:
 
 
 def smallest_problems() -> list[Problem]:
-    """Every formulation on the instance of two pixels: enough to ask what a format carries and a solver takes."""
-    return [_smallest(name) for name in FORMULATIONS]
-
-
-def _smallest(name: str, *, relax: bool | None = None) -> Problem:
-    instance = Instance(
-        "smallest", np.ones((1, 2), dtype=bool), np.array([[0, 0]]), np.array([1.0]), np.array([1.0])
-    )
-    jumps = np.zeros(1, dtype=np.int32) if FORMULATIONS[name].fixed else None
-    return formulate(instance, name, p=jumps, relax=relax)
+    """Every formulation on the instance of two pixels."""
+    return [smallest(declare(name)) for name in FORMULATIONS]
 
 
 def _with_relaxations() -> list[tuple[Problem, bool]]:
     rows: list[tuple[Problem, bool]] = []
     for name, recipe in FORMULATIONS.items():
-        rows.append((_smallest(name), False))
+        rows.append((smallest(declare(name)), False))
         if "relax" in recipe.settable:
-            rows.append((_smallest(name, relax=True), True))
+            rows.append((smallest(declare(name, relax=True)), True))
     return rows
 
 

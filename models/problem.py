@@ -91,10 +91,8 @@ class Bound:
     def columns(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
         block, inside = self.block(symbol), self.inside(symbol)
-        offset = np.int32(block.offset)
-        if inside is None:
-            return np.arange(offset, offset + block.count, dtype=np.int32)
-        return offset + inside
+        own = np.arange(block.count, dtype=np.int32) if inside is None else inside
+        return own + np.int32(block.offset)
 
     def block(self, symbol: sp.Symbol) -> Block:
         """The block of columns that a symbol means."""
@@ -443,9 +441,9 @@ _NOISE: Final = 1e-12
 
 def _ordered(factors: tuple[Ints, ...]) -> Ints:
     """Columns of each monomial in ascending order, shape (count, degree)."""
-    pair = len(factors) == 2  # nearly all, and faster than sorting rows
-    ordered = [np.minimum(*factors), np.maximum(*factors)] if pair else factors
-    return np.stack(ordered, axis=1) if pair else np.sort(np.stack(ordered, axis=1), axis=1)
+    if len(factors) == 2:  # nearly all, and faster than sorting rows
+        return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
+    return np.sort(np.stack(factors, axis=1), axis=1)
 
 
 def _merge(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:

@@ -32,7 +32,9 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        raise OutputError(f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path) from error
+        raise OutputError(
+            f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
+        ) from error
     finally:
         temporary.unlink(missing_ok=True)
 

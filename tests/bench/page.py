@@ -128,7 +128,7 @@ def reasons(at: Page, half: int, big: int) -> list[str]:
         f"  Of our CPU seconds, making the text takes {shares[0]} % and SHA-256 for the manifest {shares[1]} %; the rest is the system's work for writing and for threads.",
         "- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files (the algebra), and equal products are found by sorting.",
         "- One write: nothing is computed for it. Hashing alone takes as long as several of them, and so does making the text.",
-        f"- Growth: making the text grows {grown} times in CPU seconds. One write of the GAMS file alone grew {times(written)} times, which is the system's cache for the disk.",
+        f"- Growth: making the text grows {grown} times in CPU seconds. One write of the GAMS file alone grew {times(written)} times: that part is the system's.",
         "",
     ]
 
@@ -268,8 +268,8 @@ def peers(at: Page, sizes: Sequence[int], suffix: str) -> list[str]:
                     f"{written / 1e6 / found['seconds']:.0f}",
                     f"{found['memory'] / 1e6:.0f}",
                 ]
-                times = [times(at.ratio(found, mine, what)) for what in ("seconds", "cpu")]
-                rows.append([str(size), NAMES.get(task, task), *cells, *times])
+                ratios = [times(at.ratio(found, mine, what)) for what in ("seconds", "cpu")]
+                rows.append([str(size), NAMES.get(task, task), *cells, *ratios])
     return table(
         ["size", "writer", "MB", "seconds", "CPU s", "MB/s", "peak MB", "seconds / ours", "CPU / ours"], rows
     )
