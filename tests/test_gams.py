@@ -49,13 +49,14 @@ CHILD = """
 import json, sys
 import casadi
 answers = []
-for path, point in json.load(sys.stdin):
+for path, points in json.load(sys.stdin):
     read = casadi.NlpBuilder()
     read.import_nl(path)
     x = casadi.vertcat(*read.x)
-    f, g = casadi.Function("fg", [x], [read.f, casadi.vertcat(*read.g)])(point)
+    evaluate = casadi.Function("fg", [x], [read.f, casadi.vertcat(*read.g)])
+    found = [evaluate(point) for point in points]
     row = lambda values: casadi.DM(values).full().ravel().tolist()
-    answers.append({"f": float(f), "g": row(g), "x_lb": row(read.x_lb), "x_ub": row(read.x_ub), "g_lb": row(read.g_lb),
+    answers.append({"f": [float(f) for f, _ in found], "g": [row(g) for _, g in found], "x_lb": row(read.x_lb), "x_ub": row(read.x_ub), "g_lb": row(read.g_lb),
                     "g_ub": row(read.g_ub), "discrete": list(read.discrete)})
 json.dump(answers, open(sys.argv[1], "w"))
 """
@@ -125,10 +126,10 @@ def run_gams(executable: str, folder: Path, text: bytes, *options: str) -> dict[
 
 @dataclass(frozen=True)
 class Reading:
-    """What CONVERT made of a file: names, and CasADi's values of it at a random point."""
+    """What CONVERT made of a file: names, and CasADi's values of it at 20 random points (20, columns)."""
 
     problem: Problem
-    point: np.ndarray
+    points: np.ndarray
     results: dict[str, float]
     columns: list[str]
     rows: list[str]
@@ -152,7 +153,7 @@ def readings(
     for case in CASES:
         problem = problem_of(case)
         start = problem.point(make_field(problem.instance))
-        point = rng.normal(size=problem.columns)
+        points = rng.normal(size=(20, problem.columns))
         number = {name: index for index, name in enumerate(names_of(column_names(problem)))}
         for layout in LAYOUTS:
             folder = tmp_path_factory.mktemp("convert")
@@ -166,12 +167,12 @@ def readings(
             )
             gathered[case, layout] = {
                 "problem": problem,
-                "point": point,
+                "points": points,
                 "results": results,
                 "columns": columns,
                 "rows": rows,
             }
-            requests.append((str(folder / "out.nl"), [point[number[name]] for name in columns]))
+            requests.append((str(folder / "out.nl"), points[:, [number[name] for name in columns]].tolist()))
     answers = tmp_path_factory.mktemp("answers") / "values.json"
     subprocess.run(
         [sys.executable, "-c", CHILD, str(answers)], input=json.dumps(requests).encode(), check=True
@@ -188,7 +189,8 @@ def readings(
 class TestReading:
     def test_energy(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
         read = readings[case, layout]
-        assert read.values["f"] == pytest.approx(read.problem.objective_value(read.point), rel=1e-9)
+        expected = [read.problem.objective_value(point) for point in read.points]
+        assert read.values["f"] == pytest.approx(expected, rel=1e-9)
 
     def test_rows(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
         read = readings[case, layout]
@@ -197,18 +199,18 @@ class TestReading:
         row = dict(
             zip(
                 names,
-                zip(read.values["g"], read.values["g_lb"], read.values["g_ub"], strict=True),
+                zip(np.transpose(read.values["g"]), read.values["g_lb"], read.values["g_ub"], strict=True),
                 strict=True,
             )
         )
         expected = iter(names_of(row_names(read.problem)))
         for family in read.problem.rows:
-            for value in family.values(read.point):
-                level, low, high = row[next(expected)]
+            for values in np.transpose([family.values(point) for point in read.points]):
+                levels, low, high = row[next(expected)]
                 sense = "==" if low == high else ">=" if np.isfinite(low) else "<="
                 assert sense == family.family.sense
                 limit = low if np.isfinite(low) else high
-                assert level - limit == pytest.approx(value, rel=1e-9, abs=1e-12)
+                assert levels - limit == pytest.approx(values, rel=1e-9, abs=1e-12)
 
     def test_columns(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
         read = readings[case, layout]
