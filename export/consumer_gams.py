@@ -40,11 +40,6 @@ def _package(name: str) -> Path | None:
     return None if found is None or found.origin is None else Path(found.origin).parent
 
 
-def has_baron() -> bool:
-    """Whether BARON for GAMS is installed."""
-    return _package("gamspy_baron") is not None
-
-
 def version() -> str:
     """Its version, and that of CasADi, which evaluates what CONVERT writes."""
     from importlib.metadata import version as installed

@@ -83,6 +83,16 @@ CONSUMERS: Final = {
 """The table of consumers; the verification, its tests and its documentation are generated from it."""
 
 
+ADDED: Final = {"baron": "gamspy_baron"}
+"""Solvers that their consumer has only with another Python package."""
+
+
+def lacking(solver: str) -> str:
+    """How to install a solver that its consumer lacks; empty when it is there."""
+    package = ADDED.get(solver)
+    return f"pip install {package}" if package is not None and find_spec(package) is None else ""
+
+
 def absent() -> dict[str, str]:
     """The consumers that are not here, and how to install them."""
     return {entry.name: entry.install for entry in CONSUMERS.values() if not entry.present}

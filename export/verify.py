@@ -30,7 +30,7 @@ from ..models.storage import read_bytes, sha256_of, write_bytes
 from .capabilities import EXTERNALS
 from .comparison import difference, evaluation_difference, names_of
 from .consumer_worker import Worker
-from .consumers import CONSUMERS, Consumer, absent
+from .consumers import CONSUMERS, Consumer, absent, lacking
 from .formats import FORMATS, carried, generator
 from .manifest import Manifest, read_manifest
 from .meaning import Evaluation, Meaning, Outcome, Points, load, save
@@ -319,6 +319,9 @@ class _Bench:
         local = _refusal(solver, subject, "local")
         if local:
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, local)
+        if remedy := lacking(solver):
+            reason = f"{EXTERNALS[solver].title} is not installed: {remedy}"
+            return subject.finding(solver, "solve", Verdict.NOT_TRIED, reason)
         assert self.seconds is not None
         begin = time.perf_counter()
         answer = self._ask(subject, "solve", self.seconds, solver=solver)

@@ -16,7 +16,7 @@ from crossfield.export import consumer_worker
 from crossfield.export.capabilities import EXTERNALS, takes
 from crossfield.export.cli import invoke
 from crossfield.export.consumer_worker import Worker
-from crossfield.export.consumers import CONSUMERS
+from crossfield.export.consumers import CONSUMERS, lacking
 from crossfield.export.formats import FORMATS, carried
 from crossfield.export.manifest import read_manifest, write_all
 from crossfield.export.meaning import Outcome, load
@@ -40,6 +40,12 @@ def needs(consumer: str) -> None:
     entry = CONSUMERS[consumer]
     if not entry.present:
         pytest.skip(f"{entry.title} is not installed: {entry.install}")
+
+
+def needs_solver(solver: str) -> None:
+    needs(SOLVERS[solver])
+    if remedy := lacking(solver):
+        pytest.skip(f"{EXTERNALS[solver].title} is not installed: {remedy}")
 
 
 def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Instance:
@@ -99,7 +105,7 @@ def refuses(path: Path, solver: str) -> bool:
 @pytest.mark.parametrize("instance", INSTANCES)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):
-    needs(SOLVERS[solver])
+    needs_solver(solver)
     found = [f for f in verified(instance).findings if f.consumer == solver and f.step == "solve"]
     assert found
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.LIMIT, Verdict.REFUSED, Verdict.NOT_TRIED}
@@ -343,7 +349,7 @@ def test_claims_are_true(
     name: str,
 ):
     """Who takes a problem is not contradicted; who does not, refuses the file or gives no proven optimum of it."""
-    needs(SOLVERS[solver])
+    needs_solver(solver)
     verification = verified("2 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
     taking = takes(problem, solver)
