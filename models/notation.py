@@ -49,7 +49,7 @@ class Variable:
     """A block of columns: one variable per element of an index set.
 
     lower, upper: bounds as arrays or numbers of an instance; value: the variable at a given field, as an expression
-    over its index set; latex: how mathematics writes it; meaning: one line for the docs.
+    over its index set; meaning: one line for the docs.
     """
 
     name: str
@@ -57,7 +57,6 @@ class Variable:
     lower: Callable[[Instance], Floats | Ints | float]
     upper: Callable[[Instance], Floats | Ints | float]
     value: sp.Expr
-    latex: str
     meaning: str
     integer: bool = field(default=False, kw_only=True)
 
@@ -67,18 +66,18 @@ _FREE: Final = float("inf")
 VARIABLES: Final = {
     variable.name: variable
     for variable in (
-        Variable("alpha", "pixels", lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, r"\alpha", "direction of the cross"),
-        Variable("beta", "pixels", lambda _: -QUARTER, lambda _: QUARTER, beta, r"\beta", "skew of the cross"),
-        Variable("p", "pairs", lambda i: i.p_min, lambda i: i.p_max, p, "p", "jump between the labels of two neighbours", integer=True),
-        Variable("p1", "pairs", lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "p^{1}", "1 when the jump is odd", integer=True),
-        Variable("p2", "pairs", lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "p^{2}", "half of the even part of the jump", integer=True),
-        Variable("s", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "s", "absolute change of direction"),
-        Variable("t", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "t", "absolute change of skew"),
-        Variable("z", "pairs", lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "z", "the product of p1 and beta of the first pixel"),
-        Variable("d", "pairs", lambda _: -_FREE, lambda _: _FREE, A, "d", "change of direction"),
-        Variable("u", "pairs", lambda _: -_FREE, lambda _: _FREE, B, "u", "change of skew"),
-        Variable("gamma", "strokes", lambda _: 0.0, lambda _: _FREE, sp.Abs(R), r"\gamma", "absolute deviation from a stroke"),
-        Variable("psi", "pixels", lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), r"\psi", "absolute skew"),
+        Variable("alpha", "pixels", lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, "direction of the cross"),
+        Variable("beta", "pixels", lambda _: -QUARTER, lambda _: QUARTER, beta, "skew of the cross"),
+        Variable("p", "pairs", lambda i: i.p_min, lambda i: i.p_max, p, "jump between the labels of two neighbours", integer=True),
+        Variable("p1", "pairs", lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "1 when the jump is odd", integer=True),
+        Variable("p2", "pairs", lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "half of the even part of the jump", integer=True),
+        Variable("s", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "absolute change of direction"),
+        Variable("t", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "absolute change of skew"),
+        Variable("z", "pairs", lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "the product of p1 and beta of the first pixel"),
+        Variable("d", "pairs", lambda _: -_FREE, lambda _: _FREE, A, "change of direction"),
+        Variable("u", "pairs", lambda _: -_FREE, lambda _: _FREE, B, "change of skew"),
+        Variable("gamma", "strokes", lambda _: 0.0, lambda _: _FREE, sp.Abs(R), "absolute deviation from a stroke"),
+        Variable("psi", "pixels", lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), "absolute skew"),
     )
 }  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
@@ -106,8 +105,7 @@ SCALARS: Final = {w_strokes: "w_strokes", w_beta: "w_beta"}
 """Symbols that are one number for the whole instance."""
 
 LATEX: Final = {
-    **{symbol: VARIABLES[symbol.name].latex for symbol in (alpha, beta, gamma, psi)},
-    **{symbol: VARIABLES[symbol.name].latex + "_{ij}" for symbol in (p, p1, p2, s, t, z, d, u)},
+    **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},
     alpha: r"\alpha_i",
     beta: r"\beta_i",
     gamma: r"\gamma_i",

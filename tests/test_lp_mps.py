@@ -25,9 +25,12 @@ GOLDEN = Path(__file__).parent / "golden"
 READERS = {"highs": by_highs, "scip": by_scip, "gurobi": by_gurobi}
 GENERATE = {"lp": lp.generate, "mps": mps.generate}
 READINGS = [
-    (label, reader) for label in LOW_DEGREE for reader in READERS if (reader, label[:5]) != ("highs", "miqcp")
+    pytest.param(label, reader, marks=[pytest.mark.oracles] if reader == "gurobi" else [])
+    for label in LOW_DEGREE
+    for reader in READERS
+    if (reader, label[:5]) != ("highs", "miqcp")
 ]
-"""Cases and their readers; HiGHS reads no quadratic rows."""
+"""Cases and their readers; HiGHS reads no quadratic rows, and Gurobi is of the extra `oracles`."""
 both = pytest.mark.parametrize("suffix", GENERATE)
 
 
