@@ -28,15 +28,18 @@ if TYPE_CHECKING:
     from .models.field_file import read_field as read_field
     from .models.field_file import write_field as write_field
     from .models.greedy import greedy as greedy
-    from .models.greedy import power_field as power_field
+    from .models.improvement import improved as improved
     from .models.instance import Instance as Instance
     from .models.instance_file import read_instance as read_instance
     from .models.instance_file import write_instance as write_instance
+    from .models.power_field import power_field as power_field
     from .models.problem import Problem as Problem
     from .models.problem import formulate as formulate
     from .models.problem import with_integers_fixed as with_integers_fixed
     from .models.samples import sample as sample
     from .models.samples import samples as samples
+    from .models.search import Search as Search
+    from .models.search import search as search
     from .models.sketch import read_sketch as read_sketch
 
 _HOME: Final = {
@@ -45,13 +48,15 @@ _HOME: Final = {
     "Instance": ".models.instance",
     "Limits": ".export.solvers",
     "Problem": ".models.problem",
+    "Search": ".models.search",
     "Solution": ".export.solution",
     "analytic": ".models.analytic",
     "draw": ".export.draw",
     "fit_angles": ".export.stages",
     "formulate": ".models.problem",
     "greedy": ".models.greedy",
-    "power_field": ".models.greedy",
+    "improved": ".models.improvement",
+    "power_field": ".models.power_field",
     "read_field": ".models.field_file",
     "read_instance": ".models.instance_file",
     "read_manifest": ".export.manifest",
@@ -60,6 +65,7 @@ _HOME: Final = {
     "run": ".export.run",
     "sample": ".models.samples",
     "samples": ".models.samples",
+    "search": ".models.search",
     "solve": ".export.solvers",
     "to_pyomo": ".export.pyomo_model",
     "two_stage": ".export.stages",

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..models.field import CrossField
 from ..models.formulations import FORMULATIONS
-from ..models.greedy import greedy
+from ..models.improvement import first_field
 from ..models.instance import Instance
 from ..models.problem import formulate
 from .solution import Solution
@@ -47,12 +47,12 @@ def find_jumps(
 ) -> Solution:
     """The solution of `milp-mccormick` by HiGHS: the first stage.
 
-    start: the incumbent handed to HiGHS, the greedy baseline when None: cold, HiGHS is lost beyond 10 x 10 pixels.
+    start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x 10 pixels.
     options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
     """
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
-    return solve(problem, None, folder, limits=limits, start=start or greedy(instance))
+    return solve(problem, None, folder, limits=limits, start=start or first_field(instance))
 
 
 def two_stage(

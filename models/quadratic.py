@@ -19,7 +19,11 @@ from .instance import Instance
 
 Solve = Callable[[Floats], Floats]
 
-_PULL: Final = 1e-9  # towards the present angles: parts without strokes, or w_beta = 0, leave H singular
+PULL: Final = 1e-9
+"""Pull towards the present angles: parts without strokes, or w_beta = 0, leave H singular."""
+CLOSE: Final = 1e-2
+"""Relative residual of a step that ranks jumps like the exact one."""
+
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 40 are usual
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 
@@ -34,7 +38,7 @@ class Quadratic:
     @property
     def stiffness(self) -> Floats:
         """The diagonal of H, shape (2n,), above zero everywhere."""
-        stiffness: Floats = self.matrix.diagonal() + _PULL
+        stiffness: Floats = self.matrix.diagonal() + PULL
         return stiffness
 
     def slope(self, x: Floats) -> Floats:
@@ -81,7 +85,7 @@ def stroke_weight(instance: Instance) -> Floats:
 
 def factored(matrix: Any) -> Solve:
     """The solver of a system that is positive semidefinite: of H + 1e-9, so that it is definite."""
-    pulled = (matrix + _PULL * sparse.eye_array(matrix.shape[0])).tocsc()
+    pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
     # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
     solve: Solve = splu(
         pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -120,6 +124,6 @@ class Solver:
     def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:
         """The step by few conjugate gradients with the present factorisation, and whether they were enough."""
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
-        pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + _PULL * v, dtype=np.float64)
+        pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
         step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
         return step, not failed

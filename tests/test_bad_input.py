@@ -483,8 +483,8 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
     assert done.returncode == 0
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out" / "report.json").read_text())
-    assert {row["method"] for row in report["methods"]} == {"greedy", "power field"}
-    assert set(report["failures"]) == {"greedy + QP", "power field + QP", "MILP + QP"}
+    assert {row["method"] for row in report["methods"]} == {"greedy", "power", "power + QP", "search"}
+    assert set(report["failures"]) == {"two-stage"}
     assert all("is not installed" in reason for reason in report["failures"].values())
     assert cf.read_field(tmp_path / "out" / "field.npz").instance.sha256 == instance.sha256
 

@@ -7,8 +7,8 @@ import pytest
 from crossfield.export.stages import fit_angles
 from crossfield.models.box_qp import fitted
 from crossfield.models.field import CrossField
-from crossfield.models.greedy import power_field
 from crossfield.models.instance import HALF, QUARTER, Instance
+from crossfield.models.power_field import power_field
 from crossfield.models.samples import sample, samples
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -5,33 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.box_qp import fitted
+from crossfield.models.cells import stroke_cells
 from crossfield.models.field import CrossField
-from crossfield.models.greedy import greedy, power_field, stroke_cells
+from crossfield.models.greedy import greedy
+from crossfield.models.improvement import first_field
 from crossfield.models.instance import HALF, QUARTER, Instance
+from crossfield.models.power_field import power_field
+from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 SEEDS = st.integers(0, 2**32 - 1)
-SOLVERS = pytest.mark.parametrize("solve", [greedy, power_field])
-
-
-def sketch(mask, theta, w_beta=1e-6, gauge="strokes", w=None):
-    """An instance with strokes where the picture theta (radians) is a number."""
-    theta = np.where(mask, theta, np.nan)
-    at = np.argwhere(np.isfinite(theta))
-    weight = np.ones(len(at)) if w is None else w
-    return Instance("sketch", mask, at, theta[tuple(at.T)], weight, w_beta=w_beta, gauge=gauge)
-
-
-def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
-    rng = np.random.default_rng(seed)
-    mask = rng.random(rng.integers(1, 7, 2)) < 0.7 if shape is None else np.ones(shape, bool)
-    mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
-    at = np.argwhere(mask)
-    at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(strokes)])]
-    return Instance(
-        "random", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)), w_beta=1e-3, gauge=gauge
-    )
+SOLVERS = pytest.mark.parametrize("solve", [greedy, first_field, power_field])
 
 
 def assert_feasible(field):
@@ -75,7 +60,7 @@ def test_two_families_give_a_constant_skewed_field(first, between, w_beta):
     theta = np.full((7, 7), np.nan)
     theta[2, :] = np.radians(first)
     theta[3:, 4] = np.radians(first + between)
-    field = greedy(sketch(np.ones((7, 7), bool), theta, w_beta))
+    field = first_field(sketch(np.ones((7, 7), bool), theta, w_beta))
     # Both norms vanish with w_beta; the constant field of these lines is the bound for the 2-norm.
     assert field.energy(2).total < 1e-12 + 49 * w_beta * QUARTER**2
     assert field.energy(1).total < 1e-6 + 200 * w_beta
@@ -291,39 +276,6 @@ def test_cells_do_not_leap_over_a_corner():
     mask = np.eye(2, dtype=bool)
     instance = sketch(mask, np.array([[0.3, np.nan], [np.nan, np.nan]]))
     assert stroke_cells(instance).tolist() == [0, -1]
-
-
-def exact(instance):
-    """The least energy over all jumps in the bounds, with the windows of alpha and beta left out: a lower bound."""
-    ranges = [np.arange(low, high + 1) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
-    jumps = (
-        np.stack([axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij")], axis=1)
-        if ranges
-        else np.zeros((1, 0), int)
-    )
-    group = (jumps & 1) @ (1 << np.arange(len(ranges)))
-    order = np.argsort(group, kind="stable")
-    parts = np.split(jumps[order], np.nonzero(np.diff(group[order]))[0] + 1)
-    return min(least_energy(instance, part).min() for part in parts)
-
-
-def least_energy(instance, jumps):
-    """The least energy for each row of jumps, all of one parity, by dense least squares on the residuals; no windows."""
-    grid, size = instance.grid, instance.grid.size
-    pairs, strokes = np.arange(len(grid.first)), np.arange(len(instance.theta))
-    a, b = np.zeros((2, len(pairs), 2 * size))
-    a[pairs, grid.first], a[pairs, grid.second] = 1, -1
-    b[pairs, size + grid.first], b[pairs, size + grid.second] = 1 - 2 * (jumps[0] & 1), -1
-    r = np.zeros((len(strokes), 2 * size))
-    r[strokes, instance.stroke_index] = r[strokes, size + instance.stroke_index] = 1
-    root = np.sqrt(instance.w_strokes * instance.w)
-    skew = np.sqrt(instance.w_beta) * np.eye(2 * size)[size:]
-    rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])
-    right = np.zeros((len(jumps), len(rows)))
-    right[:, : len(pairs)] = -np.sqrt(2) * HALF * jumps
-    right[:, 2 * len(pairs) : 2 * len(pairs) + len(strokes)] = root * instance.target
-    basis = np.linalg.qr(rows)[0]
-    return np.sum((right - (right @ basis) @ basis.T) ** 2, axis=1)
 
 
 def test_dense_least_squares_agree_with_the_energy_of_a_field():

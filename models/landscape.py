@@ -1,0 +1,215 @@
+"""The least energy as a function of the jumps: what every single jump would change, at once, and any change of jumps in no time.
+
+For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H (models/quadratic.py). On a window of some hundred
+pixels G is a small dense matrix. A jump p_e of the pair (i, j) that changes by d
+
+- moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 q r;
+- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p, which by the formula of
+  Woodbury changes G by a matrix of rank 2.
+
+So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change that is made costs one update of G.
+Angles outside the window stay as they are; the energy is that of the whole field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.linalg.blas import dgemm
+
+from .field import CrossField
+from .free_field import free_bounds, parity_sign
+from .grid import Bools, Floats, Ints
+from .instance import HALF, Instance
+from .quadratic import PULL, energy_at
+
+STEPS: Final = np.array([1, -1], dtype=np.int32)
+"""Changes of one jump that `gains` tells of."""
+
+_HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
+_OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
+_MOST_HOLDS: Final = 60
+
+
+class _State(NamedTuple):
+    inverse: Floats
+    x: Floats
+    p: Ints
+    energy: float
+    held: dict[int, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Pixels whose angles are free and the pairs inside, by local numbers.
+
+    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second: (e,) local numbers of these ends.
+    """
+
+    instance: Instance
+    pixels: Ints
+    pairs: Ints
+    first: Ints
+    second: Ints
+
+    @classmethod
+    def of(cls, instance: Instance, free: Bools) -> Window:
+        """The window of the pixels that are free; free has shape (n,)."""
+        grid = instance.grid
+        pixels = np.nonzero(free)[0]
+        number = np.full(grid.size, -1)
+        number[pixels] = np.arange(len(pixels))
+        pairs = np.nonzero(free[grid.first] & free[grid.second])[0]
+        return cls(instance, pixels, pairs, number[grid.first[pairs]], number[grid.second[pairs]])
+
+    @property
+    def unknowns(self) -> Ints:
+        """Places of the window's angles in (alpha, beta), shape (2k,)."""
+        return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
+
+
+class Landscape:
+    """The least energy over a window's angles at jumps that change step by step; angles outside stay.
+
+    Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact to about 1e-4
+    where bounds matter. Without them (`gains` does not look ahead to bounds that a change would meet) walks lead
+    to points that look low and are not, so they are kept at every step.
+    """
+
+    def __init__(self, window: Window, x: Floats, p: Ints) -> None:
+        """Start at the angles x (2n,), of which those in the window are solved for, and jumps p (m,)."""
+        instance, places = window.instance, window.unknowns
+        self.window = window
+        self.p = p.copy()
+        self._around = x
+        energy = energy_at(instance, p)
+        rows = energy.matrix[places]
+        outside = x.copy()
+        outside[places] = 0.0
+        right = energy.vector[places] - rows @ outside
+        system = rows[:, places].toarray()
+        system[np.diag_indices(len(places))] += PULL
+        inverse = np.linalg.inv(system)
+        self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
+        self._x = self._inverse @ right
+        self.energy = CrossField(instance, *np.split(self.angles, 2), p).energy().total
+        self._lower, self._upper = _bounds(window)
+        self._held: dict[int, float] = {}
+        self._keep_bounds()
+
+    @property
+    def angles(self) -> Floats:
+        """The angles (alpha, beta) of the whole field, shape (2n,)."""
+        x = self._around.copy()
+        x[self.window.unknowns] = self._x
+        return x
+
+    def saved(self) -> _State:
+        """What `restore` takes back later."""
+        return _State(
+            self._inverse.copy(order="F"), self._x.copy(), self.p.copy(), self.energy, dict(self._held)
+        )
+
+    def restore(self, state: _State) -> None:
+        """Go back to a state that was saved."""
+        self._inverse, self._x, self.p = state.inverse.copy(order="F"), state.x.copy(), state.p.copy()
+        self.energy, self._held = state.energy, dict(state.held)
+
+    def gains(self) -> Floats:
+        """By how much each jump's change by +1 and by -1 alters the energy; shape (2, e), rows as in STEPS."""
+        g, x, i, j = self._inverse, self._x, self.window.first, self.window.second
+        k = len(self.window.pixels)
+        p = self.p[self.window.pairs]
+        a = x[i] - x[j] + HALF * p
+        give = g[i, i] + g[j, j] - 2 * g[i, j]
+        at_i, at_j = i + k, j + k
+        to_i, to_j = g[at_i, i] - g[at_i, j], g[at_j, i] - g[at_j, j]
+        ii, jj, ij = g[at_i, at_i], g[at_j, at_j], g[at_i, at_j] + parity_sign(p) / 4
+        q = HALF * STEPS[:, None]
+        y_i, y_j = x[at_i] - 2 * q * to_i, x[at_j] - 2 * q * to_j
+        turned = (jj * y_i**2 - 2 * ij * y_i * y_j + ii * y_j**2) / (ii * jj - ij**2)
+        gains: Floats = 2 * q * q * (1 - 2 * give) + 4 * q * a + turned
+        return gains
+
+    def change(self, pairs: Ints, steps: Ints) -> None:
+        """Add steps, shape (c,), to the jumps of the window's pairs with those local numbers, each at most once."""
+        push, gain = self._pushed(pairs, steps)
+        touched = np.nonzero(push)[0]
+        moved = self._inverse[:, touched] @ push[touched]
+        self.energy += gain - float(push[touched] @ moved[touched])
+        self._x += moved
+        places, added = self._couplings(pairs, steps)
+        if len(places):
+            small = self._small(places, added)
+            columns = self._inverse[:, places]
+            here = self._x[places]
+            self.energy += float(here @ small @ here)
+            self._x -= columns @ (small @ here)
+            self._update(-1.0, columns @ small, columns)
+        self.p[self.window.pairs[pairs]] += steps
+        self._keep_bounds()
+
+    def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
+        """The change of b, shape (2k,), and what c - 2 x'b gains."""
+        i, j = self.window.first[pairs], self.window.second[pairs]
+        q = HALF * steps
+        a = self._x[i] - self._x[j] + HALF * self.p[self.window.pairs[pairs]]
+        push = np.bincount(j, 2 * q, len(self._x)) - np.bincount(i, 2 * q, len(self._x))
+        # c changes by the sum of 2 q^2 + 4 q (pi/2 p).
+        return push, float(np.sum(2 * q * q + 4 * q * a))
+
+    def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
+        """The unknowns beta whose couplings turn, shape (c,), and what is added to H there, shape (c, c)."""
+        odd = pairs[(steps & 1) == 1]
+        ends = np.concatenate([self.window.first[odd], self.window.second[odd]])
+        places, where = np.unique(ends, return_inverse=True)
+        first, second = where[: len(odd)], where[len(odd) :]
+        added = np.zeros((len(places), len(places)))
+        added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.window.pairs[odd]])
+        return places + len(self.window.pixels), added
+
+    def _small(self, places: Ints, added: Floats) -> Floats:
+        """C (1 + G C)^-1 for couplings C that are added at these places: H + C has the inverse G - G (...) G."""
+        inside = self._inverse[np.ix_(places, places)]
+        small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
+        return small
+
+    def _update(self, factor: float, left: Floats, right: Floats) -> None:
+        self._inverse = dgemm(factor, left, right, beta=1.0, c=self._inverse, trans_b=1, overwrite_c=1)
+
+    def _keep_bounds(self) -> None:
+        """Hold angles that pass their bounds, the worst first, and let go of those that lean inwards."""
+        for _ in range(_MOST_HOLDS):
+            past = np.maximum(self._x - self._upper, self._lower - self._x)
+            past[list(self._held)] = 0.0
+            worst = int(np.argmax(past))
+            if past[worst] > _OUTSIDE:
+                upper = self._x[worst] > self._upper[worst]
+                self._held[worst] = float((self._upper if upper else self._lower)[worst])
+                self._pull(worst, self._held[worst], _HOLD)
+                continue
+            leaving = next((k for k, bound in self._held.items() if self._leans_in(k, bound)), None)
+            if leaving is None:
+                return
+            self._pull(leaving, self._held.pop(leaving), -_HOLD)
+
+    def _leans_in(self, place: int, bound: float) -> bool:
+        inwards = -1.0 if bound == self._upper[place] else 1.0
+        return bool(inwards * (self._x[place] - bound) > 0)
+
+    def _pull(self, place: int, goal: float, weight: float) -> None:
+        """Add weight (x - goal)^2 to the energy."""
+        column = self._inverse[:, [place]]
+        share = weight / (1 + weight * column[place, 0])
+        off = goal - self._x[place]
+        self.energy += share * off * off
+        self._x += column[:, 0] * (share * off)
+        self._update(-share, column, column)
+
+
+def _bounds(window: Window) -> tuple[Floats, Floats]:
+    """Least and greatest angles of the window, shapes (2k,)."""
+    lower, upper = free_bounds(window.instance)
+    return lower[window.unknowns], upper[window.unknowns]

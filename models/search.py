@@ -1,0 +1,234 @@
+"""A search for a field of low 2-norm energy: from the greedy field downwards, window by window, on all cores.
+
+Every round some windows of the grid are explored (models/exploration.py) with all else fixed; what is lower is taken over, and angles and
+jumps of the whole grid follow from time to time. A small grid is one window. The field at the end of a round depends on instance and seed
+alone, not on the number of processes: time only decides after which round the search ends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from .coarse import halved, prolonged
+from .errors import InputError
+from .exploration import LOWER, Better, Task, explore
+from .field import CrossField
+from .free_field import FreeField, free_bounds
+from .grid import Bools
+from .improvement import first_field, improved, settle, stroke_curves
+from .instance import Instance
+from .power_field import power_field
+from .quadratic import Solver
+
+Progress = Callable[[int, float], object]
+"""Is told how many rounds are done, and the least energy so far."""
+
+Explorers = Callable[[list[Task]], list[Better | None]]
+"""Explores windows side by side and gives what was found in the order of the tasks."""
+
+_WINDOW: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
+_WINDOWS: Final = 4  # a round
+_FINE: Final = 0.6  # share of the seconds that is kept for the grid of higher resolution
+_COARSE: Final = 60  # rounds on a grid of lower resolution
+_LATEST: Final = 4  # fields that are brought from there
+_KICKS: Final = 40  # a window
+_SETTLE: Final = 8  # rounds between two improvements of the whole grid
+_PATIENCE: Final = 200  # kicks a pixel without success that end a search
+_ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found: the field, the rounds it took, (round, energy) of every improvement, and how it ended.
+
+    ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
+    """
+
+    field: CrossField
+    rounds: int
+    energies: tuple[tuple[int, float], ...]
+    ended: str
+
+
+def search(
+    instance: Instance,
+    *,
+    seconds: float | None = None,
+    rounds: int | None = None,
+    seed: int = 0,
+    jobs: int = 2,
+    start: CrossField | None = None,
+    progress: Progress = lambda *_: None,
+) -> Search:
+    """The field of least 2-norm energy that was found, never above the improved greedy field and `start`.
+
+    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without success.
+    jobs: processes. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is not positive.
+    """
+    if (seconds is not None and seconds <= 0) or (rounds is not None and rounds < 0) or jobs < 1:
+        raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
+    deadline = np.inf if seconds is None else time.monotonic() + seconds
+    hunt = _Hunt(instance, seed, min(starts(instance, start), key=_energy))
+    try:
+        with _explorers(1 if instance.grid.size <= _ALONE else jobs) as explorers:
+            if hunt.large:
+                for field in _from_coarse(instance, seed, deadline, rounds, explorers):
+                    hunt.offer(field)
+            ended = hunt.run(explorers, deadline, rounds, progress)
+    except KeyboardInterrupt:
+        ended = "interrupted"
+    return Search(hunt.best(), hunt.round, tuple(hunt.energies), ended)
+
+
+def _from_coarse(
+    instance: Instance, seed: int, deadline: float, rounds: int | None, explorers: Explorers
+) -> Iterator[CrossField]:
+    """Fields that were found on the grid of half the resolution, brought to this one, the best of there first."""
+    coarse = halved(instance)
+    if coarse is None:
+        return
+    deadline -= _FINE * (deadline - time.monotonic()) if deadline < np.inf else 0.0
+    hunt = _Hunt(coarse, seed, min(starts(coarse, None), key=_energy))
+    if hunt.large:
+        for field in _from_coarse(coarse, seed, deadline, rounds, explorers):
+            hunt.offer(field)
+    many = _COARSE if rounds is None else min(rounds, _COARSE)
+    hunt.run(explorers, deadline, many, lambda *_: None)
+    for field in hunt.latest():
+        yield prolonged(field, instance)
+
+
+def starts(instance: Instance, start: CrossField | None) -> Iterator[CrossField]:
+    """The fields from the best of which a search goes on: the greedy and the power field, improved, and what the user gives."""
+    yield first_field(instance)
+    yield improved(power_field(instance))
+    if start is not None:
+        yield improved(start)
+
+
+def _energy(field: CrossField) -> float:
+    return round(field.energy().total, 9)
+
+
+@contextmanager
+def _explorers(jobs: int) -> Iterator[Explorers]:
+    """A function that explores windows side by side, in the order of the tasks, in that many processes."""
+    if jobs == 1:
+        yield lambda tasks: [explore(task) for task in tasks]
+        return
+    from joblib import Parallel, delayed
+
+    with Parallel(n_jobs=jobs, backend="loky") as parallel:
+        yield lambda tasks: list(parallel(delayed(explore)(task) for task in tasks))
+
+
+class _Hunt:
+    """The field that a search has reached, and what it tries next."""
+
+    def __init__(self, instance: Instance, seed: int, start: CrossField) -> None:
+        self.round = 0
+        self.fruitless = 0
+        self.energies = [(0, start.energy().total)]
+        self._instance = instance
+        self._seed = seed
+        self._start = start
+        self._state = FreeField.of(start)
+        self._bounds = free_bounds(instance)
+        self._solver = Solver()
+        self._latest = [start]
+        self._unsettled = False
+        self._curve = np.full(instance.grid.size, -1)
+        self._curve[instance.stroke_index] = stroke_curves(instance)
+
+    def best(self) -> CrossField:
+        """The field of least energy so far."""
+        self._settle()
+        return min(self._state.bounded(), self._start, key=_energy)
+
+    @property
+    def large(self) -> bool:
+        """Whether the grid is more than one window."""
+        return self._instance.grid.size > _WINDOW * 5 // 4
+
+    def latest(self) -> list[CrossField]:
+        """The last fields that were the best for a round or more, the best first."""
+        return [self.best(), *self._latest[-_LATEST:-1][::-1]]
+
+    def offer(self, field: CrossField) -> None:
+        """Go on from this field if it is lower."""
+        if _energy(field) < _energy(self._start):
+            self._start, self._state = field, FreeField.of(field)
+            self.energies.append((self.round, field.energy().total))
+
+    def run(self, explorers: Explorers, deadline: float, rounds: int | None, progress: Progress) -> str:
+        """Go on until a limit is met; which one."""
+        while self.round != rounds:
+            if time.monotonic() >= deadline:
+                return "time"
+            if self.fruitless > _PATIENCE * self._instance.grid.size:
+                return "patience"
+            tasks = self.tasks()
+            self._take(tasks, explorers(tasks))
+            progress(self.round, self.energies[-1][1])
+        return "rounds"
+
+    def tasks(self) -> list[Task]:
+        """What to explore in this round."""
+        rng = np.random.default_rng((self._seed, self.round))
+        x, p = self._state.x, self._state.p
+        return [
+            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number))
+            for number, free in enumerate(self._windows(rng))
+        ]
+
+    def _windows(self, rng: np.random.Generator) -> Iterator[Bools]:
+        """The windows of a round, round pixels of high energy and others in turn."""
+        grid = self._instance.grid
+        if not self.large:
+            yield from [np.ones(grid.size, dtype=bool)] * _WINDOWS
+            return
+        field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
+        high = field.pixel_energy + 1e-12
+        for number in range(_WINDOWS):
+            centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
+            away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
+            yield away <= np.partition(away, _WINDOW)[_WINDOW]
+
+    def _take(self, tasks: list[Task], found: list[Better | None]) -> None:
+        """Take over what is lower, the lowest first, and end the round."""
+        self.round += 1
+        self.fruitless += _KICKS * len(tasks)
+        lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
+        for task, better in sorted(lower, key=lambda pair: pair[1].energy):
+            self._adopt(task, better)
+        if any(found) and self._unsettled:
+            self._latest.append(
+                CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
+            )
+        if self._unsettled and (self.round % _SETTLE == 0 or not self.large):
+            self._settle()
+
+    def _adopt(self, task: Task, better: Better) -> None:
+        """Take over a window's angles and jumps if that lowers the energy beside what else was taken over."""
+        state = self._state
+        trial = FreeField(
+            self._instance, state.alpha, state.beta, np.where(better.p != task.p, better.p, state.p)
+        )
+        inside = np.concatenate([task.free, task.free])
+        trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
+        if trial.energy < state.energy - LOWER:
+            self._state, self._unsettled, self.fruitless = trial, True, 0
+            self.energies.append((self.round, trial.energy))
+
+    def _settle(self) -> None:
+        """Bring angles and jumps of the whole grid up to date."""
+        if self._unsettled:
+            settle(self._state, self._solver)
+            self._unsettled = False
+            self.energies.append((self.round, self._state.energy))

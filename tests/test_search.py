@@ -1,0 +1,262 @@
+"""The search: its formulas against dense least squares, its answers against all jumps, and what it promises."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.coarse import halved, prolonged
+from crossfield.models.field import CrossField
+from crossfield.models.greedy import greedy
+from crossfield.models.improvement import first_field, improved, stroke_curves
+from crossfield.models.instance import HALF, QUARTER
+from crossfield.models.kicks import Kicks
+from crossfield.models.landscape import STEPS, Landscape, Window
+from exhaustive import exact, least_energy, random_instance, sketch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def angles(field):
+    return np.concatenate([field.alpha, field.beta])
+
+
+def landscape(field, free=None):
+    size = field.instance.grid.size
+    window = Window.of(field.instance, np.ones(size, bool) if free is None else free)
+    return Landscape(window, angles(field), field.p)
+
+
+def kicks_of(window):
+    instance = window.instance
+    curve = np.full(instance.grid.size, -1)
+    curve[instance.stroke_index] = stroke_curves(instance)
+    return Kicks(window, curve)
+
+
+def gentle(seed):
+    """An instance whose strokes are so close in direction that no bound matters for small jumps."""
+    rng = np.random.default_rng(seed)
+    theta = np.where(rng.random((4, 5)) < 0.4, 1.0 + 0.2 * rng.random((4, 5)), np.nan)
+    theta[0, 0] = 1.0
+    return sketch(np.ones((4, 5), bool), theta, w_beta=0.1)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_gains_are_those_of_dense_least_squares(seed):
+    field = first_field(gentle(seed))
+    land = landscape(field)
+    gains = land.gains()
+    rng = np.random.default_rng(seed)
+    for pair in rng.integers(len(field.p), size=4):
+        for row, step in enumerate(STEPS):
+            p = field.p.copy()
+            p[pair] += step
+            assert land.energy + gains[row, pair] == pytest.approx(
+                least_energy(field.instance, p[None])[0], rel=1e-6
+            )
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_energy_after_many_changes_is_that_of_its_jumps(seed):
+    field = first_field(gentle(seed))
+    land = landscape(field)
+    rng = np.random.default_rng(seed)
+    kicks = kicks_of(land.window)
+    start = land.saved()
+    for _ in range(6):
+        land.change(*kicks.draw(rng, land.p))
+    least = least_energy(field.instance, land.p[None])[0]
+    # Bounds only raise it; where none is met it is equal.
+    assert land.energy >= least - 1e-6
+    if not land._held:
+        assert land.energy == pytest.approx(least, rel=1e-6)
+    reached = CrossField(field.instance, *np.split(land.angles, 2), land.p).energy().total
+    assert land.energy == pytest.approx(reached, rel=1e-3)
+    land.restore(start)
+    assert land.energy == start.energy
+    assert (land.p == field.p).all()
+
+
+def test_bounds_hold_after_changes():
+    field = first_field(random_instance(4, shape=(5, 6), strokes=12))
+    land = landscape(field)
+    kicks, rng = kicks_of(land.window), np.random.default_rng(0)
+    for _ in range(30):
+        land.change(*kicks.draw(rng, land.p))
+        beta = np.split(land.angles, 2)[1]
+        assert np.abs(beta).max() < QUARTER + 1e-2
+
+
+def test_angles_outside_the_window_stay():
+    field = first_field(cf.sample("mouse", 12))
+    grid = field.instance.grid
+    free = grid.columns < 6
+    land = landscape(field, free)
+    assert land.energy == pytest.approx(field.energy().total, rel=1e-6)
+    kicks, rng = kicks_of(land.window), np.random.default_rng(3)
+    for _ in range(5):
+        land.change(*kicks.draw(rng, land.p))
+    outside = np.concatenate([~free, ~free])
+    assert (land.angles[outside] == angles(field)[outside]).all()
+    across = ~(free[grid.first] & free[grid.second])
+    assert (land.p[across] == field.p[across]).all()
+
+
+def turns(instance, p):
+    bottom, side, top, left = instance.grid.blocks.T
+    return p[bottom] + p[side] - p[top] - p[left]
+
+
+def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
+    field = first_field(cf.sample("ring", 14))
+    land = landscape(field)
+    kicks, rng = kicks_of(land.window), np.random.default_rng(5)
+    before = turns(field.instance, field.p)
+    moved = set()
+    for _ in range(200):
+        for change, most in ((kicks.turn(rng), 0), (kicks.shift(rng, field.p), 2)):
+            pairs, steps = change
+            assert len(pairs) == len(set(pairs.tolist()))
+            p = field.p.copy()
+            p[land.window.pairs[pairs]] += steps
+            changed = turns(field.instance, p) - before
+            assert (changed != 0).sum() <= most
+            moved.add(int(np.abs(changed).sum()))
+    assert moved >= {0, 1, 2}
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_search_finds_the_optimum_over_all_jumps(seed):
+    instance = random_instance(seed, shape=(2, 3), strokes=6)
+    field = cf.search(instance, rounds=2).field
+    least = exact(instance)
+    assert field.energy().total >= least - 1e-9
+    if np.abs(field.beta).max() < QUARTER - 1e-3:
+        assert field.energy().total == pytest.approx(least, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["skew", "singular", "bottle"])
+def test_search_is_never_above_what_it_starts_from(name):
+    instance = cf.sample(name, 10)
+    start = cf.power_field(instance)
+    found = cf.search(instance, rounds=1, start=start).field
+    for other in (greedy(instance), first_field(instance), start):
+        assert found.energy().total <= other.energy().total + 1e-9
+    assert (np.abs(found.beta) <= QUARTER).all()
+    assert (found.alpha >= instance.alpha_lower).all()
+    assert (found.alpha <= instance.alpha_upper).all()
+
+
+def test_search_gets_below_the_greedy_field():
+    instance = cf.sample("mouse", 24)
+    found = cf.search(instance, rounds=4)
+    assert found.field.energy().total < 0.99 * first_field(instance).energy().total
+    energies = [energy for _, energy in found.energies]
+    assert energies[-1] == pytest.approx(found.field.energy().total, rel=1e-6)
+    assert energies == sorted(energies, reverse=True)
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
+    instance = cf.sample("mouse", 14).with_gauge(gauge)
+    fields = [cf.search(instance, rounds=2, seed=7, jobs=jobs).field for jobs in (1, 2, 2)]
+    for name in ("alpha", "beta", "p"):
+        assert len({getattr(field, name).tobytes() for field in fields}) == 1
+
+
+def test_a_large_grid_is_searched_from_coarse_to_fine_by_windows():
+    instance = cf.sample("mouse", 40)
+    seen = []
+    found = cf.search(instance, rounds=2, progress=lambda rounds, energy: seen.append((rounds, energy)))
+    assert found.field.energy().total < first_field(instance).energy().total
+    assert (found.rounds, found.ended) == (2, "rounds")
+    assert [rounds for rounds, _ in seen] == [1, 2]
+
+
+def test_search_ends_by_itself_when_nothing_is_found():
+    found = cf.search(cf.sample("skew", 6))
+    assert found.ended == "patience"
+    assert found.field.energy().total < 1e-4
+
+
+def test_search_ends_in_time():
+    found = cf.search(cf.sample("mouse", 16), seconds=0.5, jobs=1)
+    assert found.ended == "time"
+    assert found.rounds >= 1
+
+
+@pytest.mark.parametrize("given", [{"seconds": 0}, {"rounds": -1}, {"jobs": 0}])
+def test_limits_that_cannot_be_are_refused(given):
+    with pytest.raises(cf.CrossfieldError, match="positive"):
+        cf.search(cf.sample("skew", 6), **given)
+
+
+CHILD = """
+import crossfield as cf
+if True:
+    found = cf.search(cf.sample("mouse", 16), jobs=2, progress=lambda rounds, energy: print(rounds, flush=True))
+    print(found.ended, found.field.energy().total)
+"""
+
+
+@pytest.mark.solver
+def test_ctrl_c_gives_the_best_field_so_far():
+    child = subprocess.Popen(
+        [sys.executable, "-c", CHILD],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert child.stdout.readline() == "1\n"
+    os.killpg(child.pid, signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    assert (child.returncode, err) == (0, "")
+    ended, energy = out.splitlines()[-1].split()
+    assert ended == "interrupted"
+    assert float(energy) <= first_field(cf.sample("mouse", 16)).energy().total + 1e-9
+
+
+@given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
+@settings(deadline=None, max_examples=30)
+def test_improved_fields_are_no_worse_and_stay_improved(seed, gauge):
+    field = greedy(random_instance(seed, gauge=gauge))
+    better = improved(field)
+    assert better.energy().total <= field.energy().total
+    assert improved(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
+
+
+def test_a_constant_field_stays_constant_on_finer_grids():
+    theta = np.full((9, 7), np.nan)
+    theta[2], theta[6], theta[3:6, 3] = 0.3, 0.3, 1.6
+    fine = sketch(np.ones(theta.shape, bool), theta)
+    coarse = halved(fine)
+    assert coarse.mask.shape == (5, 4)
+    field = prolonged(first_field(coarse), fine)
+    assert field.energy().total < fine.grid.size * fine.w_beta
+    assert not len(field.singularities.index)
+
+
+def test_smooth_energy_is_the_same_on_both_grids():
+    # A quarter turn of the frame round the middle, with the exact field in between on both grids.
+    rows, columns = np.mgrid[0:32, 0:32]
+    around = np.arctan2(-(rows - 15.5), columns - 15.5) / 4
+    theta = np.where((rows - 15.5) ** 2 + (columns - 15.5) ** 2 > 14**2, around, np.nan)
+    fine = sketch(np.ones(theta.shape, bool), theta)
+    field, above = first_field(fine), first_field(halved(fine))
+    assert field.singularities.index.tolist() == above.singularities.index.tolist() == [0.25]
+    assert prolonged(above, fine).singularities.index.tolist() == [0.25]
+    assert prolonged(above, fine).energy().total == pytest.approx(field.energy().total, rel=0.01)
+
+
+def test_crossing_strokes_leave_no_coarse_stroke():
+    theta = np.array([[0.0, HALF], [HALF, 0.0]])
+    assert halved(sketch(np.ones((2, 2), bool), theta)) is None
