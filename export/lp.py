@@ -76,7 +76,7 @@ def linear_costs(problem: Problem) -> Floats:
     index, coefficient = problem.merged_objective(1)
     costs = np.zeros(problem.columns)
     costs[index[:, 0]] = coefficient
-    check_coefficients(costs, "the objective")
+    check_coefficients(coefficient, "the objective")
     return costs
 
 

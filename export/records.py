@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..models.errors import UnsupportedByFormatError
 from ..models.grid import Bools, Floats
+from ..models.monomials import ranked
 
 Bytes = NDArray[np.uint8]
 Cells = NDArray[Any]
@@ -149,9 +150,8 @@ def render(parts: Sequence[Piece | OnlyWhere], count: int, *, padded: bool = Tru
         return
     template = _Template(parts)
     for start in range(0, count, BLOCK):
-        stop = min(start + BLOCK, count)
-        block, gaps = template.filled(start, stop)
-        yield block[block != 0].tobytes() if padded and gaps else block.tobytes()
+        line, gaps = template.line(start, min(start + BLOCK, count))
+        yield line[line != 0].tobytes() if padded and gaps else line.tobytes()
 
 
 def filled(parts: Pieces, count: int) -> Bytes:
@@ -160,7 +160,7 @@ def filled(parts: Pieces, count: int) -> Bytes:
         return np.zeros(
             (0, sum(len(part) if isinstance(part, bytes) else part.width for part in parts)), np.uint8
         )
-    return _Template(parts).filled(0, count)[0].reshape(count, -1)
+    return _Template(parts).line(0, count)[0].reshape(count, -1)
 
 
 class _Template:
@@ -181,55 +181,77 @@ class _Template:
         self._parts = {id(piece): piece for piece in self._pieces if not isinstance(piece, bytes)}
         self._widths: list[int] = []
 
-    def filled(self, start: int, stop: int) -> tuple[Bytes, bool]:
+    def line(self, start: int, stop: int) -> tuple[Bytes, bool]:
         """The bytes of these records in a row, and whether there are NUL bytes to drop."""
         cells, padded = {}, False
         for key, part in self._parts.items():
             cells[key], gaps = part.cells(start, stop)
             padded |= gaps
         self._lay_out(cells, stop - start)
-        for number, piece in enumerate(self._pieces):
-            if not isinstance(piece, bytes):
-                words = cells[id(piece)]
-                self._view(slice(number, number + 1), words.dtype)[: len(words)] = words
-        for place, present in self._optional:
-            padded |= self._blank(place, ~present[start:stop])
-        return self._matrix[: stop - start].reshape(-1), padded
-
-    def _blank(self, place: slice, absent: Bools) -> bool:
-        """Whether some records lack these pieces; they hold NUL there now."""
-        view = self._view(place)[: len(absent)]
-        view[absent] = np.zeros((), view.dtype)
-        return bool(absent.any())
+        for hole, key in self._holes:
+            hole[: stop - start] = cells[key]
+        present = [where[start:stop] for _, where in self._optional]
+        if all(where.all() for where in present):
+            return self._matrix[: stop - start].reshape(-1), padded
+        return self._chosen(present), padded
 
     def _lay_out(self, cells: dict[int, Cells], rows: int) -> None:
-        """Literals in their places: everywhere when a width has changed, else where some were blanked."""
+        """Literals in their places, and where the holes are, when a width has changed."""
         widths = [
             len(piece) if isinstance(piece, bytes) else cells[id(piece)].dtype.itemsize
             for piece in self._pieces
         ]
-        if widths != self._widths:
-            self._widths, self._ends = widths, [0, *accumulate(widths)]
-            texts = (
-                piece if isinstance(piece, bytes) else bytes(width)
-                for piece, width in zip(self._pieces, widths, strict=True)
-            )
-            self._line = np.frombuffer(b"".join(texts), dtype=np.uint8)
-            self._matrix = np.tile(self._line, (rows, 1))
-        for place, _ in self._optional:
-            column = self._view(place)
-            column[:] = self._line[self._ends[place.start] : self._ends[place.stop]].view(column.dtype)
-
-    def _view(self, place: slice, kind: Any = None) -> Cells:
-        """The column of the matrix that these pieces fill, one item a record."""
-        first, last = self._ends[place.start], self._ends[place.stop]
-        return np.ndarray(
-            (len(self._matrix),),
-            kind or f"V{last - first}",
-            self._matrix,
-            first,
-            (self._matrix.shape[1],),
+        if widths == self._widths:
+            return
+        self._widths, self._ends = widths, [0, *accumulate(widths)]
+        texts = (
+            piece if isinstance(piece, bytes) else bytes(width)
+            for piece, width in zip(self._pieces, widths, strict=True)
         )
+        self._matrix = np.tile(np.frombuffer(b"".join(texts), dtype=np.uint8), (rows, 1))
+        self._holes = [
+            (self._column(first, cells[id(piece)].dtype), id(piece))
+            for first, piece in zip(self._ends, self._pieces, strict=False)
+            if not isinstance(piece, bytes)
+        ]
+
+    def _column(self, first: int, kind: Any) -> Cells:
+        """The column of the matrix that begins at a byte, one item a record."""
+        return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
+
+    def _chosen(self, present: Sequence[Bools]) -> Bytes:
+        """The bytes of the records at hand without the pieces that they lack.
+
+        Few patterns of presence occur: what stands side by side in one of them is moved for all of its records at once.
+        """
+        pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
+        there = np.bincount(pattern)
+        found = {
+            number: self._stretches([bool(number >> bit & 1) for bit in range(len(present))])
+            for number in np.flatnonzero(there).tolist()
+        }
+        lengths = np.zeros(len(there), dtype=np.intp)
+        lengths[list(found)] = [sum(last - first for first, last in runs) for runs in found.values()]
+        ends = np.cumsum(lengths[pattern])
+        line = np.empty(ends[-1], dtype=np.uint8)
+        for number, runs in found.items():
+            at = np.flatnonzero(pattern == number)
+            to = ends[at] - lengths[number]
+            for first, last in runs:
+                kind = f"V{last - first}"
+                anywhere = np.ndarray((len(line) - (last - first) + 1,), kind, line, 0, (1,))
+                anywhere[to] = self._column(first, kind)[at]
+                to += last - first
+        return line
+
+    def _stretches(self, present: Sequence[bool]) -> list[tuple[int, int]]:
+        """First and last byte of what stands side by side in a record that has these optional pieces."""
+        cuts = [0]
+        for (place, _), there in zip(self._optional, present, strict=True):
+            if not there:
+                cuts += [self._ends[place.start], self._ends[place.stop]]
+        cuts.append(self._ends[-1])
+        return [(first, last) for first, last in zip(cuts[::2], cuts[1::2], strict=True) if first < last]
 
 
 def as_cells(matrix: Bytes) -> Cells:
@@ -309,8 +331,8 @@ def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
     few = 0 <= most - least < _FEW and max(-least, most) < MOST
     if few and (values == np.rint(values)).all():
         return np.arange(least, most + 1), (values - least).astype(np.uint8)
-    distinct, codes = np.unique(values, return_inverse=True)
-    return distinct, codes
+    place, rank = ranked(values)
+    return values[place], rank
 
 
 def check_coefficients(values: Floats | float, where: str) -> None:

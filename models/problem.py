@@ -9,17 +9,17 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from .errors import FormulationError, InstanceError
 from .field import CrossField
 from .formulations import FORMULATIONS, Family, Formulation, declare, lift_products
 from .grid import Bools, Floats, Ints
 from .instance import Instance
+from .monomials import beyond_noise, merged, monomials, ordered
 from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, elements, numeric, way
 
 Coefficient = float | Floats
@@ -116,7 +116,7 @@ class Bound:
 
     def data(self, expression: sp.Expr) -> Coefficient:
         """Value of an expression free of columns: a number, or an array (count,)."""
-        symbols = sorted(expression.free_symbols, key=str)
+        symbols = sorted(expression.free_symbols, key=_name)
         if not symbols:
             return float(expression)
         value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
@@ -131,20 +131,10 @@ class Bound:
     @cached_property
     def terms(self) -> tuple[Term, ...] | None:
         """Its monomials, the constant one included, or None when it is no polynomial."""
-        try:
-            polynomial = sp.Poly(self.family.body, *self.variables) if self.variables else None
-        except sp.PolynomialError:
+        split = monomials(self.family, self.variables)
+        if split is None:
             return None
-        if polynomial is None:
-            return (Term(self, (), self.data(self.family.body)),)
-        terms = sorted(
-            polynomial.terms(), key=lambda term: (sum(term[0]), tuple(-power for power in term[0]))
-        )
-        return tuple(Term(self, self._factors(powers), self.data(c)) for powers, c in terms if c != 0)
-
-    def _factors(self, powers: tuple[int, ...]) -> tuple[sp.Symbol, ...]:
-        """The symbols of a monomial, each as often as its power says."""
-        return tuple(s for s, power in zip(self.variables, powers, strict=True) for _ in range(power))
+        return tuple(Term(self, symbols, self.data(c)) for symbols, c in split)
 
     @property
     def degree(self) -> int:
@@ -171,7 +161,7 @@ class Bound:
 
     def values(self, point: Floats) -> Floats:
         """The expression (of a row: left minus right side) at a point, one value per element, shape (count,)."""
-        symbols = sorted(self.family.body.free_symbols, key=str)
+        symbols = sorted(self.family.body.free_symbols, key=_name)
         evaluate = numeric(symbols, self.family.body)
         given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
@@ -351,9 +341,20 @@ class Problem:
             return np.zeros((1, 0), np.int32), np.array([total])
         if not terms:
             return np.zeros((0, degree), np.int32), np.zeros(0)
-        index = np.concatenate([_ordered(term.factors) for term, _ in terms])
+        if degree == 1:
+            return self._merged_costs([term for term, _ in terms])
+        index = np.concatenate([ordered(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
-        return _merge(index, np.concatenate(coefficients), scale, self.columns)
+        return merged(index, np.concatenate(coefficients), scale, self.columns)
+
+    def _merged_costs(self, terms: list[Term]) -> tuple[Ints, Floats]:
+        reached = [(term.family.block(term.symbols[0]), term) for term in terms]
+        costs = [
+            _costs([term for other, term in reached if other is block], block)
+            for block in self.blocks.values()
+        ]
+        index, cost = zip(*costs, strict=True)
+        return np.concatenate(index), np.concatenate(cost)
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,)."""
@@ -423,7 +424,7 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
     sources = problem.data | given
-    symbols = sorted(variable.value.free_symbols, key=str)
+    symbols = sorted(variable.value.free_symbols, key=_name)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
     return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
@@ -435,34 +436,28 @@ def _excess(sense: str, values: Floats) -> Floats:
     return values if sense == "<=" else -values
 
 
-_NOISE: Final = 1e-12
-"""Relative to its element's largest coefficient: what cancels up to rounding, or comes from an angle of 1e-16, is noise."""
+def _costs(terms: list[Term], block: Block) -> tuple[Ints, Floats]:
+    """As `merged`, for the single columns of a block: one number each, to which the terms are added in turn."""
+    if not terms:
+        return np.zeros((0, 1), np.int32), np.zeros(0)
+    total, scale = np.zeros(block.count), np.zeros(block.count)
+    for term in terms:
+        inside = term.family.inside(term.symbols[0])
+        _add(total, inside, term.coefficient)
+        _add(scale, inside, term.family.scale)
+    kept = np.nonzero(beyond_noise(total, scale))[0]
+    return (block.offset + kept).astype(np.int32)[:, None], total[kept]
 
 
-def _ordered(factors: tuple[Ints, ...]) -> Ints:
-    """Columns of each monomial in ascending order, shape (count, degree)."""
-    if len(factors) == 2:  # nearly all, and faster than sorting rows
-        return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
-    return np.sort(np.stack(factors, axis=1), axis=1)
+def _add(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
+    if inside is None:
+        sums += values
+    else:
+        np.add.at(sums, inside, values)
 
 
-def _merge(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
-    """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out."""
-    rows, number = _numbered(index, columns)
-    total = np.bincount(number, weights=coefficient, minlength=len(rows)).astype(np.float64)
-    kept = np.abs(total) > _NOISE * np.bincount(number, weights=scale, minlength=len(rows))
-    return rows[kept], total[kept]
-
-
-def _numbered(index: Ints, columns: int) -> tuple[Ints, NDArray[Any]]:
-    """Sorted rows, all rows of `index` among them and each once, and the number of each row of `index` among them."""
-    if index.shape[1] == 1:
-        return np.arange(columns, dtype=np.int32)[:, None], index[:, 0]
-    key = index[:, 0].astype(np.int64)
-    for factor in range(1, index.shape[1]):
-        key = key * columns + index[:, factor]
-    _, place, number = np.unique(key, return_index=True, return_inverse=True)
-    return index[place], number
+def _name(symbol: sp.Symbol) -> str:
+    return str(symbol.name)
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:

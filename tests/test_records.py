@@ -172,6 +172,31 @@ def test_pieces_that_some_records_have(block, monkeypatch):
     assert text(parts, 7).decode() == "".join(expected)
 
 
+@given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=40), st.booleans())
+def test_any_records_lack_any_pieces(present, whole):
+    """Neighbours, the first and the last piece, all of them; with words of several lengths between. whole: nothing is always there."""
+    count = len(present)
+    key = Words(table([b"%d" % 7**at for at in range(count)]), None)
+    first, second, third, last = np.array(present).T
+    middle = [] if whole else [b"-", key]
+    parts = [
+        OnlyWhere(first, [b"(", key]),
+        OnlyWhere(second, [Tagged(b"t", key), b","]),
+        *middle,
+        OnlyWhere(third, [b"!"]),
+        OnlyWhere(last, [key.at(np.arange(count)[::-1]), b";"]),
+    ]
+    expected = b"".join(
+        b"(%d" % 7**at * a
+        + b"t%d," % 7**at * b
+        + b"-%d" % 7**at * (not whole)
+        + b"!" * c
+        + b"%d;" % 7 ** (count - 1 - at) * d
+        for at, (a, b, c, d) in enumerate(present)
+    )
+    assert text(parts, count) == expected
+
+
 @pytest.mark.parametrize("first", [0, 7, 95, 9_990, 99_999_990])
 def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypatch):
     values = np.arange(first, first + 20, dtype=np.int32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import subprocess
+import sys
 import threading
 import zlib
 
@@ -26,13 +27,54 @@ def cut(data: bytes, length: int) -> list[bytes]:
     return [data[start : start + length] for start in range(0, len(data), length)]
 
 
+@pytest.mark.parametrize("share", [1, 999, 1000, 1001, 1 << 20])
 @pytest.mark.parametrize("length", [1, 1000, 1 << 20])
-def test_count_and_hash_are_those_of_the_file(length, tmp_path):
+def test_count_and_hash_are_those_of_the_file(length, share, tmp_path, monkeypatch):
+    monkeypatch.setattr(sink, "SHARE", share)
     for name in ("a.lp", "a.lp.gz"):
         facts = save(tmp_path / name, cut(TEXT, length))
         data = (tmp_path / name).read_bytes()
         assert facts == {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         assert (gzip.decompress(data) if name.endswith("gz") else data) == TEXT
+
+
+def test_a_small_file_begins_no_thread_and_a_large_one_does(tmp_path):
+    def running(size: int) -> int:
+        def chunks():
+            yield bytes(size)
+            yield b"end"
+            found.append(threading.active_count())
+
+        found: list[int] = []
+        save(tmp_path / "a.lp", chunks())
+        return found[0]
+
+    assert running(sink.SHARE - 10) == 1
+    assert running(sink.SHARE) == 3
+    assert threading.active_count() == 1
+
+
+FULL = """
+import resource, sys, threading
+from pathlib import Path
+from crossfield.export.sink import SHARE, save
+from crossfield.models.errors import OutputError
+resource.setrlimit(resource.RLIMIT_FSIZE, (3 * SHARE, 3 * SHARE))
+try:
+    save(Path(sys.argv[1]), (bytes(SHARE) for _ in range(int(sys.argv[2]))))
+except OutputError as error:
+    print(error, threading.active_count())
+"""
+
+
+@pytest.mark.parametrize("shares", [4, 100])
+def test_a_disk_that_takes_no_more_is_an_error_of_output_and_leaves_nothing(shares, tmp_path):
+    """The thread that writes fails, at the end or long before it: files of this process are limited to three shares."""
+    command = [sys.executable, "-c", FULL, str(tmp_path / "a.lp"), str(shares)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "a.lp: cannot be written: file too large; free some space" in done.stdout
+    assert done.stdout.endswith(" 1\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 @given(st.lists(st.binary(max_size=50), max_size=30), st.integers(1, 60))
@@ -71,14 +113,16 @@ def test_solvers_read_files_of_many_pieces(suffix, tmp_path, monkeypatch):
             np.testing.assert_array_equal(getattr(packed, name), value, err_msg=name)
 
 
-def test_a_failure_leaves_no_file_and_no_thread(tmp_path):
+def test_a_failure_leaves_no_file_and_no_thread(tmp_path, monkeypatch):
     def chunks():
         yield TEXT
         raise RuntimeError("no more")
 
     for name in ("a.lp", "a.lp.gz"):
-        with pytest.raises(RuntimeError, match="no more"):
-            save(tmp_path / name, chunks())
+        for share in (1, sink.SHARE):
+            monkeypatch.setattr(sink, "SHARE", share)
+            with pytest.raises(RuntimeError, match="no more"):
+                save(tmp_path / name, chunks())
     assert list(tmp_path.iterdir()) == []
     assert threading.active_count() == 1
 

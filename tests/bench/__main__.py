@@ -123,7 +123,7 @@ def ours(bench: Bench, sizes: tuple[int, ...], pixels: int) -> None:
         bench.run("sections", sizes[-2], MILP, suffix)
         for size in sizes[-2:]:
             bench.run("rendered", size, MILP, suffix, dialect="")
-        bench.run("hashed", sizes[-2], MILP, suffix)
+            bench.run("hashed", size, MILP, suffix)
     bench.run("ours", sizes[-2], MILP, "lp.gz")
     bench.run("picture", sizes[-1])
     for suffix in ("highs", "ampl"):

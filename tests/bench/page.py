@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import platform
 import re
@@ -18,6 +19,13 @@ NAMES = {
     "highs": "HiGHS",
     "pyomo": "Pyomo",
     "pyoptinterface": "PyOptInterface",
+}
+WHAT = {"seconds": "seconds", "cpu": "CPU"}
+MET: dict[str, Callable[[float, float], bool]] = {
+    "at least": operator.ge,
+    "at most": operator.le,
+    "under": operator.lt,
+    "below": operator.lt,
 }
 PACKAGES = ("numpy", "sympy", "pyomo", "linopy", "highspy", "pyoptinterface")
 
@@ -75,7 +83,7 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         "",
         "Written by `python tests/bench`; every number is measured in a process of its own, one at a time. The instance is a full square of pixels, a",
         "fifth of them with a stroke. Seconds go from the instance to the closed file (names, SHA-256 and, for .nl, the files of names included),",
-        "the median of three runs, or of one when it takes more than 5 s. *CPU* is the time of all threads: where other programs shared the cores, it is",
+        "the median of three runs, or of one when it takes more than 5 s. Every run writes new files. *CPU* is the time of all threads: where other programs shared the cores, it is",
         "the number to compare. Peak memory is that of the whole process, libraries included.",
         "",
         f"{given['processor']}, {given['system']}. Python {given['Python']}, "
@@ -85,7 +93,7 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         "## Targets",
         "",
         *table(["", "target", "measured", ""], targets(at, sizes, names, middle, pixels)),
-        *reasons(at, sizes[-2], sizes[-1]),
+        *reasons(at, sizes[-2], sizes[-1], middle),
         "## LP and MPS of `milp-mccormick` beside the peers",
         "",
         "Peers build their model from whole arrays where they can (linopy, HiGHS), and write without our names: their files are smaller. A peer stops at the",
@@ -105,32 +113,68 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     return "\n".join(lines).rstrip() + "\n"
 
 
-def reasons(at: Page, half: int, big: int) -> list[str]:
-    """Why what is not met is not, in measured numbers."""
-    steps = [
-        at(task, half, "lp", MILP, *rest)
-        for task, rest in (("rendered", ("",)), ("hashed", ()), ("ours", ()))
+def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
+    """What limits the writers, in numbers of the same run."""
+    lines = [
+        linopy_reason(at, half),
+        pyomo_reason(at, middle),
+        *(write_reason(at, size, suffix) for suffix in ("lp", "mps") for size in (half, big)),
+        growth_reason(at, half, big),
     ]
-    shares = [round(100 * (at.ratio(step, steps[-1], "cpu") or 0)) for step in steps[:2]]
-    bytes_ = at.ratio(at("linopy", half, "lp"), at("ours", half, "lp"), "bytes") or 0
+    return ["What stands behind these numbers, and behind those not met:", "", *filter(None, lines), ""]
+
+
+def pyomo_reason(at: Page, size: int) -> str:
+    """How fast a small file with products is written beside a larger one without."""
+    mine, other = (at("ours", size, "lp", name) for name in ("qp-fixed", MILP))
+    if not (mine and other):
+        return ""
+    return (
+        f"- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files, and equal products are found by sorting. `qp-fixed` in LP, {size} x {size}, "
+        f"is {mine['bytes'] / 1e6:.1f} MB at {mine['bytes'] / 1e6 / mine['seconds']:.0f} MB/s, `{MILP}` {other['bytes'] / 1e6:.1f} MB at {other['bytes'] / 1e6 / other['seconds']:.0f} MB/s."
+    )
+
+
+def linopy_reason(at: Page, size: int) -> str:
+    """What linopy is spared, and what our CPU seconds go to."""
+    mine, theirs = at("ours", size), at("linopy", size)
+    made, hashed, written = (
+        at(*step) for step in (("rendered", size, "lp", MILP, ""), ("hashed", size), ("copied", size))
+    )
+    if not (mine and theirs and made and hashed and written):
+        return ""
+    return (
+        f"- linopy, LP: it is handed whole arrays of column numbers here, past its own expressions, it hashes nothing, and its file has numbered names: "
+        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. A tenth of its time is {theirs['seconds'] / 10:.3f} s; "
+        f"on two cores ours can take no less than the half of its {mine['cpu']:.3f} CPU seconds ({mine['cpu'] / 2:.3f} s), "
+        f"of which making the text alone takes {made['cpu']:.3f}, SHA-256 for the manifest, in one thread from end to end, {hashed['cpu']:.3f} and writing {written['cpu']:.3f}."
+    )
+
+
+def write_reason(at: Page, size: int, suffix: str) -> str:
+    """What hashing alone takes beside one write: a file is not closed before its last byte is hashed."""
+    mine, hashed, written = at("ours", size, suffix), at("hashed", size, suffix), at("copied", size, suffix)
+    if not (mine and hashed and written):
+        return ""
+    return (
+        f"- One write, {suffix.upper()} {size}: it takes {written['seconds']:.3f} s, for nothing is computed. SHA-256 alone, which works through a file from end to end in one "
+        f"thread, takes {hashed['seconds'] / written['seconds']:.1f} times as long; all our CPU seconds, shared evenly by two cores, would take {mine['cpu'] / 2 / written['seconds']:.1f} times as long."
+    )
+
+
+def growth_reason(at: Page, half: int, big: int) -> str:
+    """How the parts grow."""
     made = {
         s: at.ratio(at("rendered", big, s, MILP, ""), at("rendered", half, s, MILP, ""), "cpu")
         for s in ("lp", "mps", "nl")
     }
-    grown = ", ".join(f"{suffix} {times(value)}" for suffix, value in made.items() if value)
-    written = at.ratio(
-        at("copied", big, "gms", MILP, "scalar"), at("copied", half, "gms", MILP, "scalar"), "cpu"
+    gms = [at("copied", size, "gms", MILP, "scalar") for size in (big, half)]
+    copies = {"lp": at.ratio(at("copied", big), at("copied", half)), "gms": at.ratio(*gms)}
+    making, writing = (
+        ", ".join(f"{suffix} {times(value)}" for suffix, value in found.items() if value)
+        for found in (made, copies)
     )
-    return [
-        "What stands behind these numbers, and behind those not met:",
-        "",
-        f"- linopy, LP: it is handed whole arrays of column numbers here, past its own expressions, and its file has numbered names: {100 * bytes_:.0f} % of our bytes.",
-        f"  Of our CPU seconds, making the text takes {shares[0]} % and SHA-256 for the manifest {shares[1]} %; the rest is the system's work for writing and for threads.",
-        "- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files (the algebra), and equal products are found by sorting.",
-        "- One write: nothing is computed for it. Hashing alone takes as long as several of them, and so does making the text.",
-        f"- Growth: making the text grows {grown} times in CPU seconds. One write of the GAMS file alone grew {times(written)} times: that part is the system's.",
-        "",
-    ]
+    return f"- Growth: making the text grows {making} times in CPU seconds; one write of the finished bytes grows {writing} times in seconds, which is the system's part."
 
 
 def times(value: float | None) -> str:
@@ -142,108 +186,90 @@ def targets(
     at: Page, sizes: Sequence[int], names: Sequence[str], middle: int, pixels: int
 ) -> list[list[str]]:
     """The lines of the table of targets."""
-    big, half = sizes[-1], sizes[-2]
-    rows: list[list[str]] = []
+    half, big = sizes[-2:]
+    return [
+        *(linopy_target(at, half, what) for what in WHAT),
+        *(pyomo_target(at, names, middle, what) for what in WHAT),
+        write_target(at, half, big),
+        *everything_targets(at, big),
+        *(growth_target(at, half, big, what) for what in ("seconds", "cpu", "memory")),
+        *small_targets(at, min(24, big)),
+        solution_target(at, pixels),
+    ]
 
-    def add(
-        what: str, target: str, values: dict[str, float | None], met: Callable[[float], bool], unit: str = ""
-    ) -> None:
-        known = {name: value for name, value in values.items() if value is not None}
-        text = ", ".join(f"{name} {value:.3g}{unit}".strip() for name, value in known.items())
-        rows.append(
-            [
-                what,
-                target,
-                text or "not measured",
-                "met" if known and all(map(met, known.values())) else "not met",
-            ]
-        )
 
-    for what, key in (("seconds", "seconds"), ("CPU", "cpu")):
-        add(
-            f"LP and MPS, {half} x {half}, linopy over ours ({what})",
-            "at least 10",
-            {s.upper(): at.ratio(at("linopy", half, s), at("ours", half, s), key) for s in ("lp", "mps")},
-            lambda value: value >= 10,
-        )
-    pyomo = {
-        f"{name} {suffix}": at.ratio(*pair(at, name, suffix, middle))
+def target(what: str, values: dict[str, float | None], met: str, limit: float, unit: str = "") -> list[str]:
+    """A line: what is measured, the target (a word of MET and a limit), the values known, and whether they meet it."""
+    known = {name: value for name, value in values.items() if value is not None}
+    text = ", ".join(f"{name} {value:.3g}{unit}".strip() for name, value in known.items())
+    reached = bool(known) and all(MET[met](value, limit) for value in known.values())
+    return [what, f"{met} {limit:g}{unit}", text or "not measured", "met" if reached else "not met"]
+
+
+def linopy_target(at: Page, size: int, what: str) -> list[str]:
+    """linopy over ours."""
+    ratios = {s.upper(): at.ratio(at("linopy", size, s), at("ours", size, s), what) for s in ("lp", "mps")}
+    return target(f"LP and MPS, {size} x {size}, linopy over ours ({WHAT[what]})", ratios, "at least", 10)
+
+
+def pyomo_target(at: Page, names: Sequence[str], size: int, what: str) -> list[str]:
+    """Pyomo over ours, where that is least."""
+    ratios = {
+        f"{name} {suffix}": at.ratio(*pair(at, name, suffix, size), what)
         for name in names
         for suffix in ("nl", "lp", "mps", "gms")
     }
-    least = min(((value, name) for name, value in pyomo.items() if value is not None), default=(None, ""))
-    add(
-        f"any formulation and format, {middle} x {middle}, Pyomo over ours (seconds)",
-        "at least 40",
-        {f"least ({least[1]})": least[0]},
-        lambda value: value >= 40,
-    )
-    cpu = {
-        f"{name} {suffix}": at.ratio(*pair(at, name, suffix, middle), "cpu")
-        for name in names
-        for suffix in ("nl", "lp", "mps", "gms")
+    least = min(((value, name) for name, value in ratios.items() if value is not None), default=(None, ""))
+    title = f"any formulation and format, {size} x {size}, Pyomo over ours ({WHAT[what]})"
+    return target(title, {f"least ({least[1]})": least[0]}, "at least", 40)
+
+
+def write_target(at: Page, half: int, big: int) -> list[str]:
+    """Ours over one write of the same bytes."""
+    ratios = {
+        f"{s.upper()} {size}": at.ratio(at("ours", size, s), at("copied", size, s))
+        for s in ("lp", "mps")
+        for size in (half, big)
     }
-    least = min(((value, name) for name, value in cpu.items() if value is not None), default=(None, ""))
-    add(
-        f"any formulation and format, {middle} x {middle}, Pyomo over ours (CPU)",
-        "at least 40",
-        {f"least ({least[1]})": least[0]},
-        lambda value: value >= 40,
-    )
-    add(
-        "ours over one write of the same bytes (seconds)",
-        "at most 3",
-        {
-            f"{s.upper()} {size}": at.ratio(at("ours", size, s), at("copied", size, s))
-            for s in ("lp", "mps")
-            for size in (half, big)
-        },
-        lambda value: value <= 3,
-    )
-    every = [at("everything", big, "scalar", MILP, jobs) for jobs in (1, 2)]
-    add(
-        f"{big} x {big}, all formats",
-        "under 30 s",
-        {f"{jobs} at once": f and f["seconds"] for jobs, f in zip((1, 2), every, strict=True)},
-        lambda value: value < 30,
-        " s",
-    )
-    add(
-        "its peak memory",
-        "under 2 GB",
-        {f"{jobs} at once": f and f["memory"] / 1e9 for jobs, f in zip((1, 2), every, strict=True)},
-        lambda value: value < 2,
-        " GB",
-    )
-    for what in ("seconds", "cpu", "memory"):
-        grown = {
-            s.upper(): at.ratio(at("ours", big, s, MILP, *d), at("ours", half, s, MILP, *d), what)
-            for s, d in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ("scalar",)))
-        }
-        add(f"growth of {what} from {half} to {big}", "below 4.4", grown, lambda value: value < 4.4)
-    small = at("everything", min(24, big), "indexed", "all", 1)
-    add(
-        "size 24, all formulations in all formats",
-        "under 2 s",
-        {"": small and small["seconds"]},
-        lambda value: value < 2,
-        " s",
-    )
-    add("`crossfield --help`", "under 0.4 s", {"": at.document["help"]}, lambda value: value < 0.4, " s")
-    add(
-        f"a solution of {pixels} x {pixels} pixels (4 million columns at 552) to a field",
-        "under 4 s",
-        {
-            name: found and found["seconds"]
-            for name, found in (
-                ("HiGHS", at("solution", pixels, "highs")),
-                ("AMPL", at("solution", pixels, "ampl")),
-            )
-        },
-        lambda value: value < 4,
-        " s",
-    )
-    return rows
+    return target("ours over one write of the same bytes (seconds)", ratios, "at most", 3)
+
+
+def everything_targets(at: Page, size: int) -> list[list[str]]:
+    """All formats of the largest size: seconds and memory."""
+    runs = {f"{jobs} at once": at("everything", size, "scalar", MILP, jobs) for jobs in (1, 2)}
+    spent = {name: found and found["seconds"] for name, found in runs.items()}
+    peak = {name: found and found["memory"] / 1e9 for name, found in runs.items()}
+    return [
+        target(f"{size} x {size}, all formats", spent, "under", 30, " s"),
+        target("its peak memory", peak, "under", 2, " GB"),
+    ]
+
+
+def growth_target(at: Page, half: int, big: int, what: str) -> list[str]:
+    """How much more four times the pixels take."""
+    grown = {
+        s.upper(): at.ratio(at("ours", big, s, MILP, *rest), at("ours", half, s, MILP, *rest), what)
+        for s, rest in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ("scalar",)))
+    }
+    return target(f"growth of {WHAT.get(what, what)} from {half} to {big}", grown, "below", 4.4)
+
+
+def small_targets(at: Page, size: int) -> list[list[str]]:
+    """What is small: one drawing in everything, and the help."""
+    found = at("everything", size, "indexed", "all", 1)
+    spent = {"": found and found["seconds"]}
+    return [
+        target(f"size {size}, all formulations in all formats", spent, "under", 2, " s"),
+        target("`crossfield --help`", {"": at.document["help"]}, "under", 0.4, " s"),
+    ]
+
+
+def solution_target(at: Page, pixels: int) -> list[str]:
+    """Reading a large solution back."""
+    runs = {name: at("solution", pixels, suffix) for name, suffix in (("HiGHS", "highs"), ("AMPL", "ampl"))}
+    spent = {name: found and found["seconds"] for name, found in runs.items()}
+    title = f"a solution of {pixels} x {pixels} pixels (4 million columns at 552) to a field"
+    return target(title, spent, "under", 4, " s")
 
 
 def pair(at: Page, name: str, suffix: str, size: int) -> tuple[Found | None, Found | None]:
