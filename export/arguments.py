@@ -69,7 +69,9 @@ Names = Annotated[
 ]
 Formats = Annotated[
     list[str] | None,
-    typer.Option("-F", "--format", metavar="NAME", help="Format, may be repeated; all by default."),
+    typer.Option(
+        "-F", "--format", metavar="NAME", help="Format, may be repeated; by default nl, gms, lp and mps."
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 Json = Annotated[bool, typer.Option("--json", help="The result as JSON on standard output.")]

@@ -78,7 +78,7 @@ EXTERNALS: Final = {
             "integers and a quadratic objective": Refusal("solve", "HiGHS reads an MIQP, but does not solve it"),
             "a non-convex quadratic objective": Refusal("solve", "HiGHS solves convex QPs only, and may call a stationary point of another one optimal"),
         }),
-        External("scip", "SCIP", ("nl", "mps", "lp")),
+        External("scip", "SCIP", ("nl", "mps", "lp", "osil")),
         External("baron", "BARON", ("gms", "nl"), {"a cosine": Refusal("solve", "BARON has no trigonometric functions; write minlp-quartic, which is the same problem")}),
         External("bonmin", "Bonmin", ("nl", "gms"), {"non-convexity": Refusal("local", "Bonmin is exact for convex problems, elsewhere a heuristic")}),
         External("ipopt", "Ipopt", ("nl", "gms"), {
@@ -91,7 +91,7 @@ EXTERNALS: Final = {
             "non-convexity": Refusal("solve", "CPLEX takes convex problems up to quadratic"),
         }),
         External("cbc", "CBC", ("mps", "lp"), {"anything beyond linear": Refusal("read", _LINEAR_ONLY)}),
-        External("glpk", "GLPK", ("mps", "lp"), {"anything beyond linear": Refusal("read", _LINEAR_ONLY)}),
+        External("glpk", "GLPK", ("mps", "lp", "mod"), {"anything beyond linear": Refusal("read", _LINEAR_ONLY)}),
     )
 }  # fmt: skip
 """The table of solvers; `crossfield list`, the manifests, the verification and the docs are generated from it."""

@@ -1,22 +1,25 @@
-"""GLPK's executable as a consumer of LP and MPS. It takes linear models only.
+"""GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
 
-What it read is told by its own dump of the model (--wglp), in fifteen digits.
+What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective is a row there as well,
+and columns are indexed: alpha[1,2].
 """
 
 from __future__ import annotations
 
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from .consumers import Refused, program
-from .meaning import Meaning, Outcome, terms
+from .consumers import CONSUMERS, Refused, program
+from .meaning import Evaluation, Meaning, Outcome, Points, terms
 from .solution_text import Status
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps"}
+_OBJECTIVE: Final = "energy"
 
 
 def version() -> str:
@@ -27,9 +30,10 @@ def version() -> str:
 
 
 def _run(path: Path, *arguments: str) -> str:
-    kind = _KINDS[path.suffix.removeprefix(".")]
+    kind = path.suffix.removeprefix(".")
+    given = ["--model", str(path), "--data", str(path.with_suffix(".dat"))] if kind == "mod" else [_KINDS[kind], str(path)]  # fmt: skip
     done = subprocess.run(
-        [program("glpk"), kind, str(path), *arguments],
+        [program("glpk"), *given, *arguments],
         check=False,
         capture_output=True,
         text=True,
@@ -63,7 +67,7 @@ def read(path: Path) -> Meaning:
     row_lower, row_upper = _limits(lines, "i", len(names["i"]), 2)
     continuous = {int(line[1]) - 1 for line in lines if line[0] == "j" and line[2] == "c"}
     integer = [mixed and place not in continuous for place in range(len(costs))]  # binary by default
-    return Meaning.of(
+    model = Meaning.of(
         names["j"],
         names["i"],
         lower=lower,
@@ -74,6 +78,53 @@ def read(path: Path) -> Meaning:
         row_upper=row_upper,
         matrix=terms([e[:2] for e in rest], [e[2] for e in rest], indices=2),
     )
+    return _without_objective(model, path) if path.suffix == ".mod" else model
+
+
+def evaluate(path: Path, points: Points) -> Evaluation:
+    """The AMPL model as GLPK reads it; it leaves columns out that are in no term, as AMPL does."""
+    model = read(path)
+    given = points.of(model.columns)
+    return Evaluation(
+        model.columns,
+        model.lower,
+        model.upper,
+        model.integer,
+        model.rows,
+        model.row_lower,
+        model.row_upper,
+        model.objective(given),
+        model.activities(given),
+        rounding=CONSUMERS["glpk"].tolerance,
+        may_lack=True,
+    )
+
+
+def _without_objective(model: Meaning, path: Path) -> Meaning:
+    """The model under our names, its objective not among the rows."""
+    goal = model.rows.index(_OBJECTIVE)
+    kept = model.matrix_at[model.matrix_at[:, 0] != goal]
+    return replace(
+        model,
+        columns=_ours(model.columns, path),
+        rows=_ours([name for name in model.rows if name != _OBJECTIVE], path),
+        row_lower=np.delete(model.row_lower, goal),
+        row_upper=np.delete(model.row_upper, goal),
+        matrix_at=np.stack([kept[:, 0] - (kept[:, 0] > goal), kept[:, 1]], axis=1),
+        matrix=model.matrix[model.matrix_at[:, 0] != goal],
+    )
+
+
+def _ours(names: list[str], path: Path) -> list[str]:
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as the model prints answers."""
+    printed = re.search(r"_%0(\d+)d", path.read_text())
+    assert printed
+    return [_our_name(name, int(printed[1])) for name in names]
+
+
+def _our_name(name: str, digits: int) -> str:
+    stem, index = name.removesuffix("]").split("[")
+    return "_".join([stem, *(part.zfill(digits) if part.isdigit() else part for part in index.split(","))])
 
 
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
@@ -98,6 +149,7 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
     said = _run(path, "--tmlim", str(max(1, round(seconds))), "--wglp", "model.glp", "-w", "answer.txt")
     names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
+    names = _ours(names, path) if path.suffix == ".mod" else names
     answer = [line.split() for line in Path("answer.txt").read_text().splitlines()]
     head = next(line for line in answer if line[0] == "s")
     place = 2 if head[1] == "mip" else 3

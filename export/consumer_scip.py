@@ -1,6 +1,6 @@
-"""SCIP as a consumer of LP, MPS and .nl, through PySCIPOpt.
+"""SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
-A quadratic or nonlinear objective is a row with a variable of its own there. SCIP evaluates no nonlinear row at a point, but it
+A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed variable. SCIP evaluates no nonlinear row at a point, but it
 judges points: at a feasible one the objective is within a hair of ours when a hair more is feasible and a hair less is not.
 """
 
@@ -18,7 +18,8 @@ from .meaning import Evaluation, Meaning, Outcome, Points, Terms, terms
 from .solution_text import Status
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
-_OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar"})
+_CONSTANT: Final = "objconstvar"
+_OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar", _CONSTANT})
 _OBJECTIVE_ROWS: Final = frozenset({"quadobj", "qmatrix", "objcons"})
 _HAIR: Final = 1e-5
 
@@ -106,11 +107,11 @@ def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The .nl file as SCIP reads it: columns, and its judgement of the objective at the feasible points. Linear rows are evaluated."""
+    """The .nl or OSiL file as SCIP reads it: columns, and its judgement of the objective at the feasible points. Linear rows are evaluated."""
     scip = _load(path)
-    columns, row_names = file_names(path)
     variables = {v.name: v for v in scip.getVars()}
-    rows = {row.name: row for row in scip.getConss()}
+    rows = {row.name: row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS}
+    columns, row_names = file_names(path) if path.suffix == ".nl" else (points.names, list(rows))
     ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
     row_lower, row_upper = _limits([_row_limits(scip, rows[name]) for name in row_names])
@@ -151,9 +152,13 @@ def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
 
 def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float) -> float:
     """The claimed objective at a feasible point when SCIP agrees to within a hair, else infinity."""
-    extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS]
+    extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS - {_CONSTANT}]
     rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
     solution = scip.createSol()
+    if _CONSTANT in variables:
+        constant = variables[_CONSTANT].getLbOriginal()
+        scip.setSolVal(solution, variables[_CONSTANT], constant)
+        rest += constant
     for name, value in zip(columns, point, strict=True):
         scip.setSolVal(solution, variables[name], value)
 

@@ -4,7 +4,7 @@ A consumer's module (`consumer_<name>.py`) is imported in a child process only (
 
     version() -> str                                 of the program
     read(path) -> Meaning                            the algebra of an LP or MPS file, where it tells it
-    evaluate(path, points) -> Evaluation             the behaviour of an .nl or GAMS file
+    evaluate(path, points) -> Evaluation             the behaviour of a file of another format
     solve(path, seconds, solver) -> Outcome          its answer, where it solves
 
 and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
@@ -72,9 +72,9 @@ CONSUMERS: Final = {
         Consumer("gurobi", "Gurobi", ("lp", "mps"), (), "gurobipy", "pip install gurobipy", ("gurobi",), free="2000 columns and rows, 200 columns with quadratic terms"),
         Consumer("cplex", "CPLEX", ("lp", "mps"), (), "cplex", "pip install cplex", ("cplex",), 1e-15, "1000 columns and 1000 rows"),
         Consumer("xpress", "Xpress", ("lp", "mps"), (), "xpress", "pip install xpress", ("xpress",), free="5000 rows and columns, 200 with quadratic terms"),
-        Consumer("scip", "SCIP", ("lp", "mps"), ("nl",), "pyscipopt", "pip install pyscipopt", ("scip",)),
+        Consumer("scip", "SCIP", ("lp", "mps"), ("nl", "osil"), "pyscipopt", "pip install pyscipopt", ("scip",)),
         Consumer("cbc", "CBC", ("lp", "mps"), (), "cbc", "apt install coinor-cbc", ("cbc",), 1e-6),
-        Consumer("glpk", "GLPK", ("lp", "mps"), (), "glpsol", "apt install glpk-utils", ("glpk",), 1e-14),
+        Consumer("glpk", "GLPK", ("lp", "mps"), ("mod",), "glpsol", "apt install glpk-utils", ("glpk",), 1e-14),
         Consumer("asl", "AMPL Solver Library", (), ("nl",), "gjh_asl_json", "apt install gjh-asl-json", ()),
         Consumer("casadi", "CasADi", (), ("nl",), "casadi", "pip install casadi", ("ipopt", "bonmin")),
         Consumer("gams", "GAMS", (), ("gms",), "gamspy_base", "pip install gamspy_base gamspy_baron", ("gams-cplex", "baron"), free="2000 linear or 1000 nonlinear columns and rows, 50 for BARON"),

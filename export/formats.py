@@ -46,12 +46,36 @@ def _mps(problem: Problem, header: list[str], _start: Floats | None, _dialect: s
     return mps.generate(problem, header)
 
 
+def _mod(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import mod
+
+    return mod.generate(problem, header)
+
+
+def _osil(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import osil
+
+    return osil.generate(problem, header)
+
+
+def _qplib(problem: Problem, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import qplib
+
+    return qplib.generate(problem, header, start=start)
+
+
+def _bar(problem: Problem, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import bar
+
+    return bar.generate(problem, header, start=start)
+
+
 @dataclass(frozen=True)
 class Format:
     """A file format: what it carries and how it is written.
 
     degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default first;
-    starts: whether a starting point has a place in it.
+    starts: whether a starting point has a place in it; default: whether it is written when no format is asked for.
     """
 
     name: str
@@ -60,6 +84,7 @@ class Format:
     generate: Callable[[Problem, list[str], Floats | None, str], Iterator[bytes]]
     dialects: tuple[str, ...] = ("",)
     starts: bool = False
+    default: bool = True
 
     @property
     def suffix(self) -> str:
@@ -74,9 +99,16 @@ FORMATS: Final = {
         Format("gms", "GAMS model, self-contained: sets and equations, or scalar", ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True),
         Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
         Format("mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _mps),
+        Format("mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too", ANY_DEGREE, _mod, default=False),
+        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, _osil, default=False),
+        Format("qplib", "QPLIB's own format, at most quadratic", 2, _qplib, starts=True, default=False),
+        Format("bar", "BARON's own format, polynomials", 4, _bar, starts=True, default=False),
     )
 }  # fmt: skip
 """The table of formats; command line, docs and tests are generated from it."""
+
+DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.default)
+"""Names of the formats that are written when none is asked for."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +160,9 @@ def carried(problem: Problem, entry: Format) -> Problem:
             return other
     instead = problem.formulation.equivalent
     remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
+    limit = "quadratic" if entry.degree == 2 else f"polynomials of degree {entry.degree}"
     raise UnsupportedByFormatError(
-        f"{entry.name} holds nothing beyond quadratic and cannot carry {problem.name}; {remedy}"
+        f"{entry.name} holds nothing beyond {limit} and cannot carry {problem.name}; {remedy}"
     )
 
 
@@ -151,7 +184,9 @@ def header(problem: Problem) -> list[str]:
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:
-    """What was written to `path`: its suffix names the format, `.gz` compresses; .nl gets .row and .col beside it.
+    """What was written to `path`: its suffix names the format, `.gz` compresses.
+
+    .nl gets .row and .col beside it, .mod its .dat.
 
     dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point is the starting point
     where the format has a place for one. Same problem, same bytes. Raises UnsupportedByFormatError before a byte is written,
@@ -167,17 +202,25 @@ def write(
     held = carried(problem, entry)
     point = held.point(start) if start is not None and entry.starts else None
     written = Written(entry.name, chosen, held)
-    written.files[path.name] = save(path, entry.generate(held, header(held), point, chosen))
-    if entry.name == "nl":
-        _save_names(path, held, written)
+    lines = header(held)
+    written.files[path.name] = save(path, entry.generate(held, lines, point, chosen))
+    for beside, content in _companions(path, entry.name, held, lines):
+        written.files[beside.name] = save(beside, content)
     return written
 
 
-def _save_names(path: Path, problem: Problem, written: Written) -> None:
-    from . import nl
+def _companions(
+    path: Path, name: str, problem: Problem, lines: list[str]
+) -> Iterator[tuple[Path, Iterator[bytes]]]:
+    """The files beside one that is written: names of an .nl, never compressed, and data of a .mod, which are when it is."""
+    stem = path.name.removesuffix(".gz").removesuffix(f".{name}")
+    if name == "nl":
+        from . import nl
 
-    layout = nl.Layout(problem)
-    stub = path.with_name(path.name.removesuffix(".gz").removesuffix(".nl"))
-    for suffix, names in ((".row", layout.row_file()), (".col", layout.column_file())):
-        path = stub.with_name(stub.name + suffix)
-        written.files[path.name] = save(path, names)
+        layout = nl.Layout(problem)
+        yield path.with_name(f"{stem}.row"), layout.row_file()
+        yield path.with_name(f"{stem}.col"), layout.column_file()
+    if name == "mod":
+        from . import mod
+
+        yield path.with_name(f"{stem}.dat{'.gz' if path.suffix == '.gz' else ''}"), mod.data(problem, lines)

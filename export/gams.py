@@ -105,8 +105,8 @@ def bracketed(values: Floats) -> Texts:
     return np.where(values < 0, np.strings.add(np.strings.add(b"(", texts), b")"), texts)
 
 
-class _Scalar(Language):
-    """The language of one family: symbols are column names, data are numbers, one per record."""
+class Scalar(Language):
+    """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
     def __init__(self, family: Bound, names: Names) -> None:
         self._family = family
@@ -114,20 +114,25 @@ class _Scalar(Language):
         self._variables = set(family.variables)
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
+        """A column's name at each element."""
         return self._names.at(self._family, symbol)
 
     def is_data(self, expression: sp.Expr) -> bool:
+        """Whether it holds no column."""
         return not expression.free_symbols & self._variables
 
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """One number an element."""
         return _number_words(self._family.data(expression), signed=signed)
 
     def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """One number an element; raises UnsupportedByFormatError for an extreme one."""
         values = self._family.data(expression)
         check_coefficients(values, f"family {self._family.family.tag}")
         return _number_words(values, signed=signed)
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
+        """A power as GAMS writes it."""
         return power(base, exponent)
 
 
@@ -136,7 +141,7 @@ def _number_words(values: Floats | float, *, signed: bool) -> Piece:
     return words(given, with_sign if signed else bracketed)
 
 
-def _declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
+def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
     """A statement that declares names, given as lists with their lengths, as one wrapped list."""
     per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
     total = sum(count for _, count in lists)
@@ -152,12 +157,12 @@ def _declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes
 def _variables(problem: Problem, names: Names) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
-            yield from _declared(_keyword(block), [(names.of(block), block.count)])
+            yield from declared(_keyword(block), [(names.of(block), block.count)])
 
 
 def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
     if problem.rows:
-        yield from _declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
+        yield from declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
 
 
 def _keyword(block: Block) -> bytes:
@@ -169,13 +174,13 @@ def _keyword(block: Block) -> bytes:
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     """The terms of the objective, one line an element (more when it is long)."""
     for family in problem.objective:
-        terms = _Scalar(family, names).summands(family.family.expression)
+        terms = Scalar(family, names).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
 def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
-        language, relation = _Scalar(family, names), family.family.expression
+        language, relation = Scalar(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
         parts = [
             names.row(family),

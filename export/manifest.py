@@ -34,7 +34,7 @@ from ..models.instance_file import check_schema, check_version, parse_json, read
 from ..models.problem import Problem, formulate
 from ..models.storage import make_folder, read_bytes, write_bytes
 from .capabilities import smallest, takers
-from .formats import FORMATS, Written, generator, write
+from .formats import DEFAULTS, FORMATS, Written, generator, write
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -112,7 +112,7 @@ def read_manifest(path: str | Path) -> Manifest:
 def write_problem(
     problem: Problem,
     folder: str | Path,
-    formats: Iterable[str] = tuple(FORMATS),
+    formats: Iterable[str] = DEFAULTS,
     *,
     start: CrossField | None = None,
     dialects: dict[str, str] | None = None,
@@ -200,7 +200,7 @@ def write_all(
     instance: Instance,
     folder: str | Path,
     formulations: Iterable[str] = tuple(FORMULATIONS),
-    formats: Iterable[str] = tuple(FORMATS),
+    formats: Iterable[str] = DEFAULTS,
     *,
     start: CrossField | None = None,
     options: dict[str, Any] | None = None,

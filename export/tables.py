@@ -9,6 +9,7 @@ from ..models.formulations import FORMULATIONS, declare
 from ..models.problem import Problem
 from ..models.samples import sample, samples
 from .capabilities import EXTERNALS, smallest, takers
+from .consumers import CONSUMERS
 from .formats import FORMATS, carried
 from .readers import READERS
 from .solvers import SOLVERS, refusal
@@ -24,7 +25,10 @@ def tables() -> Tables:
             ("name", "paper", "class", "summary", *FORMATS),
             [_formulation_row(problem) for problem in smallest_problems()],
         ),
-        "formats": (("name", "dialects", "summary"), [_format_row(name) for name in FORMATS]),
+        "formats": (
+            ("name", "written", "dialects", "verified by", "summary"),
+            [_format_row(name) for name in FORMATS],
+        ),
         "solvers": (
             ("formulation", *SOLVERS),
             [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
@@ -88,7 +92,14 @@ def _carriage(problem: Problem, name: str) -> str:
 
 def _format_row(name: str) -> Row:
     entry = FORMATS[name]
-    return {"name": name, "dialects": ", ".join(filter(None, entry.dialects)), "summary": entry.summary}
+    readers = [consumer.title for consumer in CONSUMERS.values() if name in consumer.formats]
+    return {
+        "name": name,
+        "written": "by default" if entry.default else "when asked for",
+        "dialects": ", ".join(filter(None, entry.dialects)),
+        "verified by": ", ".join(readers) or "none",
+        "summary": entry.summary,
+    }
 
 
 def _solver_row(problem: Problem, relaxed: bool) -> Row:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import make_field, make_instance, make_problem
-from crossfield.export.formats import FORMATS, format_of, write
+from crossfield.export.formats import DEFAULTS, format_of, write
 from crossfield.export.manifest import read_manifest, write_all, write_problem
 from crossfield.models.errors import (
     FormulationError,
@@ -97,7 +97,7 @@ def test_compressed_files_hold_the_same_bytes(tmp_path):
     write_problem(problem, tmp_path / "plain")
     manifest = write_problem(problem, tmp_path / "small", compress=True)
     packed = [entry["name"] for entry in manifest.document["files"] if entry["name"].endswith(".gz")]
-    assert [Path(name).suffixes[-2:] for name in packed] == [[f".{name}", ".gz"] for name in FORMATS]
+    assert [Path(name).suffixes[-2:] for name in packed] == [[f".{name}", ".gz"] for name in DEFAULTS]
     for name in packed:
         plain = (tmp_path / "plain" / name.removesuffix(".gz")).read_bytes()
         assert gzip.decompress((tmp_path / "small" / name).read_bytes()) == plain
@@ -318,10 +318,10 @@ def test_problems_that_no_manifest_records(tmp_path):
 
 def test_unknown_formats_dialects_and_folders(tmp_path):
     problem = make_problem("qp-fixed", make_instance())
-    with pytest.raises(InputError, match="no format 'bar'; choose one of nl, gms, lp, mps"):
-        write_problem(problem, tmp_path, ["bar"])
-    with pytest.raises(InputError, match=r"model\.bar: no format has the suffix 'bar'"):
-        write(problem, tmp_path / "model.bar")
+    with pytest.raises(InputError, match="no format 'ps'; choose one of nl, gms, lp, mps"):
+        write_problem(problem, tmp_path, ["ps"])
+    with pytest.raises(InputError, match=r"model\.ps: no format has the suffix 'ps'"):
+        write(problem, tmp_path / "model.ps")
     with pytest.raises(InputError, match="nl has no dialect 'indexed'; choose one of text, binary"):
         write(problem, tmp_path / "model.nl", dialect="indexed")
     with pytest.raises(InputError, match="lp has no dialect 'text'; choose one of none"):
