@@ -6,16 +6,16 @@ Every number in the docs comes from here. Sizes, seeds and time limits stand in 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.formats import FORMATS
-from crossfield.export.stages import fit_angles, two_stage
+from crossfield.export.formats import DEFAULTS
+from crossfield.export.methods import METHODS, Candidate, Request
 from crossfield.export.tables import sample_rows, tables
-from crossfield.models.field import CrossField
 from crossfield.models.formulations import FORMULATIONS, declare
 from crossfield.models.instance import GAUGES, Gauge, Instance
 from crossfield.models.latex import latex
@@ -68,18 +68,12 @@ and $[0, \pi/2]$ elsewhere; under `box` it is $[0, \pi/2]$ everywhere, as printe
 from the windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper prints it."""
 
 
-def methods(instance: Instance) -> dict[str, CrossField]:
+def methods(instance: Instance) -> Iterator[Candidate]:
     """Every field that a run considers."""
-    limits = cf.Limits(seconds=SECONDS)
-    greedy, power = cf.greedy(instance), cf.power_field(instance)
-    both = two_stage(instance, limits=limits, start=greedy)
-    return {
-        "power field": power,
-        "power field + QP": fit_angles(power, limits=limits).field,
-        "greedy": greedy,
-        "MILP": both.milp.field,
-        "MILP + QP": both.field,
-    }
+    with tempfile.TemporaryDirectory() as folder:
+        request = Request(instance, Path(folder), cf.Limits(seconds=SECONDS))
+        for method in METHODS.values():
+            yield from method.find(request)
 
 
 def accuracy() -> None:
@@ -89,7 +83,8 @@ def accuracy() -> None:
         for size in (24, 48) if entry.kind == "analytic" else ():
             known = cf.analytic(name, size)
             share = len(known.instance.theta) / known.instance.grid.size
-            for method, found in methods(known.instance).items():
+            for candidate in methods(known.instance):
+                found = candidate.field
                 error = np.degrees(found.cross_error(known.u_angle, known.v_angle))
                 numbers = [error.mean(), np.median(error), np.percentile(error, 95), found.energy(2).total]
                 rows.append(
@@ -97,7 +92,7 @@ def accuracy() -> None:
                         name,
                         str(size),
                         f"{share:.0%}",
-                        method,
+                        candidate.method,
                         *(f"{value:.2f}" for value in numbers),
                         str(len(found.singularities.index)),
                     ]
@@ -118,8 +113,9 @@ def accuracy() -> None:
 {said("python docs/make.py accuracy")}
 
 Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one; over all pixels. Strokes are
-exact curvature lines of both families. The MILP is given {SECONDS:g} s and the greedy field as its incumbent; it minimises the 1-norm energy,
-and a lower 1-norm energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest 2-norm energy.
+exact curvature lines of both families. Search and MILP are given {SECONDS:g} s each, and start from the greedy field, improved. The MILP minimises
+the 1-norm energy, and a lower 1-norm energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest
+2-norm energy.
 
 {markdown(columns, rows)}
 """
@@ -230,7 +226,7 @@ def pictures() -> None:
 def readme() -> None:
     """The tables inside README.md, between their markers."""
     _, rows = tables()["formulations"]
-    shown = ("name", "paper", "class", *FORMATS)
+    shown = ("name", "paper", "class", *DEFAULTS)
     replace_between(
         "formulations",
         markdown(shown, [[f"`{row['name']}`", *(str(row[column]) for column in shown[1:])] for row in rows]),

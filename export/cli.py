@@ -8,7 +8,7 @@ from __future__ import annotations
 import signal
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 
 import typer
 
@@ -46,14 +46,15 @@ from .console import (
     show_manifests,
     show_report,
     show_samples,
-    show_solution,
 )
+from .inputs import DEFAULT_SIZE, known, load, options_of, start_field
+from .library_command import library
+from .solve_command import solve_command, tell_solution
 from .verify_command import verify_command
 
 if TYPE_CHECKING:
     from ..models.field import CrossField
-    from ..models.instance import Gauge, Instance
-    from .solution import Solution
+    from ..models.instance import Instance
 
 app = typer.Typer(
     name="crossfield",
@@ -64,7 +65,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-_DEFAULT_SIZE: Final = 24
 _STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
 
 
@@ -107,7 +107,7 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = _load(sketch, size, mask, gauge)
+        instance = load(sketch, size, mask, gauge)
         dialects = _dialects(gams_layout, nl_form)
         report = run(
             instance,
@@ -140,7 +140,7 @@ def instance_command(
     _require_suffix(output, (".json", ".npz"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = _load(sketch, size, mask, gauge)
+        instance = load(sketch, size, mask, gauge)
         write_instance(instance, output)
     if not quiet:
         say(f"{output}: {described(instance)}")
@@ -170,24 +170,24 @@ def export_command(
 ) -> None:
     """Write an instance (or sketch, or sample) as solver files: every formulation in every format, with manifests."""
     from ..models.formulations import FORMULATIONS
-    from .formats import FORMATS
+    from .formats import DEFAULTS, FORMATS
     from .manifest import write_all
     from .starts import write_starts
 
     formulations, formats = (
-        _known(formulation, FORMULATIONS, "formulation"),
-        _known(file_format, FORMATS, "format"),
+        known(formulation, FORMULATIONS, "formulation"),
+        known(file_format or list(DEFAULTS), FORMATS, "format"),
     )
     with progress(quiet=quiet) as show:
-        loaded = _load(instance, size, mask, gauge)
-        field = None if start is None else _start(start, loaded)
+        loaded = load(instance, size, mask, gauge)
+        field = None if start is None else start_field(start, loaded)
         manifests = write_all(
             loaded,
             output,
             formulations,
             formats,
             start=field,
-            options=_options(facet, stroke_norm, beta_norm, relax=relax),
+            options=options_of(facet, stroke_norm, beta_norm, relax=relax),
             dialects=_dialects(gams_layout, nl_form),
             compress=compress,
             jobs=jobs,
@@ -203,68 +203,6 @@ def export_command(
         say_json([manifest.document for manifest in manifests])
     elif not quiet:
         show_manifests(manifests, output)
-
-
-@app.command("solve")
-def solve_command(
-    instance: What,
-    output: Folder,
-    *,
-    formulation: Annotated[
-        str, typer.Option("-f", "--formulation", metavar="NAME", help="Formulation to solve.")
-    ],
-    solver: Annotated[
-        str | None,
-        typer.Option(
-            "--solver", metavar="NAME", help="highs, ipopt or bonmin; by default the one for the class."
-        ),
-    ] = None,
-    size: Size = None,
-    mask: Mask = None,
-    gauge: GaugeName = None,
-    facet: Facet = None,
-    stroke_norm: StrokeNorm = None,
-    beta_norm: BetaNorm = None,
-    relax: Relax = False,
-    start: Start = None,
-    time_limit: Seconds = 60.0,
-    gap: Gap = 1e-6,
-    threads: Threads = 0,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:
-    """Solve one formulation here, started from the greedy baseline; leaves file, log, solution and field in the folder.
-
-    Ctrl-C ends the search and keeps the best point so far.
-    """
-    from ..models.field_file import write_field
-    from ..models.formulations import FORMULATIONS
-    from ..models.greedy import greedy
-    from ..models.problem import formulate
-    from .solvers import Limits, solve
-
-    limits = Limits(time_limit, gap, threads)
-    (name,) = _known([formulation], FORMULATIONS, "formulation")
-    with progress(quiet=quiet) as show:
-        loaded = _load(instance, size, mask, gauge)
-        show("greedy start" if start is None else "reading the start")
-        first = greedy(loaded) if start is None else _start(start, loaded)
-        jumps = first.p if FORMULATIONS[name].fixed else None
-        problem = formulate(loaded, name, p=jumps, **_options(facet, stroke_norm, beta_norm, relax=relax))
-        show(f"solving {name}, at most {time_limit:g} s; Ctrl-C keeps the best point so far")
-        solution = solve(problem, solver, output, limits=limits, start=first)
-        target = output / f"{loaded.name}.{name}.field.npz"
-        if solution.point is None:
-            target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one
-        else:
-            write_field(solution.field, target)
-    _tell(solution, target, quiet=quiet, as_json=as_json)
-    if solution.point is None:
-        words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
-        raise InputError(
-            f"the solver found no point ({words}); give it more time or another start, and see its log",
-            file=output,
-        )
 
 
 @app.command("read")
@@ -294,7 +232,7 @@ def read_command(
                 f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution
             )
         write_field(found.field, output)
-    _tell(found, output, quiet=quiet, as_json=as_json)
+    tell_solution(found, output, quiet=quiet, as_json=as_json)
 
 
 @app.command("draw")
@@ -347,14 +285,16 @@ def samples_command(*, as_json: Json = False) -> None:
     """List the built-in samples."""
     from .tables import sample_rows
 
-    rows = sample_rows(_DEFAULT_SIZE)
+    rows = sample_rows(DEFAULT_SIZE)
     if as_json:
         say_json(rows)
     else:
         show_samples(rows)
 
 
+app.command("solve")(solve_command)
 app.command("verify")(verify_command)
+app.add_typer(library, name="library")
 
 
 def main() -> NoReturn:
@@ -392,68 +332,6 @@ def _line(error: Exception) -> str:
     return f"this should not happen, please report it: {type(error).__name__}: {error} (crossfield --debug ... shows where)"
 
 
-def _tell(solution: Solution, field: Path, *, quiet: bool, as_json: bool) -> None:
-    """Print the facts of a solution whose field lies in a file."""
-    from .run import facts_with_energies
-
-    facts = facts_with_energies(solution)
-    if as_json:
-        say_json(facts)
-    elif not quiet:
-        show_solution(solution, facts, field)
-    if solution.interrupted:
-        complain("interrupted; the best point so far was kept")
-
-
-def _load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
-    """The instance, of a size that can be written. Raises InputError."""
-    from ..models.sketch import available_memory, check_memory
-
-    instance = _found(what, size, mask, gauge)
-    check_memory(instance.grid.size, available_memory())
-    return instance
-
-
-def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
-    """The instance of an instance file, a sketch file or a built-in sample, in this order."""
-    from ..models.instance_file import read_instance
-    from ..models.samples import SAMPLES, sample
-    from ..models.sketch import read_sketch
-
-    path = Path(what)
-    pixels = _DEFAULT_SIZE if size is None else size
-    if not path.is_file() and what in SAMPLES:
-        if mask is not None:
-            raise InputError(f"the sample {what} has its own mask; leave --mask out")
-        return sample(what, pixels, gauge or "strokes")
-    if not path.exists():
-        raise InputError(
-            "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
-        )
-    if path.suffix.lower() not in {".json", ".npz"}:
-        return read_sketch(path, size=pixels, mask=mask, gauge=gauge or "strokes")
-    if size is not None or mask is not None:
-        raise InputError(
-            "is an instance, which has its own grid and mask; leave --size and --mask out", file=what
-        )
-    instance = read_instance(path)
-    return instance if gauge is None else instance.with_gauge(gauge)
-
-
-def _start(path: Path, instance: Instance) -> CrossField:
-    """The field in a file, which must be on the instance."""
-    from ..models.field_file import read_field
-
-    field = read_field(path)
-    if field.instance.sha256 != instance.sha256:
-        raise InputError(
-            f"is a field on another instance ({described(field.instance)}), not on this one ({described(instance)}); "
-            "give a field of the same sketch, size and gauge",
-            file=path,
-        )
-    return field
-
-
 def _field_or_instance(path: Path) -> CrossField | Instance:
     from ..models.field_file import read_field
     from ..models.instance_file import read_instance
@@ -471,29 +349,11 @@ def _field_or_instance(path: Path) -> CrossField | Instance:
             raise InputError(f"is no field ({first}) and no instance ({second})", file=path) from as_field
 
 
-def _known(names: list[str] | None, table: dict[str, Any], kind: str) -> list[str]:
-    """The names, each of which is in the table; all of the table when there are none."""
-    for name in names or ():
-        if name not in table:
-            raise InputError(f"there is no {kind} {name!r}; choose one of {', '.join(table)}")
-    return list(dict.fromkeys(names or table))
-
-
 def _require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
     if path.suffix.lower() not in allowed:
         has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
         raise InputError(f"has {has}, which does not say what it is; use {', '.join(allowed)}", file=path)
 
 
-def _options(
-    facet: str | None, stroke_norm: int | None, beta_norm: int | None, *, relax: bool
-) -> dict[str, Any]:
-    return {"facet": facet, "stroke_norm": stroke_norm, "beta_norm": beta_norm, "relax": relax or None}
-
-
 def _dialects(gams_layout: str | None, nl_form: str | None) -> dict[str, str]:
     return {name: value for name, value in (("gms", gams_layout), ("nl", nl_form)) if value}
-
-
-if __name__ == "__main__":
-    main()

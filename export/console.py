@@ -124,8 +124,8 @@ def show_report(report: Report, folder: Path) -> None:
     say(f"  pictures: {folder / 'overview.png'} and others beside it")
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     for candidate in report.candidates:
-        if candidate.solution is not None and candidate.solution.interrupted:
-            complain(f"{candidate.method}: interrupted; its best point so far was kept")
+        if candidate.interrupted:
+            complain(f"{candidate.method}: interrupted; its best field so far was kept")
     for method, reason in report.failures.items():
         complain(f"{method}: {reason}")
 
@@ -178,11 +178,16 @@ _ONLY_IF_ANY: Final = (
 
 def show_solution(solution: Solution, facts: dict[str, Any], field: Path) -> None:
     """Print what a solution claims beside what was recomputed, and where its field lies."""
-    shown = {key: value for key, value in facts.items() if value or key not in _ONLY_IF_ANY}
-    rows = [[key.replace("_", " "), _text(value)] for key, value in shown.items()]
-    show_table(described(solution.problem.instance), ("fact", "value"), rows, header=False)
+    show_facts(described(solution.problem.instance), facts)
     if solution.point is not None:
         say(f"field: {field}")
+
+
+def show_facts(title: str, facts: dict[str, Any]) -> None:
+    """Print facts as a table of two columns."""
+    shown = {key: value for key, value in facts.items() if value or key not in _ONLY_IF_ANY}
+    rows = [[key.replace("_", " "), _text(value)] for key, value in shown.items()]
+    show_table(title, ("fact", "value"), rows, header=False)
 
 
 def _text(value: object) -> str:
@@ -201,7 +206,8 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
     )
     formats, solvers = tables["formats"], tables["solvers"]
     names = [row["name"] for row in formats[1]]
-    show_table("which format carries what", ("formulation", *names), _cells(formulations, ("name", *names)))
+    carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]
+    show_table("which format carries what (--json: what instead)", ("formulation", *names), carried)
     marked = [
         [row[solvers[0][0]], *("yes" if row[name] == "yes" else "-" for name in solvers[0][1:])]
         for row in solvers[1]

@@ -13,7 +13,7 @@ import numpy as np
 from .field import CrossField
 from .free_field import FreeField, parity_sign
 from .grid import Floats, Ints
-from .improvement import settle
+from .improvement import improved, settle
 from .instance import HALF, Instance
 from .quadratic import Solver
 
@@ -26,8 +26,9 @@ def halved(instance: Instance) -> Instance | None:
     A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels' strokes, by the double angle.
     """
     height, width = instance.mask.shape
-    mask = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
-    mask = mask.reshape(mask.shape[0] // 2, 2, mask.shape[1] // 2, 2).any(axis=(1, 3))
+    even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
+    squares = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
+    mask = squares[:, 0, :, 0] | squares[:, 0, :, 1] | squares[:, 1, :, 0] | squares[:, 1, :, 1]
     parent = (instance.stroke_pixels[:, 0] // 2) * mask.shape[1] + instance.stroke_pixels[:, 1] // 2
     weight = np.bincount(parent, instance.w, mask.size)
     turn = [np.bincount(parent, instance.w * f(2 * instance.theta), mask.size) for f in (np.cos, np.sin)]
@@ -49,14 +50,14 @@ def halved(instance: Instance) -> Instance | None:
 def prolonged(coarse: CrossField, instance: Instance) -> CrossField:
     """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
 
-    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the stroke.
+    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the stroke. Then they are improved.
     """
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
     settle(state, Solver())
-    return state.bounded()
+    return improved(state.bounded())
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:

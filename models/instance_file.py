@@ -130,11 +130,11 @@ def of_document(document: object) -> Instance:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
 
-def check_schema(document: object, schema: str) -> dict[str, Any]:
-    """The document, which obeys the shipped `<schema>.schema.json`. Raises InstanceError with the place."""
+def check_schema(document: object, schema: str, package: str = __package__) -> dict[str, Any]:
+    """The document, which obeys the `<schema>.schema.json` that ships with a package. Raises InstanceError with the place."""
     import jsonschema
 
-    errors = jsonschema.Draft202012Validator(_schema(schema)).iter_errors(cast("Any", document))
+    errors = jsonschema.Draft202012Validator(_schema(schema, package)).iter_errors(cast("Any", document))
     error = min(errors, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
     if error is not None:
         raise InstanceError(f"{error.json_path}: {error.message[:200]}")
@@ -142,9 +142,9 @@ def check_schema(document: object, schema: str) -> dict[str, Any]:
 
 
 @cache
-def _schema(name: str) -> dict[str, Any]:
+def _schema(name: str, package: str) -> dict[str, Any]:
     return cast(
-        "dict[str, Any]", json.loads(files(__package__).joinpath(f"{name}.schema.json").read_text("utf-8"))
+        "dict[str, Any]", json.loads(files(package).joinpath(f"{name}.schema.json").read_text("utf-8"))
     )
 
 

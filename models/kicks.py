@@ -51,8 +51,8 @@ class Kicks:
     def shift(self, rng: np.random.Generator, p: Ints) -> Change:
         """The jumps along a random path of blocks, which starts at a singularity every other time."""
         if not len(self._blocks):
-            pair = rng.integers(len(self._window.pairs), size=1)
-            return pair, rng.choice([-1, 1], size=1)
+            pair = rng.integers(len(self._window.pairs), size=1, dtype=np.int32)
+            return pair, rng.choice(np.array([-1, 1], dtype=np.int32), size=1)
         turns = p[self._window.pairs[self._blocks]] @ np.array(_SIDES)
         singular = np.nonzero(turns)[0]
         if len(singular) and rng.random() < 0.5:
@@ -76,7 +76,7 @@ class Kicks:
             if rng.random() < 0.3:
                 side = int(rng.integers(4))
         kept = {pair: step for pair, step in steps.items() if step}
-        return np.array(list(kept), dtype=np.int64), np.array(list(kept.values()), dtype=np.int32)
+        return np.array(list(kept), dtype=np.int32), np.array(list(kept.values()), dtype=np.int32)
 
     def turn(self, rng: np.random.Generator) -> Change:
         """The jumps round the strokes of a disc, of one curve or of all."""
@@ -86,9 +86,9 @@ class Kicks:
         inside = (away <= radius) & (self._curve >= 0)
         if rng.random() < 0.7:
             inside &= self._curve == self._curve[centre]
-        own = inside.astype(np.int32) * int(rng.choice([-1, 1]))
+        own: Ints = inside.astype(np.int32) * np.int32(rng.choice([-1, 1]))
         steps = own[self._window.first] - own[self._window.second]
-        pairs = np.nonzero(steps)[0]
+        pairs = np.nonzero(steps)[0].astype(np.int32)
         return pairs, steps[pairs]
 
 

@@ -58,10 +58,10 @@ class Window:
     def of(cls, instance: Instance, free: Bools) -> Window:
         """The window of the pixels that are free; free has shape (n,)."""
         grid = instance.grid
-        pixels = np.nonzero(free)[0]
-        number = np.full(grid.size, -1)
-        number[pixels] = np.arange(len(pixels))
-        pairs = np.nonzero(free[grid.first] & free[grid.second])[0]
+        pixels = np.nonzero(free)[0].astype(np.int32)
+        number = np.full(grid.size, -1, dtype=np.int32)
+        number[pixels] = np.arange(len(pixels), dtype=np.int32)
+        pairs = np.nonzero(free[grid.first] & free[grid.second])[0].astype(np.int32)
         return cls(instance, pixels, pairs, number[grid.first[pairs]], number[grid.second[pairs]])
 
     @property
@@ -94,7 +94,8 @@ class Landscape:
         inverse = np.linalg.inv(system)
         self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
         self._x = self._inverse @ right
-        self.energy = CrossField(instance, *np.split(self.angles, 2), p).energy().total
+        alpha, beta = np.split(self.angles, 2)
+        self.energy = CrossField(instance, alpha, beta, p).energy().total
         self._lower, self._upper = _bounds(window)
         self._held: dict[int, float] = {}
         self._keep_bounds()
@@ -156,7 +157,9 @@ class Landscape:
         i, j = self.window.first[pairs], self.window.second[pairs]
         q = HALF * steps
         a = self._x[i] - self._x[j] + HALF * self.p[self.window.pairs[pairs]]
-        push = np.bincount(j, 2 * q, len(self._x)) - np.bincount(i, 2 * q, len(self._x))
+        push = np.zeros(len(self._x))
+        np.subtract.at(push, i, 2 * q)
+        np.add.at(push, j, 2 * q)
         # c changes by the sum of 2 q^2 + 4 q (pi/2 p).
         return push, float(np.sum(2 * q * q + 4 * q * a))
 

@@ -39,6 +39,7 @@ _COARSE: Final = 60  # rounds on a grid of lower resolution
 _LATEST: Final = 4  # fields that are brought from there
 _KICKS: Final = 40  # a window
 _SETTLE: Final = 8  # rounds between two improvements of the whole grid
+_IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a window
 _PATIENCE: Final = 200  # kicks a pixel without success that end a search
 _ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
 
@@ -162,8 +163,8 @@ class _Hunt:
 
     def offer(self, field: CrossField) -> None:
         """Go on from this field if it is lower."""
-        if _energy(field) < _energy(self._start):
-            self._start, self._state = field, FreeField.of(field)
+        if field.energy().total < self._state.energy - LOWER:
+            self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
     def run(self, explorers: Explorers, deadline: float, rounds: int | None, progress: Progress) -> str:
@@ -213,6 +214,8 @@ class _Hunt:
             )
         if self._unsettled and (self.round % _SETTLE == 0 or not self.large):
             self._settle()
+        if self.large and self.round % _IMPROVE == 0:
+            self.offer(improved(self.best()))
 
     def _adopt(self, task: Task, better: Better) -> None:
         """Take over a window's angles and jumps if that lowers the energy beside what else was taken over."""

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("models", "export", "templates")
-DATA = (".svg", ".json", ".j2", ".typed")
+DATA = (".svg", ".json", ".toml", ".j2", ".css", ".js", ".typed")
 
 
 @pytest.fixture(scope="module")

@@ -42,13 +42,37 @@ def test_tour_runs_line_by_line(tmp_path):
 
 @pytest.mark.solver
 def test_files_are_verified_and_an_answer_read_back(tmp_path):
-    verify, glpk = blocks("sh")[3:]
+    verify, glpk = blocks("sh")[3:5]
     run_line_by_line(verify, tmp_path)
     assert (tmp_path / "checked" / "verify.json").exists()
     if shutil.which("glpsol") is None:
         pytest.skip("glpsol is not installed: apt-get install glpk-utils")
     run_line_by_line(glpk, tmp_path)
     assert (tmp_path / "skew.npz").exists()
+
+
+SPEC = """
+format = "crossfield-library-spec"
+version = 1
+title = "A small one"
+formulations = ["milp-mccormick", "qp-fixed"]
+
+[rungs.tiny]
+sizes = [4]
+formats = ["mps", "nl"]
+
+[[sketches]]
+name = "mouse"
+sample = "mouse"
+"""
+
+
+@pytest.mark.solver
+def test_a_library_is_built_verified_and_shown(tmp_path):
+    (block,) = blocks("sh")[5:]
+    (tmp_path / "small.toml").write_text(SPEC)
+    run_line_by_line(block.replace(" default ", " small.toml "), tmp_path)
+    assert (tmp_path / "site" / "index.html").exists()
 
 
 def test_first_command_names_what_it_makes():

@@ -1,0 +1,158 @@
+"""Building a library: what is missing is made, what is whole stays.
+
+Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written here and nowhere else, each
+file beside and renamed, the one that says "done" last. So a build that was stopped continues, whatever it was that stopped it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from ...models.errors import CrossfieldError
+from ...models.storage import make_folder, read_bytes, write_bytes
+from .entry import Entry, make_entry
+from .index import write_index
+from .ledger import Ledger, Record, merged, read_ledger
+from .points import Provenance
+from .preparing import Files, Preparation, Submitted, about_file, prepare
+from .recipe import InstancePlan, plan
+from .schedule import Tasks, ahead, executor
+from .sidecar import Library, are_whole, read_about, read_library, read_sidecar
+from .spec import Spec
+
+Progress = Callable[[str], None]
+
+
+def build(
+    spec: Spec,
+    folder: str | Path,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = lambda _: None,
+) -> Library:
+    """The library of a specification, now in the folder.
+
+    jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead. progress: called with a line for each entry that
+    is made. Same specification and ledger, same bytes, wherever they are made. Raises InputError, OutputError, BuildError.
+    """
+    plans = plan(spec)
+    folder = make_folder(folder)
+    _sweep(folder)
+    ledger = _ledger(spec, plans, folder)
+    with executor(jobs, scheduler) as chosen:
+        tasks = Tasks(chosen, ahead(jobs, scheduler))
+        work = _Build(folder, ledger, plans, tasks, progress)
+        for each in sorted(
+            plans, key=lambda each: -each.recipe.size
+        ):  # the last one goes first: small ones, whose faults show at once
+            work.begin(each)
+        tasks.run()
+    progress("index and checksums")
+    write_index(folder, spec, plans)
+    return read_library(folder)
+
+
+def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+    """A library brought up to date after its ledger changed; only what the change touches is made again."""
+    return build(read_library(folder).spec, folder, jobs=jobs, progress=progress)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a build that was killed while it wrote has left."""
+    for path in folder.glob(".*.part"):
+        path.unlink(missing_ok=True)
+
+
+def _ledger(spec: Spec, plans: Iterable[InstancePlan], folder: Path) -> Ledger:
+    entries = [entry.name for each in plans for entry in each.entries]
+    given = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
+    return merged(folder, given, entries)
+
+
+class _Build:
+    """A build under way: what is to be made, and how far it is."""
+
+    def __init__(
+        self, folder: Path, ledger: Ledger, plans: Iterable[InstancePlan], tasks: Tasks, progress: Progress
+    ) -> None:
+        self.folder, self.ledger, self.tasks, self.progress = folder, ledger, tasks, progress
+        names = [entry.name for each in plans for entry in each.entries]
+        self.total, self.done = len(names), 0
+        self.relatives: dict[str, list[str]] = {}
+        for each in plans:
+            self.relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
+
+    def begin(self, each: InstancePlan) -> None:
+        """Have an instance made, unless it is whole, and then its entries."""
+        submitted = self._submitted(each)
+        task = Preparation(each.recipe, submitted)
+        about = self._whole(task.name, task.sha256)
+        if about is not None:
+            self._entries(each, about, submitted)
+            return
+
+        def finish(files: Files) -> None:
+            self._write(files)
+            self._entries(each, read_about(self.folder / about_file(task.name)), submitted)
+
+        self.tasks.add(prepare, task, finish)
+
+    def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
+        """What is known of an instance, when it was made from the same and its files are whole."""
+        try:
+            about = read_about(self.folder / about_file(instance))
+        except CrossfieldError:
+            return None
+        return about if about["recipe_sha256"] == sha256 and are_whole(self.folder, about["files"]) else None
+
+    def _entries(self, each: InstancePlan, about: dict[str, Any], submitted: tuple[Submitted, ...]) -> None:
+        files = {facts["name"]: read_bytes(self.folder / facts["name"]) for facts in about["files"]}
+        relatives = tuple(self.relatives[_relation(each)])
+        records = self._records(each)
+        for recipe in reversed(each.entries):
+            task = Entry(recipe, about, files, records, submitted, relatives)
+            if self._is_done(task):
+                self.done += 1
+            else:
+                self.tasks.add(make_entry, task, self._finish(task.name))
+
+    def _finish(self, name: str) -> Callable[[Files], None]:
+        def finish(files: Files) -> None:
+            self._write(files)
+            self.done += 1
+            self.progress(f"{self.done} of {self.total} entries: {name}")
+
+        return finish
+
+    def _is_done(self, task: Entry) -> bool:
+        try:
+            sidecar = read_sidecar(self.folder / f"{task.name}.json")
+        except CrossfieldError:
+            return False
+        return sidecar["recipe_sha256"] == task.sha256 and are_whole(self.folder, sidecar["files"])
+
+    def _records(self, each: InstancePlan) -> tuple[Record, ...]:
+        names = {entry.name for entry in each.entries}
+        return tuple(record for record in self.ledger.records if record.entry in names)
+
+    def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
+        """The fields that the ledger keeps for the entries of an instance."""
+        records = (self.ledger.with_point(entry.name) for entry in each.entries)
+        return tuple(self._submission(record) for record in records if record is not None)
+
+    def _submission(self, record: Record) -> Submitted:
+        self.ledger.field(record)  # damage is told here, with the file's name
+        provenance = Provenance(record.solver, record.version, record.seconds, record.by)
+        return Submitted(read_bytes(self.ledger.folder / str(record.point)), provenance)
+
+    def _write(self, files: Files) -> None:
+        for name, data in files.items():
+            write_bytes(self.folder / name, data)
+
+
+def _relation(each: InstancePlan) -> str:
+    """What instances share whose entries may be related: everything but the gauge."""
+    return each.recipe.name.removesuffix("_box")

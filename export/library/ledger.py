@@ -1,0 +1,155 @@
+"""The ledger: what solvers found, measured once and kept. An input of every build, never made by one.
+
+ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A record carries the SHA-256
+of the problem it is about, and counts for that problem alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from ...models.errors import InputError, InstanceError
+from ...models.field import CrossField
+from ...models.field_file import read_field, write_field
+from ...models.instance_file import check_schema, check_version, parse_json
+from ...models.storage import read_bytes, sha256_of, write_bytes
+
+FORMAT: Final = "crossfield-ledger"
+VERSION: Final = 1
+FILE: Final = "ledger.json"
+Ending = Literal["optimal", "feasible", "limit", "no point"]
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run of a solver on an entry, or one submitted point.
+
+    problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound; seconds, threads and time_limit as
+    measured; by: who ran it; point: the field's file beside the ledger, with its SHA-256, or None.
+    """
+
+    entry: str
+    problem_sha256: str
+    solver: str
+    version: str
+    status: Ending
+    primal: float | None = None
+    bound: float | None = None
+    seconds: float | None = None
+    threads: int | None = None
+    time_limit: float | None = None
+    by: str | None = None
+    point: str | None = None
+    point_sha256: str | None = None
+
+    @property
+    def rank(self) -> tuple[Any, ...]:
+        """Place in the ledger: by entry and solver, then by everything else."""
+        return (self.entry, self.solver, self.version, json.dumps(asdict(self)))
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Records in order, and the folder where the files of their fields lie."""
+
+    folder: Path
+    records: tuple[Record, ...] = ()
+
+    def of(self, entry: str, problem_sha256: str) -> list[Record]:
+        """The records of an entry that are about this very problem."""
+        return [each for each in self.records if (each.entry, each.problem_sha256) == (entry, problem_sha256)]
+
+    def with_point(self, entry: str) -> Record | None:
+        """The record whose field is kept for an entry: the last one that has a field."""
+        found = [each for each in self.records if each.entry == entry and each.point is not None]
+        return found[-1] if found else None
+
+    def field(self, record: Record) -> CrossField:
+        """The field of a record. Raises InputError, InstanceError when the file is missing, damaged or another one."""
+        path = self.folder / str(record.point)
+        if path.is_file() and sha256_of(path) != record.point_sha256:
+            raise InstanceError(
+                "is another file than the one its ledger names; restore it, or submit the point again",
+                file=path,
+            )
+        return read_field(path)
+
+    def document(self) -> dict[str, Any]:
+        """The ledger as JSON."""
+        return {"format": FORMAT, "version": VERSION, "records": [asdict(record) for record in self.records]}
+
+
+def field_file(entry: str) -> str:
+    """Name of the file that holds the kept field of an entry."""
+    return f"{entry}.field.json"
+
+
+def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
+    """The ledger of a folder, empty when there is none. Raises InputError, InstanceError, naming the file."""
+    path = Path(folder) / name
+    if not path.exists():
+        return Ledger(Path(folder))
+    try:
+        document = parse_json(read_bytes(path).decode())
+        check_version(document, FORMAT, VERSION)
+        given = check_schema(document, "library-ledger", __package__.rpartition(".")[0])["records"]
+    except UnicodeDecodeError as error:
+        raise InputError("is not JSON; give the ledger.json of a library", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+    return Ledger(Path(folder), tuple(Record(**each) for each in given))
+
+
+def write_ledger(ledger: Ledger) -> Path:
+    """The path of the ledger's file, now holding it. Raises OutputError."""
+    data = json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n"
+    return write_bytes(ledger.folder / FILE, data.encode())
+
+
+def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
+    """The record, now in the ledger of a folder; with a field, that is from now on the kept one of the entry.
+
+    The field's file is written first, so that the ledger never names what is not there. Records of the same entry that named the file before lose
+    their field, which is not there any more. Raises OutputError.
+    """
+    ledger = read_ledger(folder)
+    records = list(ledger.records)
+    if field is not None:
+        path = write_field(field, ledger.folder / field_file(record.entry))
+        record = replace(record, point=path.name, point_sha256=sha256_of(path))
+        records = [_without_point(each) if each.entry == record.entry else each for each in records]
+    records = sorted({*records, record}, key=lambda each: each.rank)
+    write_ledger(replace(ledger, records=tuple(records)))
+    return record
+
+
+def _without_point(record: Record) -> Record:
+    return replace(record, point=None, point_sha256=None)
+
+
+def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
+    """The ledger of a folder after it took over the records of another one about these entries, with their fields.
+
+    A field that the folder has for an entry already stays.
+    """
+    ledger, wanted = read_ledger(folder), set(entries)
+    taken = [record for record in other.records if record.entry in wanted]
+    have = {replace(record, point=None, point_sha256=None) for record in ledger.records}
+    fresh: list[Record] = []
+    for record in taken:
+        if _without_point(record) in have:
+            continue
+        if record.point is not None and ledger.with_point(record.entry) is None:
+            other.field(record)  # checked before it is taken over
+            write_bytes(folder / field_file(record.entry), read_bytes(other.folder / record.point))
+            fresh.append(record)
+        else:
+            fresh.append(_without_point(record))
+    if fresh or not (folder / FILE).exists():
+        ledger = replace(ledger, records=tuple(sorted({*ledger.records, *fresh}, key=lambda each: each.rank)))
+        write_ledger(ledger)
+    return ledger

@@ -1,0 +1,140 @@
+"""What is equivalent to what, and what is not: sections 3 to 5 of the formulation notes as sentences, and what files change."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, Final
+
+from ...models.errors import UnsupportedByFormatError
+from ...models.formulations import FORMULATIONS
+from ...models.problem import Problem
+from ..formats import FORMATS, carried
+from ..lp import needs_one
+from .recipe import EntryRecipe, entry_name
+
+_SQUARES: Final = "the 2-norm energy"
+_MIXED: Final = "the 1-norm of the smoothness with squares of stroke and skew terms"
+_ABSOLUTE: Final = "the 1-norm energy"
+
+MEANING: Final = {
+    "minlp-parity": _SQUARES,
+    "minlp-quartic": _SQUARES,
+    "minlp-cubic": _SQUARES,
+    "miqp-exact": _SQUARES,
+    "miqcp-bilinear": _MIXED,
+    "miqp-mccormick": _MIXED,
+    "miqcp-bilinear-l1": _ABSOLUTE,
+    "milp-mccormick": _ABSOLUTE,
+    "qp-fixed": "the 2-norm energy at given jumps",
+}
+"""What a formulation minimises; those with the same words have the same optimum (with the facet of the hull)."""
+
+_HOW: Final = {
+    "minlp-parity": "p = p1 + 2 p2, and cos(pi p) = 1 - 2 p1",
+    "minlp-quartic": "squares of alpha_i - alpha_j + pi/2 (p1 + 2 p2) and of (1 - 2 p1) beta_i - beta_j",
+    "minlp-cubic": "the expanded squares with p1^2 = p1, which holds for binary p1 only",
+    "miqp-exact": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
+    "miqcp-bilinear": "the products p1 beta_i stand in the rows",
+    "miqp-mccormick": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
+    "miqcp-bilinear-l1": "the products p1 beta_i stand in the rows",
+    "milp-mccormick": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
+}
+
+
+def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
+    """Entries of the library with the same optimum, this one aside, and their formulations."""
+    found = equivalent(recipe, names)
+    return {each["entry"]: each["formulation"] for each in found if each["entry"] is not None}
+
+
+def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
+    """Formulations of the same instance that have the same optimum, and why. names: entries of the library."""
+    if recipe.facet == "printed":
+        return []
+    return [
+        _relation(
+            recipe,
+            other,
+            names,
+            f"both minimise {meaning}; {_HOW[other]}; points transfer by alpha, beta and the jumps",
+        )
+        for other, meaning in MEANING.items()
+        if other != recipe.formulation and meaning == MEANING[recipe.formulation]
+    ]
+
+
+def not_equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
+    """Formulations of the same instance that have another optimum, and how it differs."""
+    mine = MEANING[recipe.formulation]
+    found = [
+        _relation(recipe, other, names, _difference(recipe, other))
+        for other, meaning in MEANING.items()
+        if meaning != mine
+    ]
+    if "facet" in FORMULATIONS[recipe.formulation].settable:
+        found.append(_other_facet(recipe, names))
+    return found + _other_gauge(recipe, names)
+
+
+def _relation(recipe: EntryRecipe, formulation: str, names: Collection[str], why: str) -> dict[str, Any]:
+    name = entry_name(recipe.instance, formulation, "hull")
+    return {"formulation": formulation, "entry": name if name in names else None, "why": why}
+
+
+def _difference(recipe: EntryRecipe, other: str) -> str:
+    mine, theirs = MEANING[recipe.formulation], MEANING[other]
+    if other == "qp-fixed" and mine == _SQUARES:
+        return "its jumps are fixed: its optimum is an upper bound of this one"
+    if recipe.formulation == "qp-fixed" and theirs == _SQUARES:
+        return "its jumps are free: its optimum is a lower bound of this one"
+    return f"it minimises {theirs}, this one {mine}: points transfer, optima differ"
+
+
+def _other_facet(recipe: EntryRecipe, names: Collection[str]) -> dict[str, Any]:
+    if recipe.facet == "printed":
+        why = "the facet of the hull, z >= -(pi/4) p1: z = p1 beta_i there, and its optimum is at least as high as this one"
+        facet = "hull"
+    else:
+        why = "(26) as printed, z >= -pi/4, leaves z free where p1 = 0: a relaxation, whose optimum may be lower"
+        facet = "printed"
+    name = entry_name(recipe.instance, recipe.formulation, facet)
+    shown = f"{recipe.formulation} (facet {facet})"
+    return {"formulation": shown, "entry": name if name in names else None, "why": why}
+
+
+def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
+    """The same entry under the other gauge, when the library has it."""
+    box = recipe.instance.endswith("_box")
+    instance = recipe.instance.removesuffix("_box") if box else f"{recipe.instance}_box"
+    name = entry_name(instance, recipe.formulation, recipe.facet)
+    if name not in names:
+        return []
+    windows = (
+        "a window of alpha round each stroke, which loses nothing"
+        if box
+        else "alpha in [0, pi/2] everywhere, as printed in (1), which forces skews"
+    )
+    shown = f"{recipe.formulation} (gauge {'strokes' if box else 'box'})"
+    return [{"formulation": shown, "entry": name, "why": f"the other gauge: {windows}; optima differ"}]
+
+
+def transformations(problem: Problem, formats: Collection[str]) -> list[str]:
+    """Sentences about what the files change: products lifted, the column ONE, a free variable's bounds."""
+    found: list[str] = []
+    for name in formats:
+        notes = notes_of(problem, name)
+        found += [f".{name}: {note}" for note in notes]
+    return found
+
+
+def notes_of(problem: Problem, name: str) -> list[str]:
+    """What the file of one format changes; empty for what it refuses."""
+    try:
+        held = carried(problem, FORMATS[name])
+    except UnsupportedByFormatError:
+        return []
+    lifting = held.formulation.lifted
+    found = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
+    if name in {"lp", "mps"} and needs_one(held):
+        found.append("the constant of the objective is the cost of a column ONE that is fixed to 1")
+    return found
