@@ -392,7 +392,11 @@ def test_tables_fit_80_columns(tmp_path, crossfield, instance_file, two_parts):
 
 
 def test_the_table_of_a_run_stands_in_lines(two_parts):
-    rows = [line for line in two_parts[1].stdout.splitlines() if re.match(r" *(greedy|power|MILP|two-stage|search)", line)]
+    rows = [
+        line
+        for line in two_parts[1].stdout.splitlines()
+        if re.match(r" *(greedy|power|MILP|two-stage|search)", line)
+    ]
     assert len(rows) == 6
     assert sum("*" in row for row in rows) == 1
     assert "*" in rows[0]

@@ -510,7 +510,9 @@ def test_ctrl_c_keeps_the_best_point(tmp_path, solver):
 
 @pytest.mark.solver
 def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
-    code, out, err = interrupted(tmp_path, "*.highs.log", ["run", "mouse", "--size", "14", "--time-limit", "10"])
+    code, out, err = interrupted(
+        tmp_path, "*.highs.log", ["run", "mouse", "--size", "14", "--time-limit", "10"]
+    )
     assert code == 0
     assert "MILP: interrupted; its best field so far was kept" in err
     assert "two-stage" in out

@@ -19,7 +19,6 @@ from ...models.problem import Problem, formulate
 from ...models.search import search
 from ..formats import generator
 
-
 _ROUNDS: Final = 8
 
 
