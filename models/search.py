@@ -225,6 +225,10 @@ class _Hunt:
         )
         inside = np.concatenate([task.free, task.free])
         trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
+        if not self.large and trial.energy >= state.energy - LOWER:
+            # Others were taken over in the same window: the angles for all of the new jumps are neither's.
+            trial.x = state.x
+            settle(trial, self._solver)
         if trial.energy < state.energy - LOWER:
             self._state, self._unsettled, self.fruitless = trial, True, 0
             self.energies.append((self.round, trial.energy))
