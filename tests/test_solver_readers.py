@@ -731,9 +731,9 @@ def test_damaged_files_are_refused_or_read(path, damages):
 )
 @pytest.mark.parametrize("head", HEADS)
 def test_long_repetitions_take_no_long_time(head, part):
-    begin = time.perf_counter()
+    begin = time.process_time()
     attempt(head + part * (60_000 // len(part)))
-    assert time.perf_counter() - begin < 2
+    assert time.process_time() - begin < 2
 
 
 def test_one_long_name_does_not_widen_all_names():
@@ -783,9 +783,9 @@ def lines_of(form, count):
 def test_half_a_million_lines_take_well_under_a_second(head, form):
     """Four million lines take two to three seconds; the limit here leaves room for a busy machine."""
     data = head.encode() + lines_of(form, 500_000)
-    begin = time.perf_counter()
+    begin = time.process_time()
     raw = parse_raw(data)
-    assert time.perf_counter() - begin < 1.5
+    assert time.process_time() - begin < 1.5
     assert len(raw.values) == 500_000
     assert raw.names[-1] == b"alpha_099_099"
     np.testing.assert_allclose(raw.values[-10_000:], np.sin(np.arange(10_000)), rtol=1e-14)
