@@ -75,7 +75,7 @@ def search(
     if (seconds is not None and seconds <= 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     deadline = np.inf if seconds is None else time.monotonic() + seconds
-    hunt = _Hunt(instance, seed, min(starts(instance, start), key=_energy))
+    hunt = _Hunt(instance, seed, _start(instance, start, deadline))
     try:
         with _explorers(1 if instance.grid.size <= _ALONE else jobs) as explorers:
             if hunt.large:
@@ -95,7 +95,7 @@ def _from_coarse(
     if coarse is None:
         return
     deadline -= _FINE * (deadline - time.monotonic()) if deadline < np.inf else 0.0
-    hunt = _Hunt(coarse, seed, min(starts(coarse, None), key=_energy))
+    hunt = _Hunt(coarse, seed, _start(coarse, None, deadline))
     if hunt.large:
         for field in _from_coarse(coarse, seed, deadline, rounds, explorers):
             hunt.offer(field)
@@ -105,12 +105,14 @@ def _from_coarse(
         yield prolonged(field, instance)
 
 
-def starts(instance: Instance, start: CrossField | None) -> Iterator[CrossField]:
-    """The fields from the best of which a search goes on: the greedy and the power field, improved, and what the user gives."""
-    yield first_field(instance)
-    yield improved(power_field(instance))
-    if start is not None:
-        yield improved(start)
+def _start(instance: Instance, given: CrossField | None, deadline: float) -> CrossField:
+    """The best of the greedy field, of what the user gives, and, if there is time, of the power field, all improved."""
+    fields = [first_field(instance)]
+    if given is not None:
+        fields.append(improved(given))
+    if time.monotonic() < deadline:
+        fields.append(improved(power_field(instance)))
+    return min(fields, key=_energy)
 
 
 def _energy(field: CrossField) -> float:

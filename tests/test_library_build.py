@@ -470,18 +470,7 @@ def test_random_instances_follow_size_and_seed_alone():
 
 
 def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(built, spec, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "crossfield",
-        "library",
-        "build",
-        str(spec),
-        "-o",
-        str(tmp_path / "again"),
-        "--jobs",
-        "2",
-    ]
+    command = build_command(spec, tmp_path / "again")
     environment = os.environ | {"PYTHONHASHSEED": "7"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
@@ -522,18 +511,7 @@ def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
 
 def test_a_build_that_was_killed_continues_and_leaves_nothing_half_written(built, spec, tmp_path):
     out = tmp_path / "killed"
-    command = [
-        sys.executable,
-        "-m",
-        "crossfield",
-        "library",
-        "build",
-        str(spec),
-        "-o",
-        str(out),
-        "--jobs",
-        "2",
-    ]
+    command = build_command(spec, out)
     process = subprocess.Popen(command, start_new_session=True)
     while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
         time.sleep(0.01)
@@ -551,20 +529,13 @@ def test_a_build_that_was_killed_continues_and_leaves_nothing_half_written(built
     assert content(out) == whole
 
 
+def build_command(spec, out):
+    return [sys.executable, "-m", "crossfield", "library", "build", str(spec), "-o", str(out), "--jobs", "2"]
+
+
 def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spec, tmp_path):
     out = tmp_path / "interrupted"
-    command = [
-        sys.executable,
-        "-m",
-        "crossfield",
-        "library",
-        "build",
-        str(spec),
-        "-o",
-        str(out),
-        "--jobs",
-        "2",
-    ]
+    command = build_command(spec, out)
     process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
         time.sleep(0.01)
@@ -579,18 +550,7 @@ def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spe
 
 def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built, spec, tmp_path):
     out = tmp_path / "died"
-    command = [
-        sys.executable,
-        "-m",
-        "crossfield",
-        "library",
-        "build",
-        str(spec),
-        "-o",
-        str(out),
-        "--jobs",
-        "2",
-    ]
+    command = build_command(spec, out)
     process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
         time.sleep(0.01)

@@ -1,0 +1,165 @@
+"""Make docs/bounds.md: how far optima can be proven with open solvers, and what strengthens the MILP: `python docs/bounds.py` (some ten minutes)."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import crossfield as cf
+import highspy
+import numpy as np
+from crossfield.models.instance import Instance
+from crossfield.models.problem import Problem
+from make import markdown, said
+
+DOCS: Final = Path(__file__).resolve().parent
+SECONDS: Final = 40.0
+SIDES: Final = (4, 5, 6, 7, 8)
+TRIED: Final = ((4, 5, 1), (4, 5, 2), (4, 5, 3), (5, 5, 4), (5, 5, 5), (5, 6, 6))
+"""Height, width and seed of the instances on which rows and bounds are tried."""
+RUNS: Final = (
+    ("milp-mccormick", "highs", False),
+    ("milp-mccormick", "highs", True),
+    ("miqp-exact", "bonmin", False),
+)
+VARIANTS: Final = ((), ("odd cycles",), ("bounds",), ("odd cycles", "bounds"))
+
+
+def instance_of(height: int, width: int, seed: int) -> Instance:
+    """Random directions on two pixels in five of a full grid."""
+    rng = np.random.default_rng(seed)
+    pixels = np.argwhere(rng.random((height, width)) < 0.4)
+    theta = rng.uniform(0, np.pi, len(pixels))
+    return Instance(f"random_{seed}", np.ones((height, width), bool), pixels, theta, np.ones(len(pixels)))
+
+
+def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
+    """Add, for every 2 x 2 block C and odd subset F: sum of p1 over F less that over C - F <= |F| - 1 + (2/pi) sum of s over C.
+
+    Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2 at least.
+    """
+    p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
+    for block in problem.instance.grid.blocks:
+        for subset in range(16):
+            inside = np.array([subset >> place & 1 for place in range(4)])
+            if inside.sum() % 2:
+                columns = np.concatenate([p1[block], s[block]]).astype(np.int32)
+                values = np.concatenate([2.0 * inside - 1, np.full(4, -2 / np.pi)])
+                model.addRow(-np.inf, float(inside.sum() - 1), len(columns), columns, values)
+
+
+def bounds(problem: Problem, model: highspy.Highs) -> None:
+    """Bound s and t by pi/2: of the two jumps nearest to what the angles ask for, each leaves |A| below that, and |beta| is at most pi/4."""
+    for name in ("s", "t"):
+        for column in range(problem.columns)[problem.blocks[name].columns]:
+            model.changeColBounds(column, 0.0, np.pi / 2)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How HiGHS fared."""
+
+    proven: bool
+    objective: float
+    bound: float
+    nodes: int
+    seconds: float
+
+
+def strengthened(instance: Instance, chosen: tuple[str, ...]) -> Outcome:
+    """HiGHS on one thread on the written MPS of `milp-mccormick`, with rows or bounds added."""
+    problem = cf.formulate(instance, "milp-mccormick")
+    model: Any = highspy.Highs()
+    model.setOptionValue("output_flag", "false")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.mps"
+        cf.write(problem, path)
+        model.readModel(str(path))
+    for option, value in (("threads", 1), ("time_limit", SECONDS), ("mip_rel_gap", 1e-6)):
+        model.setOptionValue(option, value)
+    for name, add in (("odd cycles", odd_cycles), ("bounds", bounds)):
+        if name in chosen:
+            add(problem, model)
+    begin = time.process_time()
+    model.run()
+    seconds, info = time.process_time() - begin, model.getInfo()
+    proven = model.getModelStatus() == highspy.HighsModelStatus.kOptimal
+    return Outcome(proven, info.objective_function_value, info.mip_dual_bound, info.mip_node_count, seconds)
+
+
+def strengthening() -> Iterator[list[str]]:
+    """A row for each instance and variant."""
+    for height, width, seed in TRIED:
+        for chosen in VARIANTS:
+            found = strengthened(instance_of(height, width, seed), chosen)
+            yield [
+                f"{height} x {width}, seed {seed}",
+                " + ".join(chosen) or "as written",
+                f"{found.objective:.5f}",
+                f"{found.bound:.5f}",
+                "yes" if found.proven else "no",
+                str(found.nodes),
+                f"{found.seconds:.1f}",
+            ]
+
+
+def closing() -> Iterator[list[str]]:
+    """A row for each size and solver: the MILP and its relaxation by HiGHS, the exact convex MIQP by Bonmin, each from the searched field."""
+    for side in SIDES:
+        instance = instance_of(side, side, 0)
+        start = cf.search(instance, rounds=10).field
+        for name, solver, relax in RUNS:
+            problem = cf.formulate(instance, name, relax=relax)
+            found = cf.solve(problem, solver, start=start, limits=cf.Limits(SECONDS))
+            proven = found.status == "optimal-global"
+            yield [
+                f"{side} x {side}",
+                f"`{name}`" + (" relaxed" if relax else ""),
+                solver,
+                "" if found.objective is None else f"{found.objective:.5f}",
+                "none told" if found.bound is None else f"{found.bound:.5f}",
+                "yes" if proven else f"no: {found.status}",
+                "" if found.seconds is None else f"{found.seconds:.1f}",
+            ]
+
+
+def main() -> None:
+    """Solve and write the page."""
+    sizes = markdown(
+        ("grid", "formulation", "solver", "objective", "dual bound", "proven", "s"), list(closing())
+    )
+    variants = markdown(
+        ("instance", "rows and bounds", "objective", "dual bound", "proven", "nodes", "CPU s"),
+        list(strengthening()),
+    )
+    (DOCS / "bounds.md").write_text(
+        PAGE.format(said=said("python docs/bounds.py"), seconds=SECONDS, sizes=sizes, variants=variants)
+    )
+
+
+PAGE: Final = """# Proofs and lower bounds
+
+{said}
+
+Random directions on two pixels in five of a full grid, {seconds:g} s each. What is proven with other solvers, and how the search compares,
+stands in [fields.md](fields.md#against-proven-optima); bounds of all entries of the instance library in its sidecars. Beyond these sizes the
+best bounds known are those of the relaxation, which say next to nothing.
+
+## How far open solvers get
+
+{sizes}
+
+## Strengthening the MILP
+
+On one thread. *Odd cycles*: for every 2 x 2 block C and every odd subset F of its four pairs, the sum of p1 over F, less that over the
+others, is at most |F| - 1 + (2/pi) times the sum of s over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
+
+{variants}
+"""
+
+if __name__ == "__main__":
+    main()
