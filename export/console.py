@@ -222,7 +222,8 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
         "which solver proves optima from our files (--json: why not others)", ("solver", "takes"), takes
     )
     show_table("formats", formats[0], _cells(formats[1], formats[0]))
-    readers = tables["readers"]
+    methods, readers = tables["methods"], tables["readers"]
+    show_table("ways to a field (solve --method)", methods[0], _cells(methods[1], methods[0]))
     show_table("solution files that are read", readers[0], _cells(readers[1], readers[0]))
 
 

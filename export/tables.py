@@ -11,6 +11,7 @@ from ..models.samples import sample, samples
 from .capabilities import EXTERNALS, smallest, takers
 from .consumers import CONSUMERS
 from .formats import FORMATS, carried
+from .methods import METHODS
 from .readers import READERS
 from .solvers import SOLVERS, refusal
 
@@ -36,6 +37,10 @@ def tables() -> Tables:
         "externals": (
             ("formulation", *EXTERNALS),
             [_external_row(problem) for problem in smallest_problems()],
+        ),
+        "methods": (
+            ("name", "summary"),
+            [{"name": method.name, "summary": method.summary} for method in METHODS.values()],
         ),
         "readers": (
             ("name", "description"),

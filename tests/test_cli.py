@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from crossfield.export.cli import invoke
 from crossfield.export.formats import FORMATS
+from crossfield.export.methods import METHODS
 from crossfield.export.solvers import SOLVERS
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.samples import SAMPLES
@@ -261,7 +262,9 @@ def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
 
 def test_help_loads_nothing_heavy():
     code = "import sys; from crossfield.export.cli import invoke; invoke(['--help']); print(*sorted(sys.modules), file=sys.stderr)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
     loaded = {name.split(".")[0] for name in done.stderr.split()}
     assert not loaded & {
         "numpy",
@@ -355,6 +358,7 @@ def test_list_says_which_go_together(crossfield):
     assert [row["name"] for row in listed["formulations"]] == list(FORMULATIONS)
     assert [row["name"] for row in listed["formats"]] == list(FORMATS)
     assert all(set(SOLVERS) < set(row) for row in listed["solvers"])
+    assert [row["name"] for row in listed["methods"]] == list(METHODS)
     text = crossfield("list")
     for name in (*FORMULATIONS, *FORMATS, *SOLVERS, *(row["name"] for row in listed["readers"])):
         assert name in text
@@ -452,3 +456,28 @@ def test_exports_are_the_same_bytes_twice(tmp_path):
     first, second = ({path.name: path.read_bytes() for path in (tmp_path / n).iterdir()} for n in ("1", "2"))
     assert len(first) > 60
     assert first == second
+
+
+@pytest.mark.solver
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_leaves_a_field_and_tells_its_energy(tmp_path, crossfield, instance_file, method):
+    out = crossfield("solve", instance_file, "--method", method, "--time-limit", 2, "--json", "-o", tmp_path)
+    facts = json.loads(out)
+    (path,) = tmp_path.glob(f"*.{method}.field.npz")
+    assert facts["energy_2_norm"] == pytest.approx(cf.read_field(path).energy().total, rel=1e-12)
+    assert facts["interrupted"] is False
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        (),
+        ("--method", "search", "-f", "qp-fixed"),
+        ("--method", "search", "--relax"),
+        ("--method", "greedy", "--solver", "highs"),
+    ],
+)
+def test_a_method_and_a_formulation_exclude_each_other(tmp_path, instance_file, options, capsys):
+    assert invoke(["solve", str(instance_file), *options, "-o", str(tmp_path / "out")]) == 2
+    assert "method" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
