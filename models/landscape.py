@@ -30,6 +30,7 @@ STEPS: Final = np.array([1, -1], dtype=np.int32)
 
 _HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
 _OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
+_SOFTEST: Final = 1e-6  # price of beta below which G grows so large that updates lose their digits
 _MOST_HOLDS: Final = 60
 
 
@@ -90,7 +91,9 @@ class Landscape:
         outside[places] = 0.0
         right = energy.vector[places] - rows @ outside
         system = rows[:, places].toarray()
-        system[np.diag_indices(len(places))] += PULL
+        system[np.diag_indices(len(places))] += np.repeat(
+            [PULL, max(PULL, _SOFTEST - instance.w_beta)], len(window.pixels)
+        )
         inverse = np.linalg.inv(system)
         self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
         self._x = self._inverse @ right

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from .cells import stroke_cells
 from .coarse import halved, prolonged
 from .errors import InputError
 from .exploration import LOWER, Better, Task, explore
@@ -23,6 +24,7 @@ from .free_field import FreeField, free_bounds
 from .grid import Bools
 from .improvement import first_field, improved, settle, stroke_curves
 from .instance import Instance
+from .interruption import deaf_children, interruptible
 from .power_field import power_field
 from .quadratic import Solver
 
@@ -74,43 +76,66 @@ def search(
     """
     if (seconds is not None and seconds <= 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
-    deadline = np.inf if seconds is None else time.monotonic() + seconds
-    hunt = _Hunt(instance, seed, _start(instance, start, deadline))
-    try:
-        with _explorers(1 if instance.grid.size <= _ALONE else jobs) as explorers:
-            if hunt.large:
-                for field in _from_coarse(instance, seed, deadline, rounds, explorers):
-                    hunt.offer(field)
-            ended = hunt.run(explorers, deadline, rounds, progress)
-    except KeyboardInterrupt:
-        ended = "interrupted"
-    return Search(hunt.best(), hunt.round, tuple(hunt.energies), ended)
+    with interruptible() as interrupted:
+        limits = _Limits(np.inf if seconds is None else time.monotonic() + seconds, rounds, interrupted)
+        hunt = _Hunt(instance, seed, _start(instance, start, limits))
+        try:
+            with _explorers(1 if instance.grid.size <= _ALONE else jobs) as explorers:
+                if hunt.large:
+                    for field in _from_coarse(instance, seed, limits, explorers):
+                        hunt.offer(field)
+                ended = hunt.run(explorers, limits, progress)
+        except KeyboardInterrupt:
+            ended = "interrupted"
+        return Search(hunt.best(), hunt.round, tuple(hunt.energies), ended)
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """When to end: a time of the monotonic clock, a number of rounds, and whether the user asks for it."""
+
+    deadline: float
+    rounds: int | None
+    interrupted: Callable[[], bool]
+
+    def met(self, rounds: int) -> str:
+        """Which limit is met after so many rounds; empty when none is."""
+        if self.interrupted():
+            return "interrupted"
+        if rounds == self.rounds:
+            return "rounds"
+        return "time" if time.monotonic() >= self.deadline else ""
+
+    def coarse(self) -> _Limits:
+        """The limits of the search on the grid of half the resolution."""
+        share = 0.0 if self.deadline == np.inf else _FINE * (self.deadline - time.monotonic())
+        many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
+        return _Limits(self.deadline - share, many, self.interrupted)
 
 
 def _from_coarse(
-    instance: Instance, seed: int, deadline: float, rounds: int | None, explorers: Explorers
+    instance: Instance, seed: int, limits: _Limits, explorers: Explorers
 ) -> Iterator[CrossField]:
     """Fields that were found on the grid of half the resolution, brought to this one, the best of there first."""
     coarse = halved(instance)
     if coarse is None:
         return
-    deadline -= _FINE * (deadline - time.monotonic()) if deadline < np.inf else 0.0
-    hunt = _Hunt(coarse, seed, _start(coarse, None, deadline))
+    limits = limits.coarse()
+    hunt = _Hunt(coarse, seed, _start(coarse, None, limits))
     if hunt.large:
-        for field in _from_coarse(coarse, seed, deadline, rounds, explorers):
+        for field in _from_coarse(coarse, seed, limits, explorers):
             hunt.offer(field)
-    many = _COARSE if rounds is None else min(rounds, _COARSE)
-    hunt.run(explorers, deadline, many, lambda *_: None)
+    hunt.run(explorers, limits, lambda *_: None)
     for field in hunt.latest():
         yield prolonged(field, instance)
 
 
-def _start(instance: Instance, given: CrossField | None, deadline: float) -> CrossField:
+def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
     """The best of the greedy field, of what the user gives, and, if there is time, of the power field, all improved."""
     fields = [first_field(instance)]
     if given is not None:
         fields.append(improved(given))
-    if time.monotonic() < deadline:
+    if not limits.met(-1):
         fields.append(improved(power_field(instance)))
     return min(fields, key=_energy)
 
@@ -128,6 +153,8 @@ def _explorers(jobs: int) -> Iterator[Explorers]:
     from joblib import Parallel, delayed
 
     with Parallel(n_jobs=jobs, backend="loky") as parallel:
+        with deaf_children():
+            parallel(delayed(int)() for _ in range(jobs))
         yield lambda tasks: list(parallel(delayed(explore)(task) for task in tasks))
 
 
@@ -146,6 +173,8 @@ class _Hunt:
         self._solver = Solver()
         self._latest = [start]
         self._unsettled = False
+        # Parts without a stroke are constant and cost nothing.
+        self._reached = stroke_cells(instance) >= 0
         self._curve = np.full(instance.grid.size, -1)
         self._curve[instance.stroke_index] = stroke_curves(instance)
 
@@ -169,17 +198,15 @@ class _Hunt:
             self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
-    def run(self, explorers: Explorers, deadline: float, rounds: int | None, progress: Progress) -> str:
+    def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
         """Go on until a limit is met; which one."""
-        while self.round != rounds:
-            if time.monotonic() >= deadline:
-                return "time"
+        while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
             tasks = self.tasks()
             self._take(tasks, explorers(tasks))
             progress(self.round, self.energies[-1][1])
-        return "rounds"
+        return ended
 
     def tasks(self) -> list[Task]:
         """What to explore in this round."""
@@ -194,14 +221,14 @@ class _Hunt:
         """The windows of a round, round pixels of high energy and others in turn."""
         grid = self._instance.grid
         if not self.large:
-            yield from [np.ones(grid.size, dtype=bool)] * _WINDOWS
+            yield from [self._reached] * _WINDOWS
             return
         field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
         high = field.pixel_energy + 1e-12
         for number in range(_WINDOWS):
             centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
-            yield away <= np.partition(away, _WINDOW)[_WINDOW]
+            yield (away <= np.partition(away, _WINDOW)[_WINDOW]) & self._reached
 
     def _take(self, tasks: list[Task], found: list[Better | None]) -> None:
         """Take over what is lower, the lowest first, and end the round."""

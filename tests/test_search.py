@@ -260,3 +260,19 @@ def test_smooth_energy_is_the_same_on_both_grids():
 def test_crossing_strokes_leave_no_coarse_stroke():
     theta = np.array([[0.0, HALF], [HALF, 0.0]])
     assert halved(sketch(np.ones((2, 2), bool), theta)) is None
+
+
+@pytest.mark.parametrize("w_beta", [0.0, 1e-6])
+def test_parts_without_strokes_and_free_skews_do_no_harm(w_beta):
+    mask = np.ones((6, 11), bool)
+    mask[:, 5] = False
+    theta = np.full(mask.shape, np.nan)
+    theta[:, 1], theta[2, 2:5], theta[4, 3] = 0.3, 1.2, 2.5
+    found = cf.search(sketch(mask, theta, w_beta=w_beta), rounds=4).field
+    assert found.energy().total <= first_field(found.instance).energy().total + 1e-9
+    assert found.image(found.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)
+
+
+def test_a_single_pixel_is_a_search_of_nothing():
+    found = cf.search(cf.Instance("one", [[True]], [[0, 0]], [2.0], [1.0]))
+    assert (found.ended, found.field.energy().total) == ("patience", 0)
