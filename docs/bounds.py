@@ -1,4 +1,4 @@
-"""Make docs/bounds.md: how far optima can be proven with open solvers, and what strengthens the MILP: `python docs/bounds.py` (some ten minutes)."""
+"""Make docs/bounds.md: how far optima can be proven with open solvers, and what strengthens the MILP: `python docs/bounds.py` (some five minutes)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from crossfield.models.problem import Problem
 from make import markdown, said
 
 DOCS: Final = Path(__file__).resolve().parent
-SECONDS: Final = 40.0
+SECONDS: Final = 15.0
 SIDES: Final = (4, 5, 6, 7, 8)
 TRIED: Final = ((4, 5, 1), (4, 5, 2), (4, 5, 3), (5, 5, 4), (5, 5, 5), (5, 6, 6))
 """Height, width and seed of the instances on which rows and bounds are tried."""

@@ -25,7 +25,7 @@ from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / "README.md"
-SECONDS = 30.0
+SECONDS = 10.0
 
 
 def markdown(columns: tuple[str, ...], rows: list[list[str]]) -> str:

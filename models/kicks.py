@@ -32,7 +32,7 @@ class Kicks:
         """curve: number of the curve of each pixel, -1 without a stroke; shape (n,)."""
         instance = window.instance
         self._window = window
-        local = np.full(len(instance.grid.first) + 1, -1)
+        local = np.full(len(instance.grid.first), -1)
         local[window.pairs] = np.arange(len(window.pairs))
         blocks = local[instance.grid.blocks]
         self._blocks = blocks[(blocks >= 0).all(axis=1)]
