@@ -157,6 +157,7 @@ best bounds known are those of the relaxation, which say next to nothing.
 
 On one thread. *Odd cycles*: for every 2 x 2 block C and every odd subset F of its four pairs, the sum of p1 over F, less that over the
 others, is at most |F| - 1 + (2/pi) times the sum of s over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
+Neither is an option of the formulations, for neither helps HiGHS on most of these instances.
 
 {variants}
 """

@@ -521,7 +521,7 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
 
 @pytest.mark.solver
 def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
-    code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "40"], after=0.1)
+    code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], after=0.1)
     assert (code, out) == (1, "")
     assert err == "crossfield: interrupted; files that stand are whole\n"
     assert not list(tmp_path.rglob("*.part"))
