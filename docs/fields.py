@@ -274,7 +274,7 @@ def main() -> None:
         pictures = [picture(sketch, folder) for sketch in PICTURED]
         large = [row(sketch, LARGE, given.seconds, folder) for sketch in every[-LARGE_SKETCHES:]]
     text = PAGE.format(
-        said=said("python docs/fields.py --sketches FOLDER"),
+        said=said(f"python docs/fields.py --sketches FOLDER --seconds {given.seconds:g}"),
         seconds=f"{given.seconds:g}",
         cores=os.cpu_count(),
         python=platform.python_version(),
