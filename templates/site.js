@@ -95,7 +95,12 @@ function filterable(table, form, told) {
   form.hidden = false;
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("input", () => { apply(); remember(); });
-  form.addEventListener("reset", () => setTimeout(() => { apply(); remember(); }));
+  form.addEventListener("reset", (event) => {
+    event.preventDefault(); // the fields would be empty only after this
+    for (const field of fields) field.value = "";
+    apply();
+    remember();
+  });
   addEventListener("hashchange", recall);
   apply();
   recall();
