@@ -52,12 +52,12 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
     """The bytes of the GAMS file in indexed layout, block by block.
 
     header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
-    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with integers fixed.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(
-            "gms in indexed layout has no place for integers fixed one by one; write the scalar layout"
+            "gms in indexed layout has no place for columns fixed one by one; write the scalar layout"
         )
     for name, values in (("w", instance.w), ("w_strokes", instance.w_strokes), ("w_beta", instance.w_beta)):
         check_coefficients(values, f"{name} of {instance.name}")

@@ -122,7 +122,7 @@ def write_problem(
     """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
 
     What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats written at once. Raises
-    OutputError, and InputError for an unknown format and for a problem that no manifest records: with integers fixed, or with
+    OutputError, and InputError for an unknown format and for a problem that no manifest records: with columns fixed, or with
     products lifted beforehand.
     """
     _check_recordable(problem)
@@ -192,7 +192,7 @@ def _check_recordable(problem: Problem) -> None:
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
     if plain.sha256 != problem.sha256:
         raise InputError(
-            f"a manifest cannot record {problem.name} with integers fixed or products lifted; write it as a single file"
+            f"a manifest cannot record {problem.name} with columns fixed or products lifted; write it as a single file"
         )
 
 

@@ -59,7 +59,7 @@ WIDTH: Final = 110
 def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .mod file. header: lines of comment, without the comment sign.
 
-    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with integers fixed.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
     _check(problem)
     context = {
@@ -102,7 +102,7 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
 def _check(problem: Problem) -> None:
     instance = problem.instance
     if problem.pinned is not None:
-        raise UnsupportedByFormatError("mod has no place for integers fixed one by one; write nl, lp or mps")
+        raise UnsupportedByFormatError("mod has no place for columns fixed one by one; write nl, lp or mps")
     for name, values in (("w", instance.w), ("w_strokes", instance.w_strokes), ("w_beta", instance.w_beta)):
         check_coefficients(values, f"{name} of {instance.name}")
 

@@ -20,7 +20,7 @@ from .formulations import FORMULATIONS, Family, Formulation, declare, lift_produ
 from .grid import Bools, Floats, Ints
 from .instance import Instance
 from .monomials import beyond_noise, merged, monomials, ordered
-from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, elements, numeric, way
+from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
 
 Coefficient = float | Floats
 
@@ -187,16 +187,18 @@ class Problem:
     """A formulation bound to an instance.
 
     jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns are fixed
-    (equal bounds, continuous), or None.
+    (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are not fixed; the angles and
+    jumps of all others then are.
     """
 
     instance: Instance
     formulation: Formulation
     jumps: Ints | None = None
     pinned: CrossField | None = None
+    free: Bools | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data, and that fixed integers are of this instance."""
+        """Check that jumps are there exactly where they are data, and that what is fixed is of this instance."""
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -212,6 +214,10 @@ class Problem:
             object.__setattr__(self, "jumps", jumps)
         if self.pinned is not None:
             self._check_instance_of(self.pinned)
+        if self.free is not None and self.free.shape != (self.instance.grid.size,):
+            raise FormulationError(
+                f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
+            )
 
     def _check_instance_of(self, field: CrossField) -> None:
         if field.instance.sha256 != self.instance.sha256:
@@ -250,12 +256,24 @@ class Problem:
                 for bound in (variable.lower, variable.upper)
             )
             integer = variable.integer and not self.formulation.options.relax
-            if variable.integer and self.pinned is not None:
-                lower = upper = _at_field(self, name, _angles_and_jumps(self.pinned))
-                integer = False
+            fixed = self._fixed(variable)
+            if self.pinned is not None and fixed is not None:
+                at = _at_field(self, name, _angles_and_jumps(self.pinned))
+                lower, upper = np.where(fixed, at, lower), np.where(fixed, at, upper)
+                integer = integer and not fixed.all()
             blocks[name] = Block(name, variable.over, offset, lower, upper, integer)
             offset += shape[0]
         return blocks
+
+    def _fixed(self, variable: Variable) -> Bools | None:
+        """True for the columns of a variable that are fixed at the pinned field, if there is one; None when none of them can be."""
+        count = elements(self.instance, variable.over)
+        if self.free is None:
+            return np.ones(count, bool) if variable.integer else None
+        if variable.integer:
+            grid = self.instance.grid
+            return ~(self.free[grid.first] | self.free[grid.second])
+        return ~self.free if variable.name in {"alpha", "beta"} else None
 
     @property
     def columns(self) -> int:
@@ -403,14 +421,14 @@ class Problem:
     def sha256(self) -> str:
         """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {self.formulation.lifted}"
-        given = [
-            jumps
-            for jumps in (self.jumps, None if self.pinned is None else self.pinned.p)
-            if jumps is not None
-        ]
-        return hashlib.sha256(
-            text.encode() + b"".join(jumps.astype("<i4").tobytes() for jumps in given)
-        ).hexdigest()
+        digest = hashlib.sha256(text.encode())
+        for jumps in (self.jumps, None if self.pinned is None else self.pinned.p):
+            digest.update(b"" if jumps is None else jumps.astype("<i4").tobytes())
+        if self.pinned is not None and self.free is not None:
+            for values in (self.pinned.alpha, self.pinned.beta):
+                digest.update(values.astype("<f8").tobytes())
+            digest.update(np.packbits(self.free).tobytes())
+        return digest.hexdigest()
 
 
 def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
@@ -477,6 +495,14 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     return replace(problem, pinned=field)
 
 
+def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem:
+    """The same problem in which only the angles of some pixels and the jumps to and between them are free; all else as in a field.
+
+    free: those pixels, shape (n,). Raises InstanceError when the field is on another instance, FormulationError for another shape.
+    """
+    return replace(problem, pinned=field, free=free)
+
+
 def lifted(problem: Problem) -> Problem:
     """The same problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic."""
     return replace(problem, formulation=lift_products(problem.formulation))
@@ -492,4 +518,5 @@ __all__ = [
     "formulate",
     "lifted",
     "with_integers_fixed",
+    "with_rest_fixed",
 ]

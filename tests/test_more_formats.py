@@ -315,7 +315,7 @@ def test_the_ampl_model_grows_with_the_data_alone(tmp_path: Path):
 
 @pytest.mark.parametrize("label", PINNED[:2])
 def test_the_ampl_model_refuses_fixed_integers(label: str, tmp_path: Path):
-    with pytest.raises(UnsupportedByFormatError, match="integers fixed one by one; write nl, lp or mps"):
+    with pytest.raises(UnsupportedByFormatError, match="columns fixed one by one; write nl, lp or mps"):
         write(problem_of(label), tmp_path / "model.mod")
     assert list(tmp_path.iterdir()) == []
 
