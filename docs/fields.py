@@ -1,8 +1,9 @@
 """Make docs/fields.md: how good the fields of each method are, against each other and against proven optima.
 
-    python docs/fields.py [--sketches FOLDER] [--seconds S]
+    python docs/fields.py [--sketches FOLDER] [--seconds S] [--work FOLDER]
 
-Takes about 2 S seconds for each sample and each sketch of the folder. Each search is a `crossfield solve --method search` of its own.
+Takes about 2 S seconds for each sample and each sketch of the folder. Each field comes from a `crossfield solve --method` of its own. With
+--work, what is done stays in that folder, and the command goes on there when it is given again.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from typing import Any, Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.manifest import write_all
-from crossfield.export.verify import verify
+from crossfield.export.verify import Finding, verify
+from crossfield.models.field import CrossField
 from crossfield.models.instance import Instance
 from crossfield.models.samples import SAMPLES
 from make import markdown, said
@@ -35,8 +37,11 @@ LARGE: Final = 128
 LARGE_SKETCHES: Final = 4
 PICTURED: Final = ("cylinder_bend", "mouse", "singular")
 SKETCHES: Final = (".svg", ".png", ".scap")
-PROOF_SECONDS: Final = 30.0
-RANDOM: Final = 8  # random instances of 4 x 5 pixels: more has too many columns for Gurobi's free edition
+PROVERS: Final = ("gurobi", "cplex")
+PROOF_SECONDS: Final = 60.0
+RANDOM: Final = 8  # random instances of 5 x 5 pixels
+WINDOWED: Final = ("cylinder_bend", "mouse", "singular")
+WINDOW_SECONDS: Final = 40.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def sketches(folder: Path | None) -> list[Sketch]:
 
 @dataclass(frozen=True)
 class Row:
-    """What the methods made of a sketch. memory: bytes of all processes of the search together, at most."""
+    """What the methods made of a sketch. improved: energy of the greedy field, improved; the search's memory in bytes, at most."""
 
     sketch: Sketch
     size: int
@@ -81,42 +86,63 @@ class Row:
     greedy: dict[str, Any]
     power: dict[str, Any]
     search: dict[str, Any]
-    memory: int
+    improved: float
 
     @property
     def lower(self) -> float:
-        """By which share the search is below the greedy field; 0 where both are nothing but the price of beta."""
-        greedy, search = self.greedy["energy_2_norm"], self.search["energy_2_norm"]
-        return float((greedy - search) / greedy) if greedy > 1e-3 else 0.0
+        """By which share the search is below the greedy field."""
+        return share(self.greedy["energy_2_norm"], self.search["energy_2_norm"])
+
+    @property
+    def lower_than_improved(self) -> float:
+        """By which share the search is below the greedy field, improved."""
+        return share(self.improved, self.search["energy_2_norm"])
 
     def cells(self) -> list[str]:
         """Its line of the table."""
         facts = (self.greedy, self.power, self.search)
+        greedy, power, search = (f"{each['energy_2_norm']:.4f}" for each in facts)
         return [
             self.sketch.name,
             str(self.size),
             str(self.pixels),
-            *(f"{each['energy_2_norm']:.4f}" for each in facts),
-            f"{100 * self.lower:.1f} %",
+            greedy,
+            f"{self.improved:.4f}",
+            power,
+            search,
+            f"{100 * self.lower:.1f} % / {100 * self.lower_than_improved:.1f} %",
             " / ".join(str(each["singularities"]) for each in facts),
             " / ".join(f"{each['mean_abs_beta_degrees']:.1f}" for each in facts),
             " / ".join(f"{each['seconds']:.1f}" for each in facts),
-            f"{self.memory / 1e9:.2f}",
+            f"{self.search['memory'] / 1e9:.2f}",
         ]
 
 
+def share(greedy: float, search: float) -> float:
+    """By which share the search is below; 0 where both are nothing but the price of beta."""
+    return float((greedy - search) / greedy) if greedy > 1e-3 else 0.0
+
+
 COLUMNS: Final = (
-    "sketch", "size", "pixels", "greedy", "power + QP", "search", "lower by", "singularities", "mean abs(beta)", "seconds", "GB",
+    "sketch", "size", "pixels", "greedy", "improved", "power + QP", "search", "lower by", "singularities", "mean abs(beta)", "seconds",
+    "GB",
 )  # fmt: skip
 
 
 def solved(
-    sketch: Sketch, size: int, method: str, seconds: float, folder: Path
-) -> tuple[dict[str, Any], int]:
-    """The facts of `crossfield solve --method`, and the most memory its processes took together, in bytes."""
+    sketch: Sketch, size: int, method: str, seconds: float, folder: Path, *options: str
+) -> dict[str, Any]:
+    """The facts of `crossfield solve --method`, and `memory`: the most that its processes took together, in bytes.
+
+    In the folder they stay, with the field, and are read from there the next time.
+    """
+    kept = folder / "facts.json"
+    if kept.exists():
+        return dict(json.loads(kept.read_text()))
     command = [
         *(sys.executable, "-m", "crossfield", "solve", *sketch.arguments),
         *("--size", str(size), "--method", method, "--time-limit", str(seconds), "--json", "-o", str(folder)),
+        *options,
     ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         most = 0
@@ -126,7 +152,15 @@ def solved(
         answer = process.communicate()[0]
     if process.returncode:
         raise SystemExit(f"{sketch.name}: exit code {process.returncode}")
-    return dict(json.loads(answer)), most
+    facts = dict(json.loads(answer)) | {"memory": most}
+    kept.write_text(json.dumps(facts, indent=1) + "\n")
+    return facts
+
+
+def field_in(folder: Path) -> Path:
+    """The field that `solved` left in a folder."""
+    (path,) = folder.glob("*.field.npz")
+    return path
 
 
 def memory_of(session: int) -> int:
@@ -143,24 +177,29 @@ def memory_of(session: int) -> int:
 
 def row(sketch: Sketch, size: int, seconds: float, folder: Path) -> Row:
     """All methods on a sketch."""
-    facts = {}
-    memory = 0
-    for method in ("greedy", "power", "search"):
-        facts[method], memory = solved(sketch, size, method, seconds, folder)
-    found = Row(sketch, size, sketch.instance(size).grid.size, *facts.values(), memory)
+    here = place(folder, sketch, size)
+    facts = [solved(sketch, size, method, seconds, here / method) for method in ("greedy", "power", "search")]
+    greedy = cf.read_field(field_in(here / "greedy"))
+    found = Row(sketch, size, greedy.instance.grid.size, *facts, cf.improved(greedy).energy().total)
     print(*found.cells(), file=sys.stderr, flush=True)
     return found
 
 
-def picture(name: str, folder: Path) -> str:
+def place(folder: Path, sketch: Sketch, size: int) -> Path:
+    """The folder for the fields of a sketch of that size."""
+    return folder / f"{sketch.name}_{size}"
+
+
+def picture(sketch: Sketch, folder: Path) -> str:
     """A picture of the greedy field and that of the search side by side, and the Markdown that shows it."""
-    fields = {method: cf.read_field(folder / f"{name}.{method}.field.npz") for method in ("greedy", "search")}
+    name, here = sketch.name, place(folder, sketch, max(SIZES))
+    fields = {method: cf.read_field(field_in(here / method)) for method in ("greedy", "search")}
     images = []
     for method, field in fields.items():
         title = (
             f"{method}: energy {field.energy().total:.3f}, singularities: {len(field.singularities.index)}"
         )
-        images.append(Image.open(cf.draw(field, folder / f"{method}.png", title=title)).convert("RGB"))
+        images.append(Image.open(cf.draw(field, here / f"{method}.png", title=title)).convert("RGB"))
     both = Image.new("RGB", (sum(i.width for i in images), max(i.height for i in images)), "white")
     both.paste(images[0], (0, 0))
     both.paste(images[1], (images[0].width, 0))
@@ -169,10 +208,34 @@ def picture(name: str, folder: Path) -> str:
     return f"![{name}: greedy on the left, search on the right](pictures/{path.name})"
 
 
+def windows(sketch: Sketch, folder: Path) -> list[str]:
+    """A line of the table of windows: what exact solvers reach from the improved greedy field, and from that of the search."""
+    size, here = min(SIZES), place(folder, sketch, min(SIZES))
+    start = here / "improved.npz"
+    cf.write_field(cf.improved(cf.read_field(field_in(here / "greedy"))), start)
+    cells = [sketch.name, f"{cf.read_field(start).energy().total:.4f}"]
+    walk = solved(sketch, size, "search", WINDOW_SECONDS, here / "walk", "--start", str(start))
+    cells.append(f"{walk['energy_2_norm']:.4f}")
+    found = str(field_in(here / "search"))
+    for solver, given in (("bonmin", str(start)), ("highs", str(start)), ("bonmin", found), ("highs", found)):
+        kept = here / f"windows-{solver}-{'start' if given == str(start) else 'search'}"
+        options = ("--solver", solver, "--start", given)
+        facts = solved(sketch, size, "windows", WINDOW_SECONDS, kept, *options)
+        counts = [facts[key] for key in ("windows", "windows_closed", "windows_lower")]
+        cells.append(f"{facts['energy_2_norm']:.4f} ({' / '.join(map(str, counts))})")
+    print(*cells, file=sys.stderr, flush=True)
+    return cells
+
+
+WINDOW_COLUMNS: Final = (
+    "sketch", "improved", "walk", "Bonmin", "HiGHS", "search, then Bonmin", "search, then HiGHS",
+)  # fmt: skip
+
+
 def tiny() -> Iterator[Instance]:
-    """Instances that are small enough for a proof: samples as small as they come, and random strokes on 4 x 5 pixels."""
+    """Instances that are small enough for a proof: samples as small as they come, and random strokes on 5 x 5 pixels."""
     for name in SAMPLES:
-        for size in range(4, 12):
+        for size in range(5, 12):
             try:
                 instance = cf.sample(name, size)
             except cf.CrossfieldError:  # the outline leaves no room on so coarse a grid
@@ -182,9 +245,9 @@ def tiny() -> Iterator[Instance]:
                 break
     for seed in range(RANDOM):
         rng = np.random.default_rng(seed)
-        pixels = np.argwhere(rng.random((4, 5)) < 0.5)
+        pixels = np.argwhere(rng.random((5, 5)) < 0.5)
         theta = rng.uniform(0, np.pi, len(pixels))
-        yield Instance(f"random_{seed}", np.ones((4, 5), bool), pixels, theta, np.ones(len(pixels)))
+        yield Instance(f"random_{seed}", np.ones((5, 5), bool), pixels, theta, np.ones(len(pixels)))
 
 
 def proofs() -> str:
@@ -195,21 +258,9 @@ def proofs() -> str:
         field = cf.search(instance, rounds=40).field
         seconds = time.perf_counter() - begin
         greedy, found = cf.greedy(instance).energy().total, field.energy().total
-        with tempfile.TemporaryDirectory() as folder:
-            write_all(instance, folder, ["miqp-exact"], ["mps"], start=field)
-            known = [
-                f
-                for f in verify(folder, seconds=PROOF_SECONDS, consumers=["gurobi", "scip"]).findings
-                if f.step == "solve" and f.objective is not None
-            ]
-        best = next((f for f in known if f.proven), None)
-        bound = max((f.bound for f in known if f.bound is not None), default=None)
+        best, bound = optimum(instance, field)
+        same = best is not None and abs(found - best.objective) <= 1e-6 * max(1, found)
         proven += best is not None
-        same = (
-            best is not None
-            and best.objective is not None
-            and abs(found - best.objective) <= 1e-6 * max(1, found)
-        )
         equal += same
         rows.append(
             [
@@ -218,12 +269,8 @@ def proofs() -> str:
                 f"{greedy:.7f}",
                 f"{found:.7f}",
                 f"{seconds:.1f}",
-                "" if best is None else f"{best.objective:.7f}",
-                f"{best.consumer}, {best.seconds:.1f} s"
-                if best
-                else f"best bound {bound:.7f}"
-                if bound
-                else "none",
+                f"{best.objective:.7f}" if best else f"at least {bound:.7f}" if bound else "",
+                f"{best.consumer}, {best.seconds:.1f} s" if best else "none",
                 "yes" if same else "no" if best else "open",
             ]
         )
@@ -231,7 +278,21 @@ def proofs() -> str:
     table = markdown(
         ("instance", "grid", "greedy", "search", "s", "proven optimum", "by", "equal to 1e-6"), rows
     )
-    return f"The search is equal to the proven optimum in {equal} of {proven}.\n\n{table}"
+    return f"The search is equal to the proven optimum in {equal} of {proven}; {len(rows) - proven} of {len(rows)} stay open.\n\n{table}"
+
+
+def optimum(instance: Instance, start: CrossField) -> tuple[Finding | None, float | None]:
+    """The finding of the first prover that closes `miqp-exact`, or None; and the best dual bound of all that were asked."""
+    bounds = []
+    with tempfile.TemporaryDirectory() as folder:
+        write_all(instance, folder, ["miqp-exact"], ["mps"], start=start)
+        for prover in PROVERS:
+            for finding in verify(folder, seconds=PROOF_SECONDS, consumers=[prover]).findings:
+                if finding.step == "solve" and finding.proven:
+                    return finding, finding.bound
+                if finding.step == "solve" and finding.bound is not None:
+                    bounds.append(finding.bound)
+    return None, max(bounds, default=None)
 
 
 def summary(rows: list[Row]) -> str:
@@ -240,18 +301,31 @@ def summary(rows: list[Row]) -> str:
     for size in (*SIZES, None):
         chosen = [row for row in rows if size in {row.size, None}]
         worse = sum(row.search["energy_2_norm"] > row.greedy["energy_2_norm"] * (1 + 1e-9) for row in chosen)
-        mean = 100 * float(np.mean([row.lower for row in chosen]))
+        shares = [row.lower for row in chosen]
+        numbers = (
+            np.mean(shares),
+            np.median(shares),
+            max(shares),
+            np.mean([row.lower_than_improved for row in chosen]),
+        )
         lines.append(
             [
                 "both" if size is None else str(size),
                 str(len(chosen)),
                 str(worse),
-                f"{mean:.1f} %",
-                f"{100 * float(np.median([row.lower for row in chosen])):.1f} %",
-                f"{100 * max(row.lower for row in chosen):.1f} %",
+                *(f"{100 * float(number):.1f} %" for number in numbers),
             ]
         )
-    return markdown(("size", "sketches", "search worse", "lower on average", "median", "most"), lines)
+    columns = (
+        "size",
+        "sketches",
+        "search worse",
+        "lower on average",
+        "median",
+        "most",
+        "than improved, on average",
+    )
+    return markdown(columns, lines)
 
 
 def main() -> None:
@@ -259,31 +333,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Compare the methods and write docs/fields.md.")
     parser.add_argument("--sketches", type=Path, help="Folder with further drawings: .svg, .png, .scap.")
     parser.add_argument("--seconds", type=float, default=120.0, help="Time limit of each search.")
-    parser.add_argument(
-        "--proofs", action="store_true", help="Make the last section again, and leave the others."
-    )
+    parser.add_argument("--work", type=Path, help="Folder for what is done; to go on there later.")
     given = parser.parse_args()
-    if given.proofs:
-        before = (DOCS / "fields.md").read_text().partition(PROOFS)[0]
-        (DOCS / "fields.md").write_text(before + PROOFS + proofs() + "\n")
-        return
     every = sketches(given.sketches)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+        folder = given.work or Path(name)
         rows = [row(sketch, size, given.seconds, folder) for size in SIZES for sketch in every]
-        pictures = [picture(sketch, folder) for sketch in PICTURED]
         large = [row(sketch, LARGE, given.seconds, folder) for sketch in every[-LARGE_SKETCHES:]]
-    text = PAGE.format(
-        said=said(f"python docs/fields.py --sketches FOLDER --seconds {given.seconds:g}"),
-        seconds=f"{given.seconds:g}",
-        cores=os.cpu_count(),
-        python=platform.python_version(),
-        summary=summary(rows),
-        table=markdown(COLUMNS, [each.cells() for each in rows]),
-        large=markdown(COLUMNS, [each.cells() for each in large]),
-        pictures="\n\n".join(pictures),
-    )
-    (DOCS / "fields.md").write_text(text + PROOFS + proofs() + "\n")
+        exact = [windows(sketch, folder) for sketch in [*named(every, WINDOWED), every[-1]]]
+        text = PAGE.format(
+            said=said(f"python docs/fields.py --sketches FOLDER --seconds {given.seconds:g}"),
+            seconds=f"{given.seconds:g}",
+            cores=os.cpu_count(),
+            python=platform.python_version(),
+            summary=summary(rows),
+            table=markdown(COLUMNS, [each.cells() for each in rows]),
+            large=markdown(COLUMNS, [each.cells() for each in large]),
+            pictures="\n\n".join(picture(sketch, folder) for sketch in named(every, PICTURED)),
+            windows=markdown(WINDOW_COLUMNS, exact),
+            window_seconds=f"{WINDOW_SECONDS:g}",
+            window_size=min(SIZES),
+            proof_seconds=f"{PROOF_SECONDS:g}",
+            proofs=proofs(),
+        )
+    (DOCS / "fields.md").write_text(text)
+
+
+def named(every: list[Sketch], names: tuple[str, ...]) -> list[Sketch]:
+    """The sketches of those names."""
+    return [sketch for sketch in every if sketch.name in names]
 
 
 PAGE: Final = """# How good the fields are
@@ -294,7 +372,8 @@ PAGE: Final = """# How good the fields are
 best angles for its jumps (`--method power`). Energies are 2-norm energies of fields inside all bounds; lower is better. Singularities, mean
 skew abs(beta) in degrees and seconds stand in the order greedy / power + QP / search. {cores} cores, Python {python}. GB: memory of
 all processes of the search together, pages that they share counted in each. The search starts from the greedy field and the power field, both
-improved, so that it cannot end above either.
+improved, so that it cannot end above either. *improved* is the greedy field after local improvement (`crossfield.improved`), from which solvers
+start; *lower by* is the search against greedy / against improved.
 
 {summary}
 
@@ -310,12 +389,21 @@ Size 48; the greedy field on the left, that of the search on the right. Triangle
 
 {pictures}
 
-"""
+## Windows solved exactly
 
-PROOFS: Final = f"""## Against proven optima
+`crossfield solve --method windows` sets small windows of the grid free, fixes all else and hands each to a solver: `miqp-exact` to Bonmin, in
+windows of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in windows of 5 x 5 and more. Size {window_size}, {window_seconds} s each; *walk* is `search`, and both
+go on from the improved greedy field. The last two columns go on from the field of the search above. In brackets: windows solved / solved to the
+end / that lowered the energy.
 
-`miqp-exact` is the same problem as a convex MIQP: its file goes to Gurobi (free edition) and SCIP, {PROOF_SECONDS:g} s each. The search takes 40 rounds.
+{windows}
 
+## Against proven optima
+
+`miqp-exact` is the same problem as a convex MIQP: its file goes to the free editions of Gurobi, then CPLEX, {proof_seconds} s each, until one proves the
+optimum. The search takes 40 rounds.
+
+{proofs}
 """
 
 if __name__ == "__main__":

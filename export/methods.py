@@ -13,25 +13,28 @@ import numpy as np
 from ..models.box_qp import fitted
 from ..models.field import CrossField
 from ..models.greedy import greedy
+from ..models.improvement import first_field
 from ..models.instance import Instance
 from ..models.power_field import power_field
 from ..models.search import search
 from .solution import Solution
 from .solvers import Limits
 from .stages import find_jumps, fit_angles
+from .windows import WINDOW_SOLVERS, search_windows
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A field and how it was found: method, seconds, and the solution file's facts where a solver gave it."""
+    """A field and how it was found: method, seconds, what was counted, and the solution file's facts where a solver gave it."""
 
     method: str
     field: CrossField
     seconds: float
     solution: Solution | None = None
     interrupted: bool = False
+    counts: tuple[tuple[str, int], ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """What a report says of it: energies in both norms, singularities, skew, and claims beside recomputed values."""
@@ -45,6 +48,7 @@ class Candidate:
             "mean_abs_beta_degrees": float(np.degrees(np.abs(answer.beta).mean())),
             "seconds": round(self.seconds, 3),
             "interrupted": self.interrupted,
+            **dict(self.counts),
         }
         return facts if self.solution is None else facts | solution_facts(self.solution)
 
@@ -82,7 +86,8 @@ def _tell_nobody(_text: str) -> None:
 class Request:
     """What a method is asked: the instance, a folder for files of solvers, limits, and options of the formulations.
 
-    start: a field to go on from, for methods that start from one; None: their own, the greedy field.
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver: one of those that the
+    method can do with; None: the method's choice.
     """
 
     instance: Instance
@@ -90,16 +95,22 @@ class Request:
     limits: Limits = field(default_factory=Limits)
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
+    solver: str | None = None
     progress: Progress = _tell_nobody
 
 
 @dataclass(frozen=True)
 class Method:
-    """A way to a field. find: the fields it comes to, one by one, for a later one may fail; the last one is its answer."""
+    """A way to a field. find: the fields it comes to, one by one, for a later one may fail; the last one is its answer.
+
+    solvers: those that may be chosen for it; in_runs: whether `run` tries it.
+    """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
+    solvers: tuple[str, ...] = ()
+    in_runs: bool = True
 
 
 def _greedy(request: Request) -> Iterator[Candidate]:
@@ -115,22 +126,55 @@ def _power(request: Request) -> Iterator[Candidate]:
 
 
 def _search(request: Request) -> Iterator[Candidate]:
+    begin = time.perf_counter()
+    request.progress("search: starting fields")
+    found = search(
+        request.instance,
+        seconds=request.limits.seconds,
+        jobs=_processes(request),
+        start=request.start,
+        progress=_teller(request, "search", "rounds"),
+    )
+    seconds = time.perf_counter() - begin
+    interrupted = found.ended == "interrupted"
+    yield Candidate(
+        "search", found.field, seconds, interrupted=interrupted, counts=(("rounds", found.rounds),)
+    )
+
+
+def _windows(request: Request) -> Iterator[Candidate]:
+    begin = time.perf_counter()
+    request.progress("windows: greedy field")
+    found = search_windows(
+        request.start or first_field(request.instance),
+        seconds=request.limits.seconds,
+        solver=request.solver or "bonmin",
+        jobs=_processes(request),
+        progress=_teller(request, "windows", "windows"),
+    )
+    seconds = time.perf_counter() - begin
+    counts = (("windows", found.windows), ("windows_closed", found.closed), ("windows_lower", found.lower))
+    interrupted = found.ended == "interrupted"
+    yield Candidate("windows", found.field, seconds, interrupted=interrupted, counts=counts)
+
+
+def _processes(request: Request) -> int:
     import joblib
 
-    limits = request.limits
-    begin = time.perf_counter()
+    return int(request.limits.threads or joblib.cpu_count())
 
-    def tell(rounds: int, energy: float) -> None:
-        left = max(0.0, limits.seconds - time.perf_counter() + begin)
+
+def _teller(request: Request, method: str, things: str) -> Callable[[int, float], None]:
+    """What tells how far a search is that has just begun: how many of the things it counts, the energy, and the time left."""
+    end = time.perf_counter() + request.limits.seconds
+
+    def tell(count: int, energy: float) -> None:
+        left = max(0.0, end - time.perf_counter())
         request.progress(
-            f"search: energy {energy:.5g} after {rounds} rounds, at most {left:.0f} s more; Ctrl-C keeps the best field so far"
+            f"{method}: energy {energy:.5g} after {count} {things}, at most {left:.0f} s more; Ctrl-C keeps the best field so far"
         )
 
-    request.progress("search: starting fields")
-    jobs = limits.threads or joblib.cpu_count()
-    found = search(request.instance, seconds=limits.seconds, jobs=jobs, start=request.start, progress=tell)
-    seconds = time.perf_counter() - begin
-    yield Candidate("search", found.field, seconds, interrupted=found.ended == "interrupted")
+    return tell
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:
@@ -150,6 +194,10 @@ METHODS: Final = {
         Method("greedy", "the greedy strategy of BendFields, then the best angles: the baseline", _greedy),
         Method("power", "smooth exp(4 i theta), right angles; then the best angles for its jumps", _power),
         Method("search", "local search over jumps and singularities from the greedy field on, up to the time limit", _search),
+        Method(
+            "windows", "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit", _windows,
+            solvers=tuple(WINDOW_SOLVERS), in_runs=False,
+        ),
         Method("two-stage", "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed", _two_stage),
     )
 }  # fmt: skip

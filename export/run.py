@@ -117,9 +117,9 @@ def run(
         jobs=jobs,
         progress=lambda name: progress(f"writing {name}"),
     )
-    request = Request(instance, folder / "solve", limits, options or {}, start, progress)
+    request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
     candidates, failures = list[Candidate](), dict[str, str]()
-    for method in METHODS.values():
+    for method in (each for each in METHODS.values() if each.in_runs):
         try:
             for candidate in method.find(request):
                 candidates.append(candidate)

@@ -44,7 +44,10 @@ def solve_command(
     method: Annotated[
         str | None,
         typer.Option(
-            "-m", "--method", metavar="NAME", help="Way to a field: search, two-stage, greedy or power."
+            "-m",
+            "--method",
+            metavar="NAME",
+            help="Way to a field: search, windows, two-stage, greedy or power.",
         ),
     ] = None,
     solver: Annotated[
@@ -84,13 +87,14 @@ def solve_command(
             Limits(time_limit, gap, threads),
             options_of(facet, stroke_norm, beta_norm, relax=relax),
             None if start is None else start_field(start, loaded),
+            solver,
             show,
         )
         if method is not None:
-            _refuse_with_method(solver=solver, relax=relax)
+            _check_method(method, solver, relax=relax)
             candidate, target = _by_method(method, request)
         else:
-            solution, target = _by_solver(str(formulation), solver, request)
+            solution, target = _by_solver(str(formulation), request)
     if method is not None:
         _tell_candidate(candidate, target, quiet=quiet, as_json=as_json)
         return
@@ -103,9 +107,17 @@ def solve_command(
         )
 
 
-def _refuse_with_method(*, solver: str | None, relax: bool) -> None:
-    if solver is not None or relax:
-        raise typer.BadParameter("--solver and --relax go with --formulation; a method has its own solvers")
+def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
+    """Refuse an unknown method, and what goes with formulations alone."""
+    from .methods import METHODS
+
+    known([name], METHODS, "method")
+    if relax:
+        raise typer.BadParameter("--relax goes with --formulation, not with a method")
+    solvers = METHODS[name].solvers
+    if solver is not None and solver not in solvers:
+        what = f"can do with {' or '.join(solvers)}" if solvers else "has its own solvers"
+        raise typer.BadParameter(f"--solver {solver}: the method {name} {what}")
 
 
 def _by_method(name: str, request: Request) -> tuple[Candidate, Path]:
@@ -114,14 +126,13 @@ def _by_method(name: str, request: Request) -> tuple[Candidate, Path]:
     from ..models.storage import make_folder
     from .methods import METHODS
 
-    known([name], METHODS, "method")
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     return candidate, target
 
 
-def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
+def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     """The solution of one formulation, and the file of its field, which is there if it has a point."""
     from ..models.field_file import write_field
     from ..models.formulations import FORMULATIONS
@@ -136,7 +147,7 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
     jumps = start.p if FORMULATIONS[name].fixed else None
     problem = formulate(instance, name, p=jumps, **request.options)
     request.progress(f"solving {name}, at most {seconds:g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, solver, request.folder, limits=request.limits, start=start)
+    solution = solve(problem, request.solver, request.folder, limits=request.limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None:
         target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one

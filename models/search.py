@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,9 +23,10 @@ from .free_field import FreeField, free_bounds
 from .grid import Bools
 from .improvement import first_field, improved, settle, stroke_curves
 from .instance import Instance
-from .interruption import deaf_children, interruptible
+from .interruption import interruptible
 from .power_field import power_field
 from .quadratic import Solver
+from .side_by_side import side_by_side
 
 Progress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
@@ -80,7 +80,7 @@ def search(
         limits = _Limits(np.inf if seconds is None else time.monotonic() + seconds, rounds, interrupted)
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
         try:
-            with _explorers(1 if instance.grid.size <= _ALONE else jobs) as explorers:
+            with side_by_side(explore, 1 if instance.grid.size <= _ALONE else jobs) as explorers:
                 if hunt.large:
                     for field in _from_coarse(instance, seed, limits, explorers):
                         hunt.offer(field)
@@ -142,20 +142,6 @@ def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> Cro
 
 def _energy(field: CrossField) -> float:
     return round(field.energy().total, 9)
-
-
-@contextmanager
-def _explorers(jobs: int) -> Iterator[Explorers]:
-    """A function that explores windows side by side, in the order of the tasks, in that many processes."""
-    if jobs == 1:
-        yield lambda tasks: [explore(task) for task in tasks]
-        return
-    from joblib import Parallel, delayed
-
-    with Parallel(n_jobs=jobs, backend="loky") as parallel:
-        with deaf_children():
-            parallel(delayed(int)() for _ in range(jobs))
-        yield lambda tasks: list(parallel(delayed(explore)(task) for task in tasks))
 
 
 class _Hunt:

@@ -1,0 +1,26 @@
+"""The same work on several tasks at once, in processes that Ctrl-C does not reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+from .interruption import deaf_children
+
+Task = TypeVar("Task")
+Found = TypeVar("Found")
+
+
+@contextmanager
+def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
+    """A function that does the work on each of some tasks, in that many processes, and gives what was found in their order."""
+    if jobs == 1:
+        yield lambda tasks: [work(task) for task in tasks]
+        return
+    from joblib import Parallel, delayed
+
+    with Parallel(n_jobs=jobs, backend="loky") as parallel:
+        with deaf_children():
+            parallel(delayed(int)() for _ in range(jobs))
+        yield lambda tasks: list(parallel(delayed(work)(task) for task in tasks))
