@@ -176,7 +176,7 @@ class Layout:
     def group(self) -> NDArray[np.int8]:
         """Group 0..8 of each column; small integers are sorted by counting."""
         problem, rows, objective = self.problem, self.in_rows, self.in_objective
-        binary = problem.integer & (problem.lower == 0) & (problem.upper == 1)
+        binary = problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
         nonlinear = np.where(rows & objective, 0, np.where(rows, 2, 4)) + problem.integer
         linear = np.where(binary, 7, np.where(problem.integer, 8, 6))
         return np.where(rows | objective, nonlinear, linear).astype(np.int8)

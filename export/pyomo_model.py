@@ -72,7 +72,7 @@ def _variables(block: Block, index: list[Place], point: Floats | None) -> pyo.Va
     )
     bounds = dict(zip(index, zip(*ends, strict=True), strict=True))
     values = {} if point is None else dict(zip(index, point[block.columns].tolist(), strict=True))
-    binary = bool((block.lower == 0).all() and (block.upper == 1).all())
+    binary = bool((block.lower >= 0).all() and (block.upper <= 1).all())
     domain = (pyo.Binary if binary else pyo.Integers) if block.integer else pyo.Reals
     return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
 

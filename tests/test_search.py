@@ -1,13 +1,9 @@
 """The search: its formulas against dense least squares, its answers against all jumps, and what it promises."""
 
-import os
-import signal
-import subprocess
-import sys
-
 import crossfield as cf
 import numpy as np
 import pytest
+from children import interrupted
 from crossfield.models.coarse import halved, prolonged
 from crossfield.models.field import CrossField
 from crossfield.models.greedy import greedy
@@ -209,18 +205,7 @@ if True:
 
 @pytest.mark.solver
 def test_ctrl_c_gives_the_best_field_so_far():
-    child = subprocess.Popen(
-        [sys.executable, "-c", CHILD],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    assert child.stdout.readline() == "1\n"
-    os.killpg(child.pid, signal.SIGINT)
-    out, err = child.communicate(timeout=60)
-    assert (child.returncode, err) == (0, "")
-    ended, energy = out.splitlines()[-1].split()
+    ended, energy = interrupted(CHILD)
     assert ended == "interrupted"
     assert float(energy) <= first_field(cf.sample("mouse", 16)).energy().total + 1e-9
 

@@ -1,14 +1,13 @@
 """Windows that exact solvers solve: pieces of a field, the search over them, and what it promises."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
 
 import crossfield as cf
 import numpy as np
 import pytest
+from children import interrupted
 from crossfield.export.windows import WINDOW_SOLVERS, search_windows
 from crossfield.models.excerpt import excerpt
 from crossfield.models.field import CrossField
@@ -142,17 +141,6 @@ if True:
 
 @pytest.mark.solver
 def test_ctrl_c_gives_the_best_field_so_far():
-    child = subprocess.Popen(
-        [sys.executable, "-c", CHILD],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    assert int(child.stdout.readline()) > 0
-    os.killpg(child.pid, signal.SIGINT)
-    out, err = child.communicate(timeout=60)
-    assert (child.returncode, err) == (0, "")
-    ended, energy = out.splitlines()[-1].split()
+    ended, energy = interrupted(CHILD)
     assert ended == "interrupted"
     assert float(energy) <= first_field(cf.sample("mouse", 12)).energy().total + 1e-9
