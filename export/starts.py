@@ -26,12 +26,12 @@ from ..models.errors import InputError, UnsupportedByFormatError, UnsupportedByS
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem
-from ..models.storage import write_bytes
 from .capabilities import takes
 from .formats import FORMATS, carried
 from .lp import needs_one
-from .names import ONE, column_names, family_names
-from .records import number
+from .names import ONE, Names
+from .records import Decimals, Pieces, number, render, words
+from .sink import save
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,61 +46,72 @@ class Start:
         """The objective, recomputed."""
         return self.problem.objective_value(self.point)
 
-    def lines(self) -> Iterator[tuple[str, str]]:
-        """Name and value of every column, shortest round trip."""
-        names = [bytes(row).rstrip(b"\0").decode() for row in column_names(self.problem)]
-        yield from zip(names, map(number, self.point.tolist()), strict=True)
+    @property
+    def columns(self) -> int:
+        """Number of columns, ONE included."""
+        return self.problem.columns + needs_one(self.problem)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows, the one that LP and MPS have where there is none included."""
+        return self.problem.row_count or 1
+
+    def lines(self, before: bytes = b"", *, zeros: bool = True) -> Iterator[bytes]:
+        """A line `name value` for every column, shortest round trip; zeros: for those at 0 too."""
+        names, values = Names(self.problem).all, self.point
+        if not zeros:
+            at = np.nonzero(values)[0]
+            names, values = names.at(at), values[at]
+        yield from render([before, names, b" ", words(values), b"\n"], len(values))
         if needs_one(self.problem):
-            yield ONE.decode(), "1"
+            yield before + ONE + b" 1\n"
 
-    def activities(self) -> Iterator[tuple[str, str]]:
-        """Name and value of every row, constants on its right side."""
+    def activities(self) -> Iterator[bytes]:
+        """A line `name value` for every row, constants on its right side."""
+        names = Names(self.problem)
         for family in self.problem.rows:
-            names = (bytes(row).decode() for row in family_names(family))
-            yield from zip(
-                names, map(number, (family.values(self.point) + family.limit).tolist()), strict=True
-            )
+            values = words(family.values(self.point) + family.limit)
+            yield from render([names.row(family), b" ", values, b"\n"], family.count)
         if not self.problem.rows:
-            yield "c_ONE", "1"
+            yield b"c_ONE 1\n"
 
 
-def _gurobi(start: Start) -> Iterator[str]:
-    yield f"# MIP start, objective {number(start.objective)}"
-    for name, value in start.lines():
-        yield f"{name} {value}"
+def _gurobi(start: Start) -> Iterator[bytes]:
+    yield f"# MIP start, objective {number(start.objective)}\n".encode()
+    yield from start.lines()
 
 
-def _cplex(start: Start) -> Iterator[str]:
-    yield '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
-    yield '<CPLEXSolutions version="1.2">'
-    yield '<CPLEXSolution version="1.2">'
-    yield f'<header problemName={quoteattr(start.problem.instance.name)} solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>'
-    yield "<variables>"
-    for place, (name, value) in enumerate(start.lines()):
-        yield f'<variable name="{name}" index="{place}" value="{value}"/>'
-    yield from ("</variables>", "</CPLEXSolution>", "</CPLEXSolutions>")
+def _cplex(start: Start) -> Iterator[bytes]:
+    name = quoteattr(start.problem.instance.name)
+    yield (
+        '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n'
+        '<CPLEXSolutions version="1.2">\n'
+        '<CPLEXSolution version="1.2">\n'
+        f'<header problemName={name} solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>\n'
+        "<variables>\n"
+    ).encode()
+    count = start.problem.columns
+    names, index, values = Names(start.problem).all, Decimals(np.arange(count)), words(start.point)
+    parts: Pieces = [b'<variable name="', names, b'" index="', index, b'" value="', values, b'"/>\n']
+    yield from render(parts, count)
+    if needs_one(start.problem):
+        yield b'<variable name="%b" index="%d" value="1"/>\n' % (ONE, count)
+    yield b"</variables>\n</CPLEXSolution>\n</CPLEXSolutions>\n"
 
 
-def _highs(start: Start) -> Iterator[str]:
-    columns = list(start.lines())
-    yield from ("Model status", "Unknown", "", "# Primal solution values", "Feasible")
-    yield f"Objective {number(start.objective)}"
-    yield f"# Columns {len(columns)}"
-    for name, value in columns:
-        yield f"{name} {value}"
-    rows = list(start.activities())
-    yield f"# Rows {len(rows)}"
-    for name, value in rows:
-        yield f"{name} {value}"
+def _highs(start: Start) -> Iterator[bytes]:
+    yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
+    yield f"Objective {number(start.objective)}\n# Columns {start.columns}\n".encode()
+    yield from start.lines()
+    yield b"# Rows %d\n" % start.rows
+    yield from start.activities()
 
 
-def _scip(start: Start) -> Iterator[str]:
-    yield "solution status: unknown"
-    yield f"objective value: {number(start.objective)}"
-    for name, value in start.lines():
-        yield f"{name} {value}"
+def _scip(start: Start) -> Iterator[bytes]:
+    yield f"solution status: unknown\nobjective value: {number(start.objective)}\n".encode()
+    yield from start.lines()
     for name, part in _objective_variables(start).items():
-        yield f"{name} {number(part)}"
+        yield f"{name} {number(part)}\n".encode()
 
 
 def _objective_variables(start: Start) -> dict[str, float]:
@@ -118,23 +129,22 @@ def _objective_variables(start: Start) -> dict[str, float]:
     return found
 
 
-def _xpress(start: Start) -> Iterator[str]:
-    yield f"NAME {start.problem.instance.name}"
-    for name, value in start.lines():
-        yield f" C {name} {value}"
-    yield "ENDATA"
+def _xpress(start: Start) -> Iterator[bytes]:
+    yield f"NAME {start.problem.instance.name}\n".encode()
+    yield from start.lines(b" C ")
+    yield b"ENDATA\n"
 
 
 @dataclass(frozen=True)
 class StartFormat:
-    """A format of starting points: the solver, the suffix of its files, their lines, and how they are read.
+    """A format of starting points: the solver, the suffix of its files, what generates them, and how they are read.
 
     convex: whether the solver uses it for convex problems only.
     """
 
     solver: str
     suffix: str
-    lines: Callable[[Start], Iterator[str]]
+    generate: Callable[[Start], Iterator[bytes]]
     use: str
     convex: bool = False
 
@@ -180,7 +190,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
         raise UnsupportedBySolverError(
             f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
         )
-    write_bytes(path, "".join(f"{line}\n" for line in STARTS[solver].lines(start)).encode())
+    save(Path(path), STARTS[solver].generate(start))
     return start.objective
 
 

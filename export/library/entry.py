@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -129,7 +129,7 @@ def _models(
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
     """Facts of the files of the best point that are now in the folder: MIPLIB's kind, and AMPL's where there is a .nl."""
     path = folder / f"{task.name}.sol"
-    path.write_bytes("".join(f"{line}\n" for line in _miplib(best)).encode())
+    path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
     if "nl" in task.recipe.formats:
         layout = Layout(best.problem)
@@ -141,12 +141,12 @@ def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict
     return listed
 
 
-def _miplib(best: Best) -> Iterable[str]:
+def _miplib(best: Best) -> Iterator[bytes]:
     """The lines of a .sol file as MIPLIB has them, in the columns of LP and MPS."""
     held = start_of(best.problem, best.known.field).problem
     start = Start(held, complete_point(held, best.known.field))
-    yield f"=obj= {number(start.objective)}"
-    yield from (f"{name} {value}" for name, value in start.lines() if float(value) != 0.0)
+    yield f"=obj= {number(start.objective)}\n".encode()
+    yield from start.lines(zeros=False)
 
 
 def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
