@@ -40,7 +40,7 @@ TRAITS: Final[dict[str, Callable[[Problem], bool]]] = {
         p.objective_degree == 2 and p.row_degree < 2 and not p.convex
     ),
     "integers": lambda p: bool(p.integer.any()),
-    "non-convexity": lambda p: not p.convex,
+    "non-convexity": lambda p: not p.convex and max(p.objective_degree, p.row_degree) > 1,
 }
 """What a solver may not take."""
 
@@ -107,17 +107,18 @@ class Taking(NamedTuple):
 
 def takes(problem: Problem, solver: str) -> Taking:
     """Whether the solver takes the problem, and in which format: the first one with the best answer."""
-    entry = EXTERNALS[solver]
-    found = [_takes(problem, entry, name) for name in entry.formats]
+    found = [takes_in(problem, solver, name) for name in EXTERNALS[solver].formats]
     return min(found, key=lambda each: ("yes", "local", "no").index(each.answer))
 
 
-def _takes(problem: Problem, solver: External, name: str) -> Taking:
+def takes_in(problem: Problem, solver: str, name: str) -> Taking:
+    """Whether the solver takes the problem in the format of that name."""
     try:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError as error:
         return Taking("no", name, str(error))
-    refusal = solver.refusal(held, "read", "solve") or solver.refusal(held)
+    entry = EXTERNALS[solver]
+    refusal = entry.refusal(held, "read", "solve") or entry.refusal(held)
     if refusal is None:
         return Taking("yes", name, "")
     return Taking("local" if refusal.step == "local" else "no", name, refusal.reason)

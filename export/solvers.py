@@ -29,8 +29,9 @@ from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem
 from ..models.storage import make_folder
+from .capabilities import takes_in
 from .child import run_child
-from .formats import FORMATS, carried, write
+from .formats import FORMATS, write
 from .names import ONE, column_names
 from .solution import Solution, read_solution
 
@@ -78,22 +79,17 @@ Run = Callable[[Job], Answer]
 
 @dataclass(frozen=True)
 class Solver:
-    """A local solver: what it reads, which classes it solves (True: only convex ones), and what it is called in Python."""
+    """A local solver: the format it reads, what it is called in Python, and whether an answer without proof is wanted of it.
+
+    What it takes stands in the table of capabilities.
+    """
 
     name: str
     summary: str
     format: str
-    classes: dict[str, bool]
     package: str
     run: Run
-
-    def refusal(self, problem_class: str, *, convex: bool) -> str:
-        """Why it does not take problems of this class; empty when it does."""
-        if problem_class not in self.classes:
-            return f"{self.name} does not solve {problem_class}"
-        if self.classes[problem_class] and not convex:
-            return f"{self.name} solves {problem_class} only when it is convex"
-        return ""
+    local: bool = False
 
 
 def _run_highs(job: Job) -> Answer:
@@ -186,18 +182,15 @@ def _casadi(solver: str) -> Run:
 SOLVERS: Final = {
     solver.name: solver
     for solver in (
-        Solver("highs", "HiGHS on the .mps: MILP, LP, convex QP", "mps", {"LP": False, "MILP": False, "QP": True}, "highspy", _run_highs),
+        Solver("highs", "HiGHS on the .mps: MILP, LP, convex QP", "mps", "highspy", _run_highs),
         Solver(
-            "ipopt", "Ipopt on the .nl: continuous problems, local optimum where they are not convex", "nl",
-            {"LP": False, "QP": False, "QCP": False, "NLP": False}, "casadi", _casadi("ipopt"),
+            "ipopt", "Ipopt on the .nl: continuous problems, local optimum where they are not convex", "nl", "casadi", _casadi("ipopt"),
+            local=True,
         ),
-        Solver(
-            "bonmin", "Bonmin (branch and bound) on the .nl: convex mixed-integer problems of small size", "nl",
-            {"LP": False, "QP": True, "MILP": False, "MIQP": True}, "casadi", _casadi("bonmin"),
-        ),
+        Solver("bonmin", "Bonmin (branch and bound) on the .nl: convex mixed-integer problems of small size", "nl", "casadi", _casadi("bonmin")),
     )
 }  # fmt: skip
-"""The table of local solvers: which may solve which class. Others are refused by name."""
+"""The table of local solvers."""
 
 _PREFERRED: Final = ("highs", "ipopt", "bonmin")
 
@@ -215,9 +208,9 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
     refusals = {candidate: refusal(problem, SOLVERS[candidate]) for candidate in candidates}
     willing = [SOLVERS[candidate] for candidate, reason in refusals.items() if not reason]
     if not willing:
-        reasons = "; ".join(refusals.values())
+        reasons = ", ".join(f"{candidate} ({reason})" for candidate, reason in refusals.items())
         raise UnsupportedBySolverError(
-            f"{problem.name} is {_described(problem)}: {reasons}; see `crossfield list` for who takes what, or relax it"
+            f"{problem.name} is {_described(problem)}, which is not for {reasons}; see `crossfield list` for who takes what, or relax it"
         )
     installed = [solver for solver in willing if find_spec(solver.package) is not None]
     if not installed:
@@ -230,11 +223,8 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
 
 def refusal(problem: Problem, solver: Solver) -> str:
     """Why the solver does not take the problem in the format it reads; empty when it does."""
-    entry = FORMATS[solver.format]
-    if max(problem.objective_degree, problem.row_degree) > entry.degree and problem.formulation.equivalent:
-        return f"{solver.name} reads .{solver.format}, which cannot carry {problem.name}"
-    held = carried(problem, entry)
-    return solver.refusal(held.problem_class, convex=held.convex)
+    taking = takes_in(problem, solver.name, solver.format)
+    return "" if taking.answer == "yes" or (taking.answer == "local" and solver.local) else taking.reason
 
 
 def _described(problem: Problem) -> str:

@@ -254,8 +254,8 @@ NAMES = {
     "format": (["export", "-F", "nl", "-F", "xyz"], "there is no format 'xyz'; choose one of nl, gms, lp, mps"),
     "formulation to solve": (["solve", "-f", "milp"], "there is no formulation 'milp'"),
     "solver": (["solve", "-f", "milp-mccormick", "--solver", "gurobi"], "there is no solver 'gurobi'; choose one of highs, ipopt, bonmin"),
-    "class": (["solve", "-f", "minlp-cubic"], "minlp-cubic is a non-convex MINLP: highs does not solve MIQP"),
-    "pair": (["solve", "-f", "milp-mccormick", "--solver", "ipopt"], "ipopt does not solve MILP"),
+    "class": (["solve", "-f", "minlp-cubic"], "minlp-cubic is a non-convex MINLP, which is not for highs (HiGHS reads an MIQP, but does not solve it)"),
+    "pair": (["solve", "-f", "milp-mccormick", "--solver", "ipopt"], "not for ipopt (Ipopt drops integrality; relax it, or fix the jumps)"),
     "option": (["solve", "-f", "qp-fixed", "--relax"], "qp-fixed has no option relax"),
 }  # fmt: skip
 
