@@ -68,6 +68,7 @@ def test_windows_as_large_as_the_grid_reach_the_optimum_over_all_jumps(seed):
     least = exact(instance)
     assert found.ended == "windows"
     assert found.closed == found.windows
+    assert found.lower > 0
     assert found.field.energy().total >= least - 1e-9
     if np.abs(found.field.beta).max() < QUARTER - 1e-3:
         assert found.field.energy().total == pytest.approx(least, rel=1e-5, abs=1e-9)
@@ -96,18 +97,6 @@ def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     assert told[-1] == (found.windows, field.energy().total)
     assert 0 <= found.closed <= found.windows
     assert found.ended in {"time", "windows"}
-
-
-@pytest.mark.solver
-def test_windows_lower_a_field_that_only_they_can():
-    """The greedy field of this sample is 0.1295, and its proven optimum 0.0525 (docs/fields.md)."""
-    instance = cf.sample("saddle", 4)
-    greedy = cf.greedy(instance)
-    found = search_windows(greedy, seconds=30)
-    assert found.lower > 0
-    assert found.field.energy().total == pytest.approx(
-        cf.search(instance, rounds=10).field.energy().total, rel=1e-6
-    )
 
 
 @pytest.mark.parametrize(
