@@ -425,7 +425,7 @@ start; *lower by* is the search against greedy / against improved.
 
 ## Side by side
 
-Size 48; the greedy field on the left, that of the search on the right. Triangles mark singularities.
+Size 48; the greedy field on the left, that of the search on the right. Red dots mark singularities of positive index, blue dots those of negative index.
 
 {pictures}
 
