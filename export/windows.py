@@ -83,8 +83,8 @@ def search_windows(
     """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
 
     solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows. seconds: when to end;
-    jobs: processes. Which windows are tried depends on the seed alone; how far each is solved, on time. Ctrl-C ends the search after the
-    windows at hand. Raises InputError for limits that are not positive and for another solver.
+    jobs: processes. The seed decides on the first windows; how far each is solved, and so what follows, depends on time. Ctrl-C ends the
+    search after the windows at hand. Raises InputError for limits that are not positive and for another solver.
     """
     if solver not in WINDOW_SOLVERS:
         raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
