@@ -441,7 +441,7 @@ relative to it or to 1 if that is more.
 
 `crossfield solve --method windows` sets small windows of the grid free, fixes all else and hands each to a solver: `miqp-exact` to Bonmin, in
 windows of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in windows of 5 x 5 and more. Size {window_size}, {window_seconds} s each; *walk* is `search`, and both
-go on from the improved greedy field. The last two columns go on from the field of the search above. In brackets: windows solved / solved to the
+go on from the improved greedy field, the walk also from the improved power field where that is lower. The last two columns go on from the field of the search above. In brackets: windows solved / solved to the
 end / that lowered the energy.
 
 {windows}
