@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from crossfield.export.ampl_sol import write_ampl_sol
 from crossfield.export.cli import invoke
+from loops import for_each
 from PIL import Image, ImageDraw
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
@@ -110,8 +111,8 @@ SKETCHES = {
 }
 
 
-@pytest.mark.parametrize("name", SKETCHES)
-@pytest.mark.parametrize("command", ["run", "instance"])
+@for_each("name", SKETCHES)
+@for_each("command", ["run", "instance"])
 def test_bad_sketches_are_refused(tmp_path, refused, name, command):
     content, reason = SKETCHES[name]
     (tmp_path / name).write_bytes(content)
@@ -180,8 +181,8 @@ def test_a_mask_of_several_parts_is_allowed_and_said(tmp_path, capsys):
     assert cf.read_instance(tmp_path / "two.json").grid.parts == 2
 
 
-@pytest.mark.parametrize("what", ["mouse", "wave_sheet", "sketch.png"])
-@pytest.mark.parametrize("size", [0, -1, 10**6])
+@for_each("what", ["mouse", "wave_sheet", "sketch.png"])
+@for_each("size", [0, -1, 10**6])
 def test_impossible_sizes_are_refused(tmp_path, refused, monkeypatch, what, size):
     picture(tmp_path / "sketch.png")
     monkeypatch.chdir(tmp_path)
@@ -203,7 +204,7 @@ def instance_document(instance, tmp_path):
     return json.loads((tmp_path / "instance.json").read_text())
 
 
-@pytest.mark.parametrize(
+@for_each(
     "change,reason",
     [
         (lambda d: d["strokes"][0].__setitem__(2, float("nan")), "theta is not a finite number"),
@@ -215,7 +216,6 @@ def instance_document(instance, tmp_path):
         (lambda d: d.__setitem__("w_beta", "much"), "w_beta"),
         (lambda d: d["mask"].append("#"), "mask row 2"),
     ],
-    ids=["theta", "w", "outside", "version", "format", "missing", "text", "ragged"],
 )
 def test_bad_instances_are_refused(tmp_path, refused, instance, change, reason):
     document = instance_document(instance, tmp_path)

@@ -22,6 +22,7 @@ from crossfield.models.instance import Instance
 from crossfield.models.instance_file import write_instance
 from crossfield.models.problem import formulate
 from crossfield.models.samples import sample
+from loops import for_each
 
 SOLUTIONS = Path(__file__).resolve().parent / "solutions" / "tiny"
 SCRIPT = Path(check_point.__file__)
@@ -54,7 +55,7 @@ def label(finding, name):
 # against our own evaluation
 
 
-@pytest.mark.parametrize("case", LOW_DEGREE)
+@for_each("case", LOW_DEGREE)
 def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
     problem = carried(problem_of(case), FORMATS["mps"])
     write(problem_of(case), tmp_path / "m.mps.gz")
@@ -66,7 +67,7 @@ def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
             assert float(found.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
 
 
-@pytest.mark.parametrize("name", [name for name in FORMULATIONS if name != "minlp-parity"])
+@for_each("name", [name for name in FORMULATIONS if name != "minlp-parity"])
 def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, tmp_path):
     field = make_field(make_instance("full"))
     whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
@@ -84,8 +85,8 @@ def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, 
         assert float(label(found, "objective")) == pytest.approx(field.energy(1).total, rel=1e-12)
 
 
-@pytest.mark.parametrize("gauge", ["strokes", "box"])
-@pytest.mark.parametrize("shape", ["full", "parts", "far", "pixel"])
+@for_each("gauge", ["strokes", "box"])
+@for_each("shape", ["full", "parts", "far", "pixel"])
 def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
     field = make_field(make_instance(shape, gauge))
     write_instance(field.instance, tmp_path / "i.json")
@@ -193,8 +194,8 @@ BOUNDS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("integer", [False, True])
-@pytest.mark.parametrize("bounds", BOUNDS)
+@for_each("integer", [False, True])
+@for_each("bounds", BOUNDS)
 def test_bounds_mean_what_they_mean_to_highs(bounds, integer, tmp_path):
     highspy = pytest.importorskip("highspy")
     open_, close = (" M1 'MARKER' 'INTORG'\n", " M2 'MARKER' 'INTEND'\n") if integer else ("", "")
@@ -457,14 +458,14 @@ def refused(capsys, *arguments):
     return err
 
 
-@pytest.mark.parametrize("what", BAD_MODELS)
+@for_each("what", BAD_MODELS)
 def test_bad_models_are_one_line(what, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(BAD_MODELS[what], errors="surrogateescape")
     (tmp_path / "p").write_text(GOOD_POINT)
     assert "m.mps: " in refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 
-@pytest.mark.parametrize("what", BAD_POINTS)
+@for_each("what", BAD_POINTS)
 def test_bad_points_are_one_line(what, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(linear())
     (tmp_path / "p").write_text(BAD_POINTS[what], errors="surrogateescape")
@@ -480,7 +481,7 @@ def test_the_good_ones_are_good(tmp_path):
         assert check(str(tmp_path / "m"), str(tmp_path / "p")).worst == 0
 
 
-@pytest.mark.parametrize("arguments", [(), ("m",), ("m", "p", "q"), ("m", "p", "--tolerance", "x"), ("m", "p", "--tolerance", "-1"), ("m", "p", "--nothing"), ("absent", "p"), (".", "p")])  # fmt: skip
+@for_each("arguments", [(), ("m",), ("m", "p", "q"), ("m", "p", "--tolerance", "x"), ("m", "p", "--tolerance", "-1"), ("m", "p", "--nothing"), ("absent", "p"), (".", "p")])  # fmt: skip
 def test_wrong_usage_is_one_line(arguments, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m").write_text(linear())

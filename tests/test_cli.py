@@ -18,6 +18,7 @@ from crossfield.export.methods import METHODS
 from crossfield.export.solvers import SOLVERS
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.samples import SAMPLES
+from loops import for_each
 from PIL import Image, ImageDraw
 
 
@@ -236,7 +237,7 @@ def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
 # Usage, help, exit codes
 
 
-@pytest.mark.parametrize(
+@for_each(
     "arguments",
     [
         ["fly"],
@@ -249,7 +250,6 @@ def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
         ["export", "mouse", "-o", "x", "--stroke-norm", "3"],
         ["read", "a.sol", "-o", "x.npz"],
     ],
-    ids=" ".join,
 )
 def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -284,7 +284,7 @@ def test_help_loads_nothing_heavy():
         assert re.search(rf"^\W*{verb} ", done.stdout, re.MULTILINE)
 
 
-@pytest.mark.parametrize("verb", ["run", "instance", "export", "solve", "read", "draw", "list", "samples"])
+@for_each("verb", ["run", "instance", "export", "solve", "read", "draw", "list", "samples"])
 def test_every_verb_has_help(verb, crossfield):
     for flag in ("--help", "-h"):
         assert f"crossfield {verb}" in crossfield(verb, flag)

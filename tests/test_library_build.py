@@ -38,6 +38,7 @@ from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance_file import read_instance
 from crossfield.models.problem import formulate, with_integers_fixed
 from crossfield.models.samples import sample_svg
+from loops import for_each
 from scipy import ndimage
 
 SCHEMAS = Path(__file__).resolve().parents[1] / "export"
@@ -162,7 +163,7 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", BAD)
+@for_each("case", BAD)
 def test_a_bad_specification_is_one_line_with_file_or_name_and_nothing_half_written(tmp_path, capfd, case):
     text, words = BAD[case]
     path = write_spec(tmp_path, text)

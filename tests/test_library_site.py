@@ -26,6 +26,7 @@ from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field_file import read_field
 from crossfield.models.formulations import FORMULATIONS, declare
 from crossfield.models.instance_file import read_instance
+from loops import for_each
 
 SPEC = """format = "crossfield-library-spec"
 version = 1
@@ -399,7 +400,7 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         assert told(field).startswith(f"{len(index) or 'no'} singularit")
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
+@for_each("name", FORMULATIONS)
 def test_the_mathematics_has_every_line_of_the_declaration(name):
     shown, declared = model(name, {}), declare(name)
     assert len(shown.lines) == len(declared.objective) + len(declared.rows) + len(declared.variables)
@@ -647,8 +648,8 @@ def test_it_works_from_a_folder_without_any_server(browser, site):
     assert browser.get_log("browser") == []
 
 
-@pytest.mark.parametrize("width", [320, 390])
-@pytest.mark.parametrize("page", KINDS)
+@for_each("width", [320, 390])
+@for_each("page", KINDS)
 def test_a_phone_never_scrolls_sideways(browser, address, page, width):
     show(browser, width=width, height=844)
     browser.get(f"{address}/{page}")

@@ -26,6 +26,7 @@ from crossfield.models.errors import (
     UnsupportedBySolverError,
 )
 from crossfield.models.formulations import FORMULATIONS
+from loops import for_each
 from scipy.optimize import linprog, lsq_linear
 
 with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pythons
@@ -236,7 +237,7 @@ def test_every_pair_of_the_table_is_solved(label, solver):
         assert everyone == pytest.approx([solution.objective] * len(everyone), abs=2e-5)
 
 
-@pytest.mark.parametrize("label,solver,reason", REFUSED)
+@for_each("label,solver,reason", REFUSED)
 def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, reason):
     name, relax = split(label)
     folder = tmp_path / "out"
