@@ -440,7 +440,7 @@ def in_child(*arguments, prelude=""):
     """A command line in a child process, after some lines of Python."""
     code = f"import sys\n{prelude}\nfrom crossfield.export.cli import invoke\nsys.exit(invoke(sys.argv[1:]))"
     command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(
@@ -560,9 +560,7 @@ def test_a_full_device_is_said(tmp_path):
         pytest.skip("there is no /dev/full")
     with Path("/dev/full").open("wb") as full:
         command = [sys.executable, "-m", "crossfield", "list", "--json"]
-        done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=60
-        )
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
     assert "no space left on device" in done.stderr
     assert done.stderr.count("\n") == 1

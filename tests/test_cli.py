@@ -49,7 +49,7 @@ def instance_file(tmp_path, instance):
 
 def child(*arguments, **options):
     command = [sys.executable, "-m", "crossfield", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, **options)
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
 
 
 # The verbs, one after the other
@@ -262,9 +262,7 @@ def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
 
 def test_help_loads_nothing_heavy():
     code = "import sys; from crossfield.export.cli import invoke; invoke(['--help']); print(*sorted(sys.modules), file=sys.stderr)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stderr.split()}
     assert not loaded & {
         "numpy",
@@ -321,7 +319,7 @@ def test_what_should_not_happen_is_one_line_too(tmp_path, instance_file):
     )
     arguments = ["solve", str(instance_file), "-f", "qp-fixed", "-o", str(tmp_path / "out")]
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.count("\n") == 1
@@ -410,7 +408,7 @@ def in_terminal(arguments, columns=80):
         command, stdin=follower, stdout=follower, stderr=follower, env=environment
     ) as process:
         os.close(follower)
-        while select.select([leader], [], [], 60)[0]:
+        while select.select([leader], [], [])[0]:
             try:
                 piece = os.read(leader, 1 << 16)
             except OSError:  # the other end was closed
@@ -418,7 +416,7 @@ def in_terminal(arguments, columns=80):
             if not piece:
                 break
             written += piece
-        code = process.wait(60)
+        code = process.wait()
     os.close(leader)
     return code, written.decode()
 

@@ -185,7 +185,7 @@ def test_parallel_strokes_and_two_families_cost_nothing(degrees):
     pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
     theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
     instance = Instance("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))
-    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(seconds=20))
+    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(seconds=250))
     assert found.status == "optimal-global"
     assert found.objective < 9 * 1e-6 * QUARTER + 1e-9
     assert found.field.energy(1).total == pytest.approx(found.objective, abs=1e-7)
@@ -202,7 +202,7 @@ def sketch(gauge="strokes", seed=4):
 
 
 def optimum(instance, name="milp-mccormick", **options):
-    found = solve(formulate(instance, name, **options), "highs", limits=Limits(seconds=30, gap=0))
+    found = solve(formulate(instance, name, **options), "highs", limits=Limits(seconds=250, gap=0))
     assert found.status == "optimal-global"
     return found.objective
 

@@ -696,9 +696,7 @@ FITS = ["minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqp-mccormick", "miq
 def by_baron(path: Path, problem: Problem) -> Any:
     """What BARON, in its free edition of 10 columns and 10 rows, answers to the file."""
     program = Path(BARON.submodule_search_locations[0]) / "baron"
-    done = subprocess.run(
-        [program, path.name], cwd=path.parent, capture_output=True, text=True, check=False, timeout=60
-    )
+    done = subprocess.run([program, path.name], cwd=path.parent, capture_output=True, text=True, check=False)
     assert "Normal completion" in done.stdout, done.stdout
     return read_solution(path.parent / "res.lst", problem)
 
