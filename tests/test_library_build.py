@@ -57,7 +57,7 @@ gauges = ["strokes", "box"]
 facets = ["hull", "printed"]
 
 [rungs.medium]
-sizes = [9]
+sizes = [6]
 formats = ["nl", "mps"]
 compress = true
 
@@ -271,7 +271,7 @@ def highs_model(path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["cf_own_n004_milp", "cf_own_n004_printed_milp", "cf_own_n004_box_milp", "cf_rand_n009_s2_milp"]
+    "name", ["cf_own_n004_milp", "cf_own_n004_printed_milp", "cf_own_n004_box_milp", "cf_rand_n006_s2_milp"]
 )
 def test_highs_finds_the_point_of_a_milp_feasible_with_the_sidecars_objective(built, tmp_path, name):
     document = built.entry(name)
@@ -340,7 +340,7 @@ def test_points_are_feasible_beyond_what_minlplib_asks(built):
 
 
 def test_formulations_of_one_optimum_have_points_of_one_objective(built):
-    for instance in ("cf_own_n004", "cf_own_n004_box", "cf_rand_n009_s2"):
+    for instance in ("cf_own_n004", "cf_own_n004_box", "cf_rand_n006_s2"):
         found = {name: each["best"]["objective"] for name, each in by_formulation(built, instance).items()}
         for one, other in (
             ("minlp-parity", "minlp-quartic"),
@@ -488,7 +488,7 @@ def test_nothing_whole_is_made_again(built, spec, copy):
 
 def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, copy):
     (copy / "cf_own_n004_milp.json").unlink()
-    (copy / "cf_rand_n009_s2_qp.nl.gz").write_bytes(b"half")
+    (copy / "cf_rand_n006_s2_qp.nl.gz").write_bytes(b"half")
     (copy / "cf_own_n004_box_parity.json").write_text("{}")
     (copy / ".cf_own_n004_qp.json.abc.part").write_bytes(b"half")
     made = []
@@ -496,7 +496,7 @@ def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, 
     assert sorted(line.split(": ")[1] for line in made[:-1]) == [
         "cf_own_n004_box_parity",
         "cf_own_n004_milp",
-        "cf_rand_n009_s2_qp",
+        "cf_rand_n006_s2_qp",
     ]
     assert content(copy) == content(built.folder)
 
@@ -510,6 +510,7 @@ def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
     assert content(copy) == content(built.folder)
 
 
+@pytest.mark.slow
 def test_a_build_that_was_killed_continues_and_leaves_nothing_half_written(built, spec, tmp_path):
     out = tmp_path / "killed"
     command = build_command(spec, out)
@@ -534,6 +535,7 @@ def build_command(spec, out):
     return [sys.executable, "-m", "crossfield", "library", "build", str(spec), "-o", str(out), "--jobs", "2"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spec, tmp_path):
     out = tmp_path / "interrupted"
     command = build_command(spec, out)
@@ -549,6 +551,7 @@ def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spe
     assert not list(out.glob(".*"))
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built, spec, tmp_path):
     out = tmp_path / "died"
     command = build_command(spec, out)
@@ -596,21 +599,21 @@ def better_field(library, name):
 def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_elsewhere(
     built, spec, copy, tmp_path
 ):
-    document, problem, field = better_field(built, "cf_rand_n009_s2_miqp")
+    document, problem, field = better_field(built, "cf_rand_n006_s2_miqp")
     objective = problem.objective_value(complete_point(problem, field))
     assert objective < document["best"]["objective"] - 1e-6
     record = Record(
         document["name"], problem.sha256, "HiGHS", "1", "limit", primal=objective, seconds=6.0, by="somebody"
     )
     kept = add_record(copy, record, field)
-    assert kept.point == "cf_rand_n009_s2_miqp.field.json"
+    assert kept.point == "cf_rand_n006_s2_miqp.field.json"
     made = []
     library = rebuild(copy, progress=made.append)
     best = library.entry(document["name"])["best"]
     assert best["objective"] == pytest.approx(objective, rel=1e-12)
     assert (best["solver"], best["seconds"], best["by"]) == ("HiGHS", 6.0, "somebody")
-    assert library.entry("cf_rand_n009_s2_bilin")["best"]["objective"] <= objective + 1e-9
-    assert all("cf_rand_n009_s2" in line for line in made[:-1])
+    assert library.entry("cf_rand_n006_s2_bilin")["best"]["objective"] <= objective + 1e-9
+    assert all("cf_rand_n006_s2" in line for line in made[:-1])
     models = [name for name in content(copy) if re.search(r"\.(nl|mps|gms|lp)(\.gz)?$", name)]
     assert all((copy / name).read_bytes() == (built.folder / name).read_bytes() for name in models)
 
@@ -624,7 +627,7 @@ def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_else
 
     with (copy / kept.point).open("ab") as stream:
         stream.write(b" ")
-    with pytest.raises(CrossfieldError, match=r"cf_rand_n009_s2_miqp\.field\.json: is another file than"):
+    with pytest.raises(CrossfieldError, match=r"cf_rand_n006_s2_miqp\.field\.json: is another file than"):
         rebuild(copy)
 
 

@@ -19,7 +19,7 @@ def smallest(name):
     raise AssertionError(name)
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_optimum_is_the_same_after_quarter_turn_and_mirror(name):
     instance = smallest(name)
