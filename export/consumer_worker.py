@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, Self
@@ -47,11 +48,12 @@ class Worker:
         child = self._running()
         assert child.stdin is not None
         limit = seconds + GRACE
-        try:
+        with suppress(BrokenPipeError):  # of a child that is dead already: its end says how it died
             child.stdin.write(json.dumps(task) + "\n")
             child.stdin.flush()
+        try:
             answer = self._answers.get(timeout=limit)
-        except (OSError, queue.Empty):
+        except queue.Empty:
             self._stop()
             return {"kind": "failed", "words": f"took longer than {limit:g} s and was ended"}
         if answer:
@@ -98,7 +100,8 @@ class Worker:
             child.kill()
         child.wait()
         if child.stdin is not None:
-            child.stdin.close()
+            with suppress(BrokenPipeError):  # what was not yet written goes with the child
+                child.stdin.close()
 
     def _last_words(self) -> str:
         log = self._folder / _LOG
