@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from crossfield.export.cli import invoke
 from crossfield.export.formats import write
-from crossfield.export.library import archive, check_point
+from crossfield.export.library import archive, check_point, points
 from crossfield.export.library.archive import opened
 from crossfield.export.library.build import build
 from crossfield.export.library.sidecar import problem_of, read_library
@@ -179,6 +179,14 @@ random = "full"
 seeds = [1]
 """
 STEM = "cf_rand_n004_s1"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_searches():
+    """How good the fields of a library are is nothing to its check."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(points, "_ROUNDS", 1)
+        yield
 
 
 @pytest.fixture(scope="module")
