@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from .deadline import Over, never
 from .field import CrossField
 from .grid import Floats
 from .instance import QUARTER
@@ -24,12 +25,12 @@ _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
-def fitted(field: CrossField) -> CrossField:
+def fitted(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
 
     This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not say (parts without
     strokes), the angles stay near those given. The gradient's entries that no bound balances are below 1e-12 (1 + max |b|), see
-    models/quadratic.py for b.
+    models/quadratic.py for b. Where the time is over before, the best angles so far.
     """
     instance = field.instance
     quarter = np.full(instance.grid.size, QUARTER)
@@ -38,6 +39,7 @@ def fitted(field: CrossField) -> CrossField:
         np.concatenate([field.alpha, field.beta]),
         np.concatenate([instance.alpha_lower, -quarter]),
         np.concatenate([instance.alpha_upper, quarter]),
+        over=over,
     )
     alpha, beta = np.split(x, 2)
     return CrossField(instance, alpha, beta, field.p)
@@ -51,10 +53,11 @@ def least_in_box(
     *,
     solver: Solver | None = None,
     tolerance: float = _SLOPE,
+    over: Over = never,
 ) -> Floats:
     """The point of least energy with lower <= x <= upper, searched from x; shapes (2n,), bounds may be infinite.
 
-    Rounding, or 500 steps, end the search too: then the best point so far comes back.
+    Rounding, 500 steps, or time that is over end the search too: then the best point so far comes back.
     tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
     solver: one that has met a system like this one, which spares a factorisation.
     """
@@ -63,6 +66,8 @@ def least_in_box(
     stiffness = energy.stiffness
     x = np.clip(x, lower, upper)
     for _ in range(_MOST_STEPS):
+        if over():
+            break
         slope = energy.slope(x)
         plain = np.clip(x - slope / stiffness, lower, upper) - x
         if np.abs(plain * stiffness).max() <= enough:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .deadline import Over, never
 from .field import CrossField
 from .free_field import FreeField, parity_sign
 from .grid import Floats, Ints
@@ -47,17 +48,18 @@ def halved(instance: Instance) -> Instance | None:
     )
 
 
-def prolonged(coarse: CrossField, instance: Instance) -> CrossField:
+def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
 
-    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the stroke. Then they are improved.
+    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the stroke. Then they are improved
+    until the time is over.
     """
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
-    settle(state, Solver())
-    return improved(state.bounded())
+    settle(state, Solver(), over)
+    return improved(state.bounded(over), over)
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:

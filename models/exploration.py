@@ -6,21 +6,25 @@ none of a jump that has just changed, unless that is the lowest point so far.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from .deadline import Deadline, Over
+from .field import CrossField
 from .grid import Bools, Floats, Ints
 from .instance import Instance
-from .kicks import Kicks
-from .landscape import STEPS, Landscape, Window
+from .kicks import Change, Kicks
+from .landscape import STEPS, Landscape, Point, Window
 
 LOWER: Final = 1e-7
 """Energy by which a field has to be lower to count as better: less may be rounding."""
 
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
+_MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual
 _REST: Final = (4, 12)  # changes for which a jump stays as it is once it has changed
 
 
@@ -29,7 +33,8 @@ class Task:
     """A window to explore, from a field on.
 
     x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the window, shape (n,);
-    curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to try; seed: of their choice.
+    curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to try; seed: of their choice;
+    seconds: after which to end.
     """
 
     instance: Instance
@@ -39,59 +44,85 @@ class Task:
     curve: Ints
     kicks: int
     seed: tuple[int, ...]
+    seconds: float = np.inf
 
 
-class Better(NamedTuple):
-    """Angles (2n,) and jumps (m,) of lower energy; outside the window they are those of the task."""
+class Explored(NamedTuple):
+    """The point of least energy, outside the window that of the task, or None when none was lower by more than 1e-7.
 
-    energy: float
-    x: Floats
-    p: Ints
-
-
-def explore(task: Task) -> Better | None:
-    """The field of least energy that was met, or None when none was lower than the given one by more than 1e-7.
-
-    The same task gives the same field: on one thread, for the sums of several threads end in other digits.
+    whole: whether all kicks were tried; if not, the clock has had a say in the point.
     """
-    with threadpool_limits(1, user_api="blas"):
-        return _explore(task)
+
+    better: Point | None
+    whole: bool
 
 
-def _explore(task: Task) -> Better | None:
+def explore(task: Task) -> Explored:
+    """What was found in a window; energies are those of the definition, within all bounds of the angles.
+
+    The same task gives the same field unless its seconds run out: on one thread, for the sums of several threads end in other digits.
+    """
+    deadline = Deadline.after(task.seconds)
+    with threadpool_limits(1, user_api="blas"), suppress(np.linalg.LinAlgError):
+        return _explore(task, deadline.passed)
+    return Explored(None, whole=True)
+
+
+def _explore(task: Task, over: Over) -> Explored:
     rng = np.random.default_rng(task.seed)
     window = Window.of(task.instance, task.free)
     land = Landscape(window, task.x, task.p)
-    given = home = land.saved()
-    kicks = Kicks(window, task.curve)
+    home, kicks = land.saved(), Kicks(window, task.curve)
+    alpha, beta = np.split(task.x, 2)
+    given = CrossField(task.instance, alpha, beta, task.p).energy().total
+    # Solved in the window alone the angles may be lower already; jumps have to do better than that.
+    least = min(given, land.point.energy)
+    best: Point | None = None
     for _ in range(task.kicks if len(window.pairs) else 0):
-        land.change(*kicks.draw(rng, land.p))
-        lower = _walk(land, rng, home.energy - LOWER)
-        if lower is None:
-            land.restore(home)
+        lower = _kicked(land, kicks.draw(rng, land.p), rng, home.energy - LOWER, over)
+        if lower is not None and lower.point.energy < least - LOWER:
+            land, home, best = lower, lower.saved(), lower.point
+            least = best.energy
+        elif over():
+            break
         else:
-            # Anew, so that the rounding of thousands of updates does not add up.
-            land = Landscape(window, lower.x, lower.p)
-            home = land.saved()
-    return Better(home.energy, land.angles, home.p) if home.energy < given.energy - LOWER else None
+            land.restore(home)
+    return Explored(best, whole=not over())
 
 
-def _walk(land: Landscape, rng: np.random.Generator, goal: float) -> Better | None:
-    """The lowest point below `goal` of a walk from where the landscape stands."""
+def _kicked(
+    land: Landscape, kick: Change, rng: np.random.Generator, goal: float, over: Over
+) -> Landscape | None:
+    """The landscape at the lowest point below `goal` of the walk after a kick, anew: rounding of many updates must not add up.
+
+    None when there is no such point, or none that can be computed.
+    """
+    with suppress(np.linalg.LinAlgError):
+        land.change(*kick)
+        jumps = _walk(land, rng, goal, over)
+        return None if jumps is None else Landscape(land.window, land.angles, jumps)
+    return None
+
+
+def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) -> Ints | None:
+    """The jumps (m,) of the lowest point below `goal` of a walk from where the landscape stands."""
     resting = np.zeros(len(land.window.pairs), dtype=np.int64)
     low, found = land.energy, None
-    fruitless = now = 0
-    while fruitless < _FRUITLESS:
+    fruitless = 0
+    for now in range(1, _MOST_STEPS + 1):
         gains = land.gains()
-        barred = (resting > now) & (land.energy + gains >= low - LOWER)
+        barred = (resting >= now) & (land.energy + gains >= low - LOWER)
         gains[barred] = np.inf
         row, pair = np.unravel_index(np.argmin(gains), gains.shape)
+        if np.isinf(gains[row, pair]) or over():
+            break
         land.change(np.array([pair]), STEPS[[row]])
-        now += 1
-        fruitless += 1
         resting[pair] = now + rng.integers(*_REST)
+        fruitless += 1
         if land.energy < low - LOWER:
             low, fruitless = land.energy, 0
         if land.energy < goal:
-            goal, found = land.energy - LOWER, Better(land.energy, land.angles, land.p.copy())
+            goal, found = land.energy - LOWER, land.p.copy()
+        if fruitless == _FRUITLESS:
+            break
     return found

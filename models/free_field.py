@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .box_qp import fitted
+from .deadline import Over, never
 from .field import CrossField, relabelled
 from .grid import Floats, Grid, Ints
 from .instance import HALF, QUARTER, Instance
@@ -43,9 +44,9 @@ class FreeField:
         """The 2-norm energy."""
         return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
 
-    def bounded(self) -> CrossField:
+    def bounded(self, over: Over = never) -> CrossField:
         """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha, beta and p."""
-        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p))
+        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from .cells import stroke_cells
+from .deadline import Over, never
 from .field import CrossField
 from .free_field import FreeField, free_jumps
 from .grid import Bools, Ints
@@ -28,22 +29,22 @@ _CLOSE_UP_TO: Final = (
 _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the smooth part of the error
 
 
-def greedy(instance: Instance, *, progress: Progress | None = None) -> CrossField:
+def greedy(instance: Instance, *, progress: Progress | None = None, over: Over = never) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha, beta and p.
 
     The windows are kept by the last solve alone, as BendFields knows none. Deterministic. `progress` is called as
-    progress(jumps known, jumps in all) after every batch.
+    progress(jumps known, jumps in all) after every batch. Once the time is over, all jumps that are left are decided at once.
     """
     cells = stroke_cells(instance)
     angle = np.append(instance.target, 0.0)[cells]
     state = FreeField(
         instance, angle, np.zeros(len(angle)), np.zeros(len(instance.grid.first), dtype=np.int32)
     )
-    _stitch(state, cells, progress)
-    return state.bounded()
+    _stitch(state, cells, progress, over)
+    return state.bounded(over)
 
 
-def _stitch(state: FreeField, cells: Ints, progress: Progress | None) -> None:
+def _stitch(state: FreeField, cells: Ints, progress: Progress | None, over: Over) -> None:
     """Decide the jumps between cells, cheapest first, in batches that cost at most `_BATCH_COST`."""
     grid, solver = state.instance.grid, Solver()
     known = cells[grid.first] == cells[grid.second]
@@ -54,7 +55,7 @@ def _stitch(state: FreeField, cells: Ints, progress: Progress | None) -> None:
         # Rounding must not decide the order of equal costs: it would differ between machines.
         order = np.argsort(np.round(cost[open_], 9), kind="stable")
         many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), _BATCH_COST, side="right")))
-        chosen = open_[order[:many]]
+        chosen = open_ if over() else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
         _settle(state, known, solver if grid.size <= _CLOSE_UP_TO else None)

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from .angles import line_difference
 from .box_qp import least_in_box
 from .cells import chamfer, stroke_cells
+from .deadline import Over, never
 from .field import CrossField
 from .free_field import FreeField, free_bounds, free_jumps, parity_sign
 from .greedy import greedy
@@ -28,32 +29,34 @@ _MOST_CURVES: Final = 40  # that may change their family, those first that miss 
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
 
 
-def first_field(instance: Instance) -> CrossField:
-    """The greedy field, improved: what solvers and searches start from. Deterministic."""
-    return improved(greedy(instance))
+def first_field(instance: Instance, over: Over = never) -> CrossField:
+    """The greedy field, improved, as far as time allows: what solvers and searches start from. Deterministic where it does."""
+    return improved(greedy(instance, over=over), over)
 
 
-def improved(field: CrossField) -> CrossField:
+def improved(field: CrossField, over: Over = never) -> CrossField:
     """A field of no more 2-norm energy, from which neither best jumps, nor best angles, nor the turn of a curve lead further down.
 
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and turning seldom pays.
-    At most 40 curves are tried, the worst first.
+    At most 40 curves are tried, the worst first. Where the time is over before, the best field so far, never one of more energy.
     """
     state, solver = FreeField.of(field), Solver()
-    settle(state, solver)
+    settle(state, solver, over)
     if field.instance.gauge == "strokes":
-        _exchange_families(state, solver)
-    found = state.bounded()
+        _exchange_families(state, solver, over)
+    found = state.bounded(over)
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: Solver) -> None:
-    """Solve within the bounds and choose jumps again, in turn, as long as the energy falls."""
+def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
+    """Solve within the bounds and choose jumps again, in turn, as long as the energy falls and until the time is over."""
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
+        if over():
+            break
         energy = energy_at(state.instance, state.p)
-        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED)
+        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
         if least - reached < 1e-9 * (1 + reached):
             break
@@ -79,7 +82,7 @@ def _swap_lines(state: FreeField) -> None:
     state.alpha, state.beta = alpha, beta
 
 
-def _exchange_families(state: FreeField, solver: Solver) -> None:
+def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
     """Let curves change to the other family of lines where that lowers the energy, those first that miss most."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
@@ -87,12 +90,14 @@ def _exchange_families(state: FreeField, solver: Solver) -> None:
     worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
     of_pixel = np.append(curve, -1)[stroke_cells(instance)]
     for number in worst:
+        if over():
+            return
         own = (of_pixel == number).astype(np.int32)
         if (own[grid.first] != own[grid.second]).any():
-            _turn_if_better(state, own, solver)
+            _turn_if_better(state, own, solver, over)
 
 
-def _turn_if_better(state: FreeField, own: Ints, solver: Solver) -> None:
+def _turn_if_better(state: FreeField, own: Ints, solver: Solver, over: Over) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way and keep what lowers the energy most.
 
     Without the bounds the energy of a trial is a lower bound, and usually the answer.
@@ -101,7 +106,7 @@ def _turn_if_better(state: FreeField, own: Ints, solver: Solver) -> None:
     trials = [_turned(state, quarters, solver) for quarters in (own, -own)]
     best = min(trials, key=lambda trial: round(trial.energy, 9))
     if best.energy < enough:
-        settle(best, solver)
+        settle(best, solver, over)
         if best.energy < enough:
             state.x, state.p = best.x, best.p
 

@@ -9,21 +9,27 @@ pixels G is a small dense matrix. A jump p_e of the pair (i, j) that changes by 
 
 So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change that is made costs one update of G.
 Angles outside the window stay as they are; the energy is that of the whole field.
+
+Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of beta, (alpha + c, beta -+ c) costs
+w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends this state takes the difference of numbers as large as 1 / w_beta.
+So after every change the energy is taken from its definition (models/window_energy.py), and where the updates say another one, G is
+computed anew. Gains that no energy can have are not believed either.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemm
 
-from .field import CrossField
 from .free_field import free_bounds, parity_sign
 from .grid import Bools, Floats, Ints
 from .instance import HALF, Instance
 from .quadratic import PULL, energy_at
+from .window_energy import WindowEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
 """Changes of one jump that `gains` tells of."""
@@ -32,6 +38,17 @@ _HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffness
 _OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
 _SOFTEST: Final = 1e-6  # price of beta below which G grows so large that updates lose their digits
 _MOST_HOLDS: Final = 60
+_DRIFT: Final = (
+    1e-8  # by which updates may miss the energy, relative to 1 + energy, before all is solved anew
+)
+
+
+class Point(NamedTuple):
+    """Angles (alpha, beta) of the whole field, shape (2n,), jumps (m,), and the 2-norm energy that they have by definition."""
+
+    energy: float
+    x: Floats
+    p: Ints
 
 
 class _State(NamedTuple):
@@ -74,34 +91,26 @@ class Window:
 class Landscape:
     """The least energy over a window's angles at jumps that change step by step; angles outside stay.
 
-    Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact to about 1e-4
-    where bounds matter. Without them (`gains` does not look ahead to bounds that a change would meet) walks lead
+    energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite. Bounds of the angles are kept
+    by a stiff pull on those that would pass them, so that the energy is exact to about 1e-4 where bounds matter.
+    Without them (`gains` does not look ahead to bounds that a change would meet) walks lead
     to points that look low and are not, so they are kept at every step.
+
+    Raises LinAlgError, at the start and in a change, where the jumps leave a system that double precision cannot solve.
     """
 
     def __init__(self, window: Window, x: Floats, p: Ints) -> None:
         """Start at the angles x (2n,), of which those in the window are solved for, and jumps p (m,)."""
-        instance, places = window.instance, window.unknowns
         self.window = window
         self.p = p.copy()
         self._around = x
-        energy = energy_at(instance, p)
-        rows = energy.matrix[places]
-        outside = x.copy()
-        outside[places] = 0.0
-        right = energy.vector[places] - rows @ outside
-        system = rows[:, places].toarray()
-        system[np.diag_indices(len(places))] += np.repeat(
-            [PULL, max(PULL, _SOFTEST - instance.w_beta)], len(window.pixels)
-        )
-        inverse = np.linalg.inv(system)
-        self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
-        self._x = self._inverse @ right
-        alpha, beta = np.split(self.angles, 2)
-        self.energy = CrossField(instance, alpha, beta, p).energy().total
+        self._defined = WindowEnergy(window, x, p)
+        soft = max(PULL, _SOFTEST - window.instance.w_beta)
+        self._soft = np.repeat([PULL, soft], len(window.pixels))
         self._lower, self._upper = _bounds(window)
         self._held: dict[int, float] = {}
-        self._keep_bounds()
+        self._solve()
+        self._settle()
 
     @property
     def angles(self) -> Floats:
@@ -109,6 +118,14 @@ class Landscape:
         x = self._around.copy()
         x[self.window.unknowns] = self._x
         return x
+
+    @property
+    def point(self) -> Point:
+        """The field within its bounds, with its energy by definition."""
+        inside = np.clip(self._x, self._lower, self._upper)
+        x = self._around.copy()
+        x[self.window.unknowns] = inside
+        return Point(self._defined(inside, self.p), x, self.p.copy())
 
     def saved(self) -> _State:
         """What `restore` takes back later."""
@@ -119,10 +136,21 @@ class Landscape:
     def restore(self, state: _State) -> None:
         """Go back to a state that was saved."""
         self._inverse, self._x, self.p = state.inverse.copy(order="F"), state.x.copy(), state.p.copy()
-        self.energy, self._held = state.energy, dict(state.held)
+        self.energy, self._held, self._fresh = state.energy, dict(state.held), False
 
     def gains(self) -> Floats:
-        """By how much each jump's change by +1 and by -1 alters the energy; shape (2, e), rows as in STEPS."""
+        """By how much each jump's change by +1 and by -1 alters the energy; shape (2, e), rows as in STEPS.
+
+        Infinite where rounding hides the gain even from an inverse that is fresh.
+        """
+        gains = self._gains()
+        if np.isinf(gains).any() and not self._fresh:
+            self._solve()
+            gains = self._gains()
+        return gains
+
+    def _gains(self) -> Floats:
+        """The gains by the present inverse, infinite where they cannot be true."""
         g, x, i, j = self._inverse, self._x, self.window.first, self.window.second
         k = len(self.window.pixels)
         p = self.p[self.window.pairs]
@@ -133,12 +161,27 @@ class Landscape:
         ii, jj, ij = g[at_i, at_i], g[at_j, at_j], g[at_i, at_j] + parity_sign(p) / 4
         q = HALF * STEPS[:, None]
         y_i, y_j = x[at_i] - 2 * q * to_i, x[at_j] - 2 * q * to_j
-        turned = (jj * y_i**2 - 2 * ij * y_i * y_j + ii * y_j**2) / (ii * jj - ij**2)
-        gains: Floats = 2 * q * q * (1 - 2 * give) + 4 * q * a + turned
+        # 16 (ij^2 - ii jj) is det(H + C) / det(H), of two definite matrices.
+        ratio = ij**2 - ii * jj
+        with np.errstate(all="ignore"):
+            turned = (2 * ij * y_i * y_j - jj * y_i**2 - ii * y_j**2) / ratio
+            gains: Floats = 2 * q * q * (1 - 2 * give) + 4 * q * a + turned
+            believed = np.isfinite(gains) & (ratio > 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
+        gains[~believed] = np.inf
         return gains
 
     def change(self, pairs: Ints, steps: Ints) -> None:
         """Add steps, shape (c,), to the jumps of the window's pairs with those local numbers, each at most once."""
+        try:
+            self._follow(pairs, steps)
+        except np.linalg.LinAlgError:
+            self.energy = np.nan  # which is no energy, so that all is solved anew
+        self.p[self.window.pairs[pairs]] += steps
+        self._settle()
+
+    def _follow(self, pairs: Ints, steps: Ints) -> None:
+        """Bring energy, angles and inverse up to date with a change of jumps."""
+        self._fresh = False
         push, gain = self._pushed(pairs, steps)
         touched = np.nonzero(push)[0]
         moved = self._inverse[:, touched] @ push[touched]
@@ -152,8 +195,48 @@ class Landscape:
             self.energy += float(here @ small @ here)
             self._x -= columns @ (small @ here)
             self._update(-1.0, columns @ small, columns)
-        self.p[self.window.pairs[pairs]] += steps
-        self._keep_bounds()
+
+    def _solve(self) -> None:
+        """Compute inverse, angles and energy from the jumps and from the angles that are held."""
+        places = self.window.unknowns
+        energy = energy_at(self.window.instance, self.p)
+        rows = energy.matrix[places]
+        outside = self._around.copy()
+        outside[places] = 0.0
+        right = energy.vector[places] - rows @ outside
+        held = list(self._held)
+        right[held] += _HOLD * np.array(list(self._held.values()))
+        system = rows[:, places].toarray()
+        system[np.diag_indices(len(places))] += self._soft
+        system[held, held] += _HOLD
+        inverse = np.linalg.inv(system)
+        self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
+        self._x = self._inverse @ right
+        self._x += self._inverse @ (right - system @ self._x)
+        if not np.isfinite(self._x).all():
+            raise np.linalg.LinAlgError("the angles of a window are not finite")
+        self.energy = self._defined_energy()
+        self._fresh = True
+
+    def _settle(self) -> None:
+        """Keep the bounds, and solve anew where the updates have lost the energy; then bounds are kept once more."""
+        for _ in range(2):
+            with suppress(np.linalg.LinAlgError):
+                self._keep_bounds()
+                if self._as_defined():
+                    return
+            self._solve()
+
+    def _as_defined(self) -> bool:
+        """Whether the updates say the energy that the angles have; from now on the energy is that."""
+        followed, self.energy = self.energy, self._defined_energy()
+        return bool(abs(followed - self.energy) <= _DRIFT * (1 + self.energy))
+
+    def _defined_energy(self) -> float:
+        """The energy of the present angles with all pulls."""
+        held = self._x[list(self._held)] - list(self._held.values())
+        pulls = float(self._soft @ (self._x * self._x)) + _HOLD * float(held @ held)
+        return self._defined(self._x, self.p) + pulls
 
     def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and what c - 2 x'b gains."""
@@ -208,7 +291,10 @@ class Landscape:
     def _pull(self, place: int, goal: float, weight: float) -> None:
         """Add weight (x - goal)^2 to the energy."""
         column = self._inverse[:, [place]]
-        share = weight / (1 + weight * column[place, 0])
+        stiffer = 1 + weight * column[place, 0]
+        if not stiffer > 0:
+            raise np.linalg.LinAlgError("rounding has made the inverse of a window indefinite")
+        share = weight / stiffer
         off = goal - self._x[place]
         self.energy += share * off * off
         self._x += column[:, 0] * (share * off)

@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 from children import interrupted
 from crossfield.models.coarse import halved, prolonged
+from crossfield.models.exploration import Task, explore
 from crossfield.models.field import CrossField
 from crossfield.models.greedy import greedy
 from crossfield.models.improvement import first_field, improved, stroke_curves
 from crossfield.models.instance import HALF, QUARTER
 from crossfield.models.kicks import Kicks
 from crossfield.models.landscape import STEPS, Landscape, Window
+from crossfield.models.side_by_side import side_by_side
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -186,10 +188,71 @@ def test_search_ends_by_itself_when_nothing_is_found():
 def test_search_ends_in_time():
     found = cf.search(cf.sample("mouse", 16), seconds=0.5, jobs=1)
     assert found.ended == "time"
-    assert found.rounds >= 1
+    assert found.field.energy().total <= greedy(found.field.instance).energy().total + 1e-9
 
 
-@pytest.mark.parametrize("given", [{"seconds": 0}, {"rounds": -1}, {"jobs": 0}])
+@pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
+def test_a_search_without_time_gives_a_field_within_its_bounds(name):
+    instance = cf.sample(name, 24)
+    found = cf.search(instance, seconds=1e-9, jobs=1)
+    assert (found.rounds, found.ended) == (0, "time")
+    assert (np.abs(found.field.beta) <= QUARTER).all()
+    assert (found.field.alpha >= instance.alpha_lower).all()
+    assert (found.field.alpha <= instance.alpha_upper).all()
+
+
+def test_a_deadline_that_is_far_changes_no_bit():
+    instance = cf.sample("ring", 10)
+    fields = [cf.search(instance, rounds=1, seconds=seconds, jobs=1).field for seconds in (None, 1e9)]
+    assert fields[0].alpha.tobytes() == fields[1].alpha.tobytes()
+
+
+class Hourglass:
+    """Time that is over after it has been asked for so many times, and how often it was asked."""
+
+    def __init__(self, grains):
+        self.grains, self.asked = grains, 0
+
+    def __call__(self):
+        self.asked += 1
+        return self.asked > self.grains
+
+
+WORK = {
+    "greedy": lambda over: greedy(cf.sample("mouse", 16), over=over),
+    "improved": lambda over: improved(greedy(cf.sample("mouse", 16)), over),
+    "prolonged": lambda over: prolonged(
+        first_field(halved(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
+    ),
+}
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_work_ends_soon_after_its_time_and_gives_a_field(work):
+    whole = Hourglass(np.inf)
+    WORK[work](whole)
+    assert whole.asked > 10
+    for grains in (0, 3, whole.asked // 2):
+        time = Hourglass(grains)
+        assert np.isfinite(WORK[work](time).energy().total)
+        assert time.asked - grains <= 8
+
+
+def test_a_window_without_time_is_not_whole_and_its_walk_stops():
+    field = first_field(cf.sample("mouse", 12))
+    free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
+    task = Task(field.instance, angles(field), field.p, free, curve, kicks=10**9, seed=(0,), seconds=0.0)
+    assert explore(task) == (None, False)
+
+
+def test_tasks_are_drawn_when_there_is_a_process_for_them():
+    order = []
+    with side_by_side(order.append, 1) as work:
+        work(order.append(-task) or task for task in range(1, 4))
+    assert order == [-1, 1, -2, 2, -3, 3]
+
+
+@pytest.mark.parametrize("given", [{"seconds": 0}, {"seconds": np.nan}, {"rounds": -1}, {"jobs": 0}])
 def test_limits_that_cannot_be_are_refused(given):
     with pytest.raises(cf.CrossfieldError, match="positive"):
         cf.search(cf.sample("skew", 6), **given)
