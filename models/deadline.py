@@ -1,0 +1,43 @@
+"""When work has to end: made once from a limit and passed down, so that every part asks for what is left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+Clock = Callable[[], float]
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """A moment of a clock in seconds, `inf` for none; that of `time.monotonic` is the same in all processes of a machine."""
+
+    at: float
+    clock: Clock = time.monotonic
+
+    @classmethod
+    def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
+        """The moment so many seconds from now."""
+        return cls(clock() + seconds, clock)
+
+    def left(self) -> float:
+        """Seconds until then; 0.0 once it has passed."""
+        return max(0.0, self.at - self.clock())
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is left."""
+        return self.left() == 0.0
+
+    def sooner(self, seconds: float) -> Deadline:
+        """The moment so many seconds before this one: what comes after it needs them."""
+        return replace(self, at=self.at - seconds)
+
+    def share(self, part: float) -> Deadline:
+        """The moment at which that part of what is left will have gone by."""
+        return replace(self, at=self.clock() + part * self.left())
+
+    def within(self, seconds: float) -> Deadline:
+        """This moment, or that so many seconds from now, whichever comes first."""
+        return replace(self, at=min(self.at, self.clock() + seconds))
