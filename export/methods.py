@@ -17,6 +17,7 @@ from ..models.improvement import first_field
 from ..models.instance import Instance
 from ..models.power_field import power_field
 from ..models.search import search
+from ..models.side_by_side import cores
 from .solution import Solution
 from .solvers import Limits
 from .stages import find_jumps, fit_angles
@@ -159,9 +160,7 @@ def _windows(request: Request) -> Iterator[Candidate]:
 
 
 def _processes(request: Request) -> int:
-    import joblib
-
-    return int(request.limits.threads or joblib.cpu_count())
+    return request.limits.threads or cores()
 
 
 def _teller(request: Request, method: str, things: str) -> Callable[[int, float], None]:

@@ -39,5 +39,5 @@ class Deadline:
         return replace(self, at=self.clock() + part * self.left())
 
     def within(self, seconds: float) -> Deadline:
-        """This moment, or that so many seconds from now, whichever comes first."""
+        """The sooner one of this moment and that so many seconds from now."""
         return replace(self, at=min(self.at, self.clock() + seconds))

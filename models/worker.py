@@ -1,0 +1,37 @@
+"""A process that does tasks for another one: run as a program by models/side_by_side.py."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+from collections.abc import Callable
+from typing import IO, Any
+
+from .side_by_side import Raised, leave_with_parent, send
+
+
+def main() -> None:
+    """Do tasks from standard input, one after the other, and answer on standard output, until the input closes."""
+    tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def listen(stream: IO[bytes]) -> None:
+        while True:  # until EOFError
+            tasks.put(pickle.load(stream))  # noqa: S301 - from the process that started this one
+
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)  # what a library prints is no answer
+        leave_with_parent(listen)
+        while True:
+            send(_answer(*tasks.get()), answers)
+
+
+def _answer(work: Callable[[Any], Any], task: Any) -> Any:
+    try:
+        return work(task)
+    except Exception as error:  # noqa: BLE001 - it is raised where the task came from
+        return Raised(error)
+
+
+if __name__ == "__main__":
+    main()
