@@ -30,9 +30,9 @@ class Deadline:
         """Whether nothing is left."""
         return self.left() == 0.0
 
-    def sooner(self, seconds: float) -> Deadline:
-        """The moment so many seconds before this one: what comes after it needs them."""
-        return replace(self, at=self.at - seconds)
+    def later(self, seconds: float) -> Deadline:
+        """The moment so many seconds after this one; before it where they are negative."""
+        return replace(self, at=self.at + seconds)
 
     def share(self, part: float) -> Deadline:
         """The moment at which that part of what is left will have gone by."""

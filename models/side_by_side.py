@@ -141,15 +141,19 @@ def send(value: Any, stream: IO[bytes]) -> None:
     stream.flush()
 
 
-def leave_with_parent(listen: Callable[[IO[bytes]], object] = lambda stream: stream.read()) -> None:
+def leave_with_parent(take: Callable[[Any], object] | None = None) -> None:
     """See to it that this process ends as soon as its standard input closes, a pipe from its parent.
 
-    listen: reads what comes through the pipe, in a thread, until it ends.
+    take: gets each value that comes through the pipe, in a thread.
     """
 
     def run() -> None:
         try:
-            listen(sys.stdin.buffer)
+            # Not sys.stdin: Python ends with an abort when a thread waits there.
+            with os.fdopen(os.dup(0), "rb") as stream:
+                while take is not None:
+                    take(pickle.load(stream))  # noqa: S301 - from the process that started this one
+                stream.read()
         finally:
             os._exit(1)
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import pickle
 import queue
 from collections.abc import Callable
-from typing import IO, Any
+from typing import Any
 
 from .side_by_side import Raised, leave_with_parent, send
 
@@ -14,14 +13,9 @@ from .side_by_side import Raised, leave_with_parent, send
 def main() -> None:
     """Do tasks from standard input, one after the other, and answer on standard output, until the input closes."""
     tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
-
-    def listen(stream: IO[bytes]) -> None:
-        while True:  # until EOFError
-            tasks.put(pickle.load(stream))  # noqa: S301 - from the process that started this one
-
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what a library prints is no answer
-        leave_with_parent(listen)
+        leave_with_parent(tasks.put)
         while True:
             send(_answer(*tasks.get()), answers)
 

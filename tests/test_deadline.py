@@ -32,7 +32,7 @@ def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
 
 def test_without_a_limit_there_is_no_end():
     deadline = Deadline(math.inf)
-    assert deadline.left() == deadline.share(0.5).left() == deadline.sooner(1e9).left() == math.inf
+    assert deadline.left() == deadline.share(0.5).left() == deadline.later(-1e9).left() == math.inf
     assert not deadline.passed
     assert Deadline(math.inf, clock := Clock()).within(2.0) == Deadline(clock.now + 2.0, clock)
 
@@ -43,7 +43,7 @@ def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
     clock = Clock()
     whole = Deadline.after(seconds, clock)
     for part, taken, most, kept in steps:
-        own = whole.share(part).within(most).sooner(kept)
+        own = whole.share(part).within(most).later(-kept)
         assert own.at <= whole.at + 1e-9 * seconds
         clock.now += taken * own.left()
     assert clock.now <= whole.at + 1e-9 * seconds
