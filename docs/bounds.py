@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +15,6 @@ import highspy
 import numpy as np
 from crossfield.models.instance import Instance
 from crossfield.models.problem import Problem
-from crossfield.models.side_by_side import side_by_side
 from make import markdown, said
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -98,8 +97,8 @@ def strengthened(task: tuple[tuple[int, int, int], tuple[str, ...]]) -> Outcome:
 def strengthening() -> tuple[list[list[str]], list[list[str]]]:
     """A row for each variant over all instances, and a row for each instance and variant."""
     tasks = [(size, chosen) for size in TRIED for chosen in VARIANTS]
-    with side_by_side(strengthened, os.cpu_count() or 1) as explore:
-        found = dict(zip(tasks, explore(tasks), strict=True))
+    with ProcessPoolExecutor() as pool:
+        found = dict(zip(tasks, pool.map(strengthened, tasks), strict=True))
     rows = [
         [
             f"{height} x {width}, seed {seed}",

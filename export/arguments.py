@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from ..models.side_by_side import MOST
+
 What = Annotated[
     str,
     typer.Argument(
@@ -45,11 +47,39 @@ Relax = Annotated[bool, typer.Option("--relax", help="Drop integrality.")]
 Seconds = Annotated[
     float, typer.Option("--time-limit", min=0.1, metavar="SECONDS", help="Seconds for each solve.")
 ]
+SecondsInAll = Annotated[
+    float,
+    typer.Option(
+        "--time-limit",
+        min=0.1,
+        metavar="SECONDS",
+        help="Seconds in all, reading and writing files included; greedy and power end when they are done.",
+    ),
+]
+SecondsEach = Annotated[
+    float,
+    typer.Option(
+        "--time-limit",
+        min=0.1,
+        metavar="SECONDS",
+        help="Seconds for each of the methods that search; what that makes in all is said before they start.",
+    ),
+]
 Gap = Annotated[
     float, typer.Option("--gap", min=0.0, help="Relative gap at which a discrete search may stop.")
 ]
-Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Solver files written at once, in threads.")]
-Threads = Annotated[int, typer.Option("--threads", min=0, help="Threads of HiGHS; 0: its own choice.")]
+Jobs = Annotated[
+    int, typer.Option("--jobs", min=1, max=MOST, help="Solver files written at once, in threads.")
+]
+Processes = Annotated[
+    int, typer.Option("--jobs", min=1, max=MOST, help="Entries built at once, in processes.")
+]
+Threads = Annotated[
+    int,
+    typer.Option(
+        "--threads", min=0, max=MOST, help="Threads of HiGHS, processes of searches; 0: their own choice."
+    ),
+]
 Start = Annotated[
     Path | None,
     typer.Option(

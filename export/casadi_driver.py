@@ -1,8 +1,8 @@
 """A solver driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
-Run as a child process, `python -m crossfield.export.casadi_driver ipopt model.nl model.sol seconds gap`: a crash of a solver takes
+Run as a child process, `python -m crossfield.export.casadi_driver ipopt model.nl model.sol deadline gap`: a crash of a solver takes
 the child alone, and its log is the child's output. The log's first line says that the solver starts now; from then on an
-interrupt (SIGINT) ends the search and leaves the best point so far.
+interrupt (SIGINT) ends the search and leaves the best point so far. It ends with its parent: when its standard input closes.
 
 Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better points only, and the
 start is the answer when there is none.
@@ -21,6 +21,8 @@ from typing import Any, Final, NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..models.deadline import Deadline
+from ..models.side_by_side import leave_with_parent
 from .ampl_sol import write_ampl_sol
 
 # AMPL's solve codes: 0 solved, 100 solved?, 200 infeasible, 300 unbounded, 400 limit with point, 500 failure.
@@ -45,6 +47,8 @@ _FAILURE: Final = 500
 _STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
 _FEASIBLE: Final = 1e-6
 """Violation up to which a start counts as feasible: the solvers' own tolerance."""
+_LEAST: Final = 0.01
+"""Seconds that a solver is given when nothing is left: zero would be no limit to some."""
 _NO_POINT: Final = 1e49
 """Bonmin's objective when it has no incumbent is 1e50."""
 
@@ -199,10 +203,12 @@ def _without_better(words: str, code: int, model: Model, best: float | None) -> 
 
 def main(arguments: list[str]) -> int:
     """0 when a .sol was written; the solver's status stands in it."""
-    solver, path, solution, seconds, gap = arguments
+    solver, path, solution, deadline, gap = arguments
+    leave_with_parent()
     model = read_model(Path(path))
-    line = f"{solver}: {model.columns} columns, {model.rows} rows, at most {float(seconds):g} s"
-    ending = solve(solver, model, float(seconds), float(gap), started=lambda: print(line, flush=True))  # noqa: T201 - the log
+    seconds = max(Deadline(float(deadline)).left(), _LEAST)
+    line = f"{solver}: {model.columns} columns, {model.rows} rows, at most {seconds:.3g} s"
+    ending = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201 - the log
     message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {ending.words}"
     write_ampl_sol(solution, message, ending.point, model.rows, ending.code, columns=model.columns)
     return 0

@@ -1,6 +1,8 @@
 """The command line: the verbs of the package, with progress, tables, exit codes and one-line errors.
 
-Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Heavy libraries are imported inside the commands.
+Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far, and a run with a report of what
+there is: that is fine too, and said on standard error. Where there is nothing to keep, the exit code is 1. Heavy libraries are imported
+inside the commands.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from .arguments import (
     Output,
     Quiet,
     Relax,
-    Seconds,
+    SecondsEach,
     Size,
     Start,
     StrokeNorm,
@@ -91,7 +93,7 @@ def run_command(
     mask: Mask = None,
     gauge: GaugeName = None,
     facet: Facet = None,
-    time_limit: Seconds = 60.0,
+    time_limit: SecondsEach = 60.0,
     gap: Gap = 1e-6,
     threads: Threads = 0,
     jobs: Jobs = 1,
@@ -100,11 +102,16 @@ def run_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Do everything: instance, all solver files, the solves that can be done here, the best field, pictures, a report."""
-    from .run import run
+    """Do everything: instance, all solver files, the solves that can be done here, the best field, pictures, a report.
+
+    Ctrl-C ends the present method with its best field and the run with it; a second one ends at once.
+    """
+    from .run import plan, run
     from .solvers import Limits
 
     limits = Limits(time_limit, gap, threads)
+    if not (quiet or as_json):
+        say(plan(limits))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         instance = load(sketch, size, mask, gauge)
@@ -122,6 +129,8 @@ def run_command(
         say_json(report.document())
     elif not quiet:
         show_report(report, output)
+    if report.interrupted:
+        complain(f"interrupted: {report.interrupted}; the report says what there is")
 
 
 @app.command("instance")

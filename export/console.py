@@ -121,7 +121,8 @@ def show_report(report: Report, folder: Path) -> None:
         rows.append([candidate.method + mark, *numbers, str(facts.get("status", ""))])
     show_table(described(report.instance), columns, rows, numbers=columns[1:-1])
     say(f"* kept, the least 2-norm energy: {folder / 'field.npz'} (.json, .rawfield)")
-    say(f"  pictures: {folder / 'overview.png'} and others beside it")
+    if not report.interrupted:
+        say(f"  pictures: {folder / 'overview.png'} and others beside it")
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     for candidate in report.candidates:
         if candidate.interrupted:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Folder, Json, Quiet, Seconds
+from .arguments import Folder, Json, Processes, Quiet, Seconds
 from .console import complain, progress, say, say_json
 
 library = typer.Typer(
@@ -27,7 +27,7 @@ def build_command(
     ],
     output: Folder,
     *,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Entries built at once, in processes.")] = 1,
+    jobs: Processes = 1,
     scheduler: Annotated[
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Build on the workers of a dask scheduler."),

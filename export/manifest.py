@@ -32,6 +32,7 @@ from ..models.grid import Ints
 from ..models.instance import Instance
 from ..models.instance_file import check_schema, check_version, parse_json, read_instance, write_instance
 from ..models.problem import Problem, formulate
+from ..models.side_by_side import checked
 from ..models.storage import make_folder, read_bytes, write_bytes
 from .capabilities import smallest, takers
 from .formats import DEFAULTS, FORMATS, Written, generator, write
@@ -138,7 +139,7 @@ def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
 
     After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is whole.
     """
-    with ThreadPoolExecutor(jobs) as pool:
+    with ThreadPoolExecutor(checked(jobs)) as pool:
         try:
             yield pool
         except BaseException:

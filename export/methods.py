@@ -11,15 +11,17 @@ from typing import Any, Final
 import numpy as np
 
 from ..models.box_qp import fitted
+from ..models.deadline import Deadline
 from ..models.field import CrossField
 from ..models.greedy import greedy
 from ..models.improvement import first_field
 from ..models.instance import Instance
 from ..models.power_field import power_field
 from ..models.search import search
+from ..models.side_by_side import cores
 from .solution import Solution
 from .solvers import Limits
-from .stages import find_jumps, fit_angles
+from .stages import find_jumps, fit_angles, jumps_until
 from .windows import WINDOW_SOLVERS, search_windows
 
 Progress = Callable[[str], None]
@@ -84,7 +86,7 @@ def _tell_nobody(_text: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a method is asked: the instance, a folder for files of solvers, limits, and options of the formulations.
+    """What a method is asked: the instance, a folder for files of solvers, limits of the whole, and options of the formulations.
 
     start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver: one of those that the
     method can do with; None: the method's choice.
@@ -103,13 +105,15 @@ class Request:
 class Method:
     """A way to a field. find: the fields it comes to, one by one, for a later one may fail; the last one is its answer.
 
-    solvers: those that may be chosen for it; in_runs: whether `run` tries it.
+    solvers: those that may be chosen for it; timed: whether it goes on up to the time limit, or ends when it is done; in_runs: whether
+    `run` tries it.
     """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
     solvers: tuple[str, ...] = ()
+    timed: bool = True
     in_runs: bool = True
 
 
@@ -126,14 +130,14 @@ def _power(request: Request) -> Iterator[Candidate]:
 
 
 def _search(request: Request) -> Iterator[Candidate]:
-    begin = time.perf_counter()
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
     request.progress("search: starting fields")
     found = search(
         request.instance,
         seconds=request.limits.seconds,
         jobs=_processes(request),
         start=request.start,
-        progress=_teller(request, "search", "rounds"),
+        progress=_teller(request, deadline, "search", "rounds"),
     )
     seconds = time.perf_counter() - begin
     interrupted = found.ended == "interrupted"
@@ -143,14 +147,15 @@ def _search(request: Request) -> Iterator[Candidate]:
 
 
 def _windows(request: Request) -> Iterator[Candidate]:
-    begin = time.perf_counter()
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
     request.progress("windows: greedy field")
+    start = request.start or first_field(request.instance)
     found = search_windows(
-        request.start or first_field(request.instance),
-        seconds=request.limits.seconds,
+        start,
+        seconds=request.limits.until(deadline).seconds,
         solver=request.solver or "bonmin",
         jobs=_processes(request),
-        progress=_teller(request, "windows", "windows"),
+        progress=_teller(request, deadline, "windows", "windows"),
     )
     seconds = time.perf_counter() - begin
     counts = (("windows", found.windows), ("windows_closed", found.closed), ("windows_lower", found.lower))
@@ -159,40 +164,38 @@ def _windows(request: Request) -> Iterator[Candidate]:
 
 
 def _processes(request: Request) -> int:
-    import joblib
-
-    return int(request.limits.threads or joblib.cpu_count())
+    return request.limits.threads or cores()
 
 
-def _teller(request: Request, method: str, things: str) -> Callable[[int, float], None]:
-    """What tells how far a search is that has just begun: how many of the things it counts, the energy, and the time left."""
-    end = time.perf_counter() + request.limits.seconds
+def _teller(request: Request, deadline: Deadline, method: str, things: str) -> Callable[[int, float], None]:
+    """What tells how far a search is: how many of the things it counts, the energy, and the time left."""
 
     def tell(count: int, energy: float) -> None:
-        left = max(0.0, end - time.perf_counter())
         request.progress(
-            f"{method}: energy {energy:.5g} after {count} {things}, at most {left:.0f} s more; Ctrl-C keeps the best field so far"
+            f"{method}: energy {energy:.5g} after {count} {things}, at most {deadline.left():.0f} s more; "
+            "Ctrl-C keeps the best field so far"
         )
 
     return tell
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:
-    limits = request.limits
+    deadline = Deadline.after(request.limits.seconds)
+    limits = request.limits.until(jumps_until(deadline))
     request.progress(
-        f"HiGHS: MILP for the jumps, at most {limits.seconds:g} s; Ctrl-C keeps the best point so far"
+        f"HiGHS: MILP for the jumps, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far"
     )
     milp = find_jumps(request.instance, request.folder, limits=limits, start=request.start, **request.options)
     yield _of("MILP", milp)
     request.progress("Ipopt: angles for the jumps of the MILP")
-    yield _of("two-stage", fit_angles(milp.field, request.folder, limits=limits))
+    yield _of("two-stage", fit_angles(milp.field, request.folder, limits=request.limits.until(deadline)))
 
 
 METHODS: Final = {
     method.name: method
     for method in (
-        Method("greedy", "the greedy strategy of BendFields, then the best angles: the baseline", _greedy),
-        Method("power", "smooth exp(4 i theta), right angles; then the best angles for its jumps", _power),
+        Method("greedy", "the greedy strategy of BendFields, then the best angles: the baseline", _greedy, timed=False),
+        Method("power", "smooth exp(4 i theta), right angles; then the best angles for its jumps", _power, timed=False),
         Method("search", "local search over jumps and singularities from the greedy field on, up to the time limit", _search),
         Method(
             "windows", "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit", _windows,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,11 +14,11 @@ from ..models.instance import Instance
 from ..models.storage import make_folder, write_bytes
 from .formats import generator
 from .manifest import Manifest, write_all
-from .methods import METHODS, Candidate, Progress, Request, solution_facts
+from .methods import METHODS, Candidate, Method, Progress, Request, solution_facts
 from .solution import Solution
 from .solvers import Limits
 
-PICTURES: Final = ("overview", "field", "crosses", "angle")
+PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 REPORT: Final = "report.json"
 
 
@@ -35,12 +35,16 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a run found. candidates: every field, best (lowest 2-norm energy) first; manifests: the written sets."""
+    """What a run found. candidates: every field, best (lowest 2-norm energy) first; manifests: the written sets.
+
+    failures: reasons by method; interrupted: the method, or `drawing`, that Ctrl-C ended, and the run with it; empty when none did.
+    """
 
     instance: Instance
     candidates: tuple[Candidate, ...]
     manifests: tuple[Manifest, ...]
     failures: dict[str, str] = field(default_factory=dict)
+    interrupted: str = ""
 
     @property
     def best(self) -> Candidate:
@@ -76,11 +80,23 @@ class Report:
             "best": self.best.method,
             "methods": [candidate.facts() for candidate in self.candidates],
             "failures": self.failures,
+            "interrupted": self.interrupted or None,
             "files": self.files,
             "refused": {
                 m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
             },
         }
+
+
+def plan(limits: Limits) -> str:
+    """How long the searches of a run may take in all, and each."""
+    timed = [method.name for method in _tried() if method.timed]
+    each = ", ".join(f"{name} {limits.seconds:g} s" for name in timed)
+    return f"at most {len(timed) * limits.seconds:g} s of searching: {each}; files, greedy fields and pictures besides"
+
+
+def _tried() -> list[Method]:
+    return [method for method in METHODS.values() if method.in_runs]
 
 
 def run(
@@ -98,14 +114,16 @@ def run(
         DIR/models     every formulation in every format, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
-        DIR/report.json   written last: where it is, the run is complete
+        DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
-    A solver that fails is noted in the report; the fields that were found stand. Ctrl-C during a solve ends that solve with
-    its best point. Raises OutputError.
+    limits: for each method that searches; `progress` is first told what that makes in all. A method that fails is noted in the report;
+    the fields that were found stand. Ctrl-C ends the present method with its best field and the run with it: no further method is
+    tried and nothing drawn. Before the first field is there it goes on as KeyboardInterrupt. Raises OutputError.
     """
-    folder = make_folder(folder)
-    (folder / REPORT).unlink(missing_ok=True)
-    limits = limits or Limits()
+    folder, limits = make_folder(folder), limits or Limits()
+    for stale in (REPORT, *map(_picture, PICTURES)):
+        (folder / stale).unlink(missing_ok=True)
+    progress(plan(limits))
     progress("greedy field")
     start = first_field(instance)
     manifests = write_all(
@@ -117,28 +135,61 @@ def run(
         jobs=jobs,
         progress=lambda name: progress(f"writing {name}"),
     )
-    request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
-    candidates, failures = list[Candidate](), dict[str, str]()
-    for method in (each for each in METHODS.values() if each.in_runs):
-        try:
-            for candidate in method.find(request):
-                candidates.append(candidate)
-        except CrossfieldError as error:
-            failures[method.name] = str(error)
+    found = _tried_in_turn(
+        Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
+    )
     # Equal but for rounding: the one that was found first.
-    ranked = sorted(candidates, key=lambda candidate: float(f"{candidate.field.energy(2).total:.9g}"))
-    report = Report(instance, tuple(ranked), tuple(manifests), failures)
+    ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
+    report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
-    _draw(report, folder, progress)
+    if not report.interrupted:
+        report = _drawn(report, folder, progress)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
     return report
 
 
-def _draw(report: Report, folder: Path, progress: Progress) -> None:
+@dataclass
+class _Findings:
+    """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
+
+    candidates: list[Candidate] = field(default_factory=list)
+    failures: dict[str, str] = field(default_factory=dict)
+    interrupted: str = ""
+
+
+def _tried_in_turn(request: Request) -> _Findings:
+    """What the methods of a run find, one after the other, until one of them is interrupted."""
+    found = _Findings()
+    for method in _tried():
+        try:
+            for candidate in method.find(request):
+                found.candidates.append(candidate)
+                found.interrupted = found.interrupted or (method.name if candidate.interrupted else "")
+        except CrossfieldError as error:
+            found.failures[method.name] = str(error)
+        except KeyboardInterrupt:
+            if not found.candidates:
+                raise
+            found.interrupted = method.name
+        if found.interrupted:
+            break
+    return found
+
+
+def _drawn(report: Report, folder: Path, progress: Progress) -> Report:
+    """The report, its pictures drawn, or marked where Ctrl-C ended that."""
     from .draw import draw
 
-    for kind in PICTURES:
-        progress(f"drawing {kind}")
-        draw(report.best.field, folder / f"{kind}.png", kind=kind)
-    draw(report.instance, folder / "instance.png", kind="instance")
+    try:
+        for kind in PICTURES:
+            progress(f"drawing {kind}")
+            subject = report.instance if kind == "instance" else report.best.field
+            draw(subject, folder / _picture(kind), kind=kind)
+    except KeyboardInterrupt:
+        return replace(report, interrupted="drawing")
+    return report
+
+
+def _picture(kind: str) -> str:
+    return f"{kind}.png"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..models.deadline import Deadline
 from ..models.errors import InputError
 from .arguments import (
     BetaNorm,
@@ -18,7 +19,7 @@ from .arguments import (
     Mask,
     Quiet,
     Relax,
-    Seconds,
+    SecondsInAll,
     Size,
     Start,
     StrokeNorm,
@@ -64,7 +65,7 @@ def solve_command(
     beta_norm: BetaNorm = None,
     relax: Relax = False,
     start: Start = None,
-    time_limit: Seconds = 60.0,
+    time_limit: SecondsInAll = 60.0,
     gap: Gap = 1e-6,
     threads: Threads = 0,
     quiet: Quiet = False,
@@ -74,6 +75,7 @@ def solve_command(
 
     Both start from the greedy field, improved, unless --start gives another. Ctrl-C ends the search and keeps the best so far.
     """
+    deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
     from .methods import Request
     from .solvers import Limits
 
@@ -84,11 +86,11 @@ def solve_command(
         request = Request(
             loaded,
             output,
-            Limits(time_limit, gap, threads),
-            options_of(facet, stroke_norm, beta_norm, relax=relax),
-            None if start is None else start_field(start, loaded),
-            solver,
-            show,
+            options=options_of(facet, stroke_norm, beta_norm, relax=relax),
+            start=None if start is None else start_field(start, loaded),
+            solver=solver,
+            progress=show,
+            limits=Limits(time_limit, gap, threads).until(deadline),
         )
         if method is not None:
             _check_method(method, solver, relax=relax)
@@ -141,13 +143,14 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     from .solvers import solve
 
     known([name], FORMULATIONS, "formulation")
-    instance, seconds = request.instance, request.limits.seconds
+    instance, deadline = request.instance, Deadline.after(request.limits.seconds)
     request.progress("greedy start")
     start = request.start or first_field(instance)
     jumps = start.p if FORMULATIONS[name].fixed else None
     problem = formulate(instance, name, p=jumps, **request.options)
-    request.progress(f"solving {name}, at most {seconds:g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, request.solver, request.folder, limits=request.limits, start=start)
+    limits = request.limits.until(deadline)
+    request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")
+    solution = solve(problem, request.solver, request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None:
         target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one

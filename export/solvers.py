@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from ..models.deadline import Deadline
 from ..models.errors import (
     InputError,
     MissingSolverError,
@@ -28,20 +29,29 @@ from ..models.errors import (
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem
+from ..models.side_by_side import checked
 from ..models.storage import make_folder
+from .ampl_sol import write_ampl_sol
 from .capabilities import takes_in
-from .child import run_child
+from .child import Ending, run_child
 from .formats import FORMATS, write
 from .names import ONE, column_names
+from .nl import Layout
 from .solution import Solution, read_solution
 
 _TICK: Final = 0.1
 """Seconds between two looks at a running solver."""
+_LEAST: Final = 0.01
+"""Seconds of a solve for which nothing is left: still the point that it starts from comes back."""
+_FEASIBLE: Final = 1e-6
+"""Violation up to which a start is a point of the problem: the solvers' own tolerance."""
+_LIMIT: Final = 400
+"""AMPL's solve code for a limit."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Seconds of a solve, relative gap at which a discrete search may stop, threads (0: the solver's choice)."""
+    """Seconds of a solve, files included; relative gap at which a discrete search may stop; threads (0: the solver's choice)."""
 
     seconds: float = 60.0
     gap: float = 1e-6
@@ -49,15 +59,24 @@ class Limits:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not (0 < self.seconds < np.inf and 0 <= self.gap < np.inf and self.threads >= 0):
+        if not (0 < self.seconds < np.inf and 0 <= self.gap < np.inf):
             raise InputError(
-                f"a time limit of {self.seconds} s, a gap of {self.gap} and {self.threads} threads cannot be; "
-                "give a positive number of seconds, and the others not negative"
+                f"a time limit of {self.seconds} s and a gap of {self.gap} cannot be; "
+                "give a positive number of seconds, and a gap that is not negative"
             )
+        if self.threads:
+            checked(self.threads, "threads")
+
+    def until(self, deadline: Deadline) -> Limits:
+        """The same with what is left until then."""
+        return replace(self, seconds=max(deadline.left(), _LEAST))
 
 
 class Job(NamedTuple):
-    """What a solver is to do: read `model`, leave `solution` and `log`; start: a complete point (columns,), or None."""
+    """What a solver is to do: read `model`, leave `solution` and `log` by the deadline.
+
+    start: a complete point (columns,), or None.
+    """
 
     model: Path
     solution: Path
@@ -65,6 +84,7 @@ class Job(NamedTuple):
     problem: Problem
     start: Floats | None
     limits: Limits
+    deadline: Deadline
 
 
 class Answer(NamedTuple):
@@ -101,16 +121,13 @@ def _run_highs(job: Job) -> Answer:
     highs.setOptionValue("log_file", str(job.log))
     if highs.readModel(str(job.model)) == highspy.HighsStatus.kError:
         raise SolverError(f"HiGHS cannot read it; see {job.log.name} beside it", file=job.model)
-    for option, value in (
-        ("time_limit", limits.seconds),
-        ("mip_rel_gap", limits.gap),
-        ("threads", limits.threads),
-    ):
+    for option, value in (("mip_rel_gap", limits.gap), ("threads", limits.threads)):
         highs.setOptionValue(option, value)
     if limits.threads:
         highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - one for the process, else kept from an earlier solve
     if job.start is not None:
         highs.setSolution(_highs_start(highs, job.problem, job.start))
+    highs.setOptionValue("time_limit", job.deadline.left())
     interrupted = _highs_solve(highs)
     if highs.writeSolution(str(job.solution), 0) == highspy.HighsStatus.kError:
         raise OutputError(
@@ -154,7 +171,6 @@ def _highs_start(highs: Any, problem: Problem, start: Floats) -> Any:
 
 def _casadi(solver: str) -> Run:
     def run(job: Job) -> Answer:
-        limits = (repr(float(job.limits.seconds)), repr(float(job.limits.gap)))
         # -P: a folder `crossfield` or a file casadi.py where the user happens to be is not meant.
         command = [
             sys.executable,
@@ -164,19 +180,34 @@ def _casadi(solver: str) -> Run:
             solver,
             str(job.model),
             str(job.solution),
-            *limits,
+            repr(job.deadline.at),
+            repr(float(job.limits.gap)),
         ]
-        ending = run_child(command, job.log, job.limits.seconds)
+        ending = run_child(command, job.log, job.deadline)
+        if not job.solution.exists() and (ending.interrupted or ending.killed):
+            _hand_over_start(solver, job)
         if not job.solution.exists():
-            last = job.log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
-            how = "interrupted" if ending.interrupted else f"exit code {ending.code}"
-            raise SolverError(
-                f"{solver} left no answer ({how}): {last[0][:200]}; see {job.log.name} beside it",
-                file=job.model,
-            )
+            raise SolverError(_no_answer(solver, job, ending), file=job.model)
         return Answer(None, ending.interrupted)
 
     return run
+
+
+def _no_answer(solver: str, job: Job, ending: Ending) -> str:
+    """What is said of a solver that left nothing: how it ended, and its last words."""
+    if ending.killed and not ending.interrupted:
+        return f"{solver} left no answer within its time; give it more, or a start"
+    last = job.log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
+    how = "interrupted" if ending.interrupted else f"exit code {ending.code}"
+    return f"{solver} left no answer ({how}): {last[0][:200]}; see {job.log.name} beside it"
+
+
+def _hand_over_start(solver: str, job: Job) -> None:
+    """Leave the start as the answer of a solver that was stopped before it had one, if it is a point of the problem."""
+    if job.start is not None and job.problem.violation(job.start).worst <= _FEASIBLE:
+        message = f"{solver}: stopped at its limit or by Ctrl-C, nothing better than the start"
+        point = job.start[Layout(job.problem).order]
+        write_ampl_sol(job.solution, message, point, job.problem.row_count, _LIMIT)
 
 
 SOLVERS: Final = {
@@ -239,7 +270,7 @@ def solve(
     limits: Limits | None = None,
     start: CrossField | None = None,
 ) -> Solution:
-    """The solution that a local solver finds, read back from the file it leaves and checked.
+    """The solution that a local solver finds, read back from the file it leaves and checked, all within the time limit.
 
     Written file, log and solution stay in `folder` when one is given. start: a field whose complete point is handed over as
     incumbent or starting point. Ctrl-C ends the solver and gives its best point so far.
@@ -255,6 +286,7 @@ def solve(
 def _solve_in(
     folder: Path, problem: Problem, solver: Solver, limits: Limits, start: CrossField | None
 ) -> Solution:
+    deadline = Deadline.after(limits.seconds)
     stem = f"{problem.instance.name}.{problem.name}"
     model, solution, log = (
         folder / f"{stem}{suffix}"
@@ -264,7 +296,10 @@ def _solve_in(
     for stale in (solution, log):
         stale.unlink(missing_ok=True)
     begin = time.perf_counter()
-    answer = solver.run(Job(model, solution, log, held, None if start is None else held.point(start), limits))
+    # Reading the answer takes about as long as writing the problem did.
+    own = deadline.later(deadline.left() - limits.seconds)
+    point = None if start is None else held.point(start)
+    answer = solver.run(Job(model, solution, log, held, point, limits, own))
     seconds = time.perf_counter() - begin
     try:
         found = read_solution(solution, held)

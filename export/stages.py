@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from ..models.deadline import Deadline
 from ..models.field import CrossField
 from ..models.formulations import FORMULATIONS
 from ..models.improvement import first_field
@@ -13,6 +14,10 @@ from ..models.instance import Instance
 from ..models.problem import formulate
 from .solution import Solution
 from .solvers import Limits, solve
+
+_ANGLES: Final = 0.2
+"""Share of the time that the second stage keeps, and the seconds that it needs at least: its process has to start."""
+_ANGLES_LEAST: Final = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +53,14 @@ def find_jumps(
     """The solution of `milp-mccormick` by HiGHS: the first stage.
 
     start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x 10 pixels.
-    options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
+    limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
     """
+    limits = limits or Limits()
+    deadline = Deadline.after(limits.seconds)
+    start = start or first_field(instance)
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
-    return solve(problem, None, folder, limits=limits, start=start or first_field(instance))
+    return solve(problem, None, folder, limits=limits.until(deadline), start=start)
 
 
 def two_stage(
@@ -65,7 +73,15 @@ def two_stage(
 ) -> TwoStage:
     """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
 
-    start, options: as in find_jumps. limits: for each stage. Raises SolverError, SolutionError.
+    start, options: as in find_jumps. limits: for both stages together. Raises SolverError, SolutionError.
     """
-    milp = find_jumps(instance, folder, limits=limits, start=start, **options)
-    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits))
+    limits = limits or Limits()
+    deadline = Deadline.after(limits.seconds)
+    milp = find_jumps(instance, folder, limits=limits.until(jumps_until(deadline)), start=start, **options)
+    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits.until(deadline)))
+
+
+def jumps_until(deadline: Deadline) -> Deadline:
+    """When the first stage has to end, so that the second can end by the deadline: a fifth or 2 s before, but not sooner than half way."""
+    left = deadline.left()
+    return deadline.later(-min(max(_ANGLES * left, _ANGLES_LEAST), left / 2))

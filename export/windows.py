@@ -6,13 +6,15 @@ and where the energy is high; once all of a size are solved, they grow.
 
 from __future__ import annotations
 
-import time
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from ..models.deadline import Deadline
 from ..models.errors import InputError
 from ..models.excerpt import Excerpt, excerpt
 from ..models.exploration import LOWER
@@ -33,7 +35,7 @@ WINDOW_SOLVERS: Final = {"bonmin": ("miqp-exact", 4), "highs": ("milp-mccormick"
 _WIDEST: Final = 8  # side at which a search ends: no solver here closes such a window
 _WINDOWS: Final = 4  # a round
 _SECONDS: Final = 5.0  # a window
-_SHORTEST: Final = 0.5  # seconds: with less no solver starts
+_SHORTEST: Final = 0.5  # seconds: with less no solver is started
 
 Progress = Callable[[int, float], object]
 """Is told how many windows are solved, and the least energy so far."""
@@ -55,12 +57,13 @@ class WindowSearch:
 
 
 class _Task(NamedTuple):
-    """A window: the field round it, its free pixels (n,), the solver's name, and its seconds."""
+    """A window: the field round it, its free pixels (n,), the solver's name, the end of the search, and a folder for files."""
 
     field: CrossField
     free: Bools
     solver: str
-    seconds: float
+    deadline: Deadline
+    folder: Path
 
 
 class _Found(NamedTuple):
@@ -84,32 +87,46 @@ def search_windows(
 
     solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows. seconds: when to end;
     jobs: processes. The seed decides on the first windows; how far each is solved, and so what follows, depends on time. Ctrl-C ends the
-    search after the windows at hand. Raises InputError for limits that are not positive and for another solver.
+    search after the windows at hand, a second one at once. Raises InputError for limits that are not positive and for another solver.
     """
     if solver not in WINDOW_SOLVERS:
         raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
     if not seconds > 0 or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
-    deadline = time.monotonic() + seconds
+    deadline = Deadline.after(seconds)
     state = _State(field, WINDOW_SOLVERS[solver][1], np.random.default_rng(seed))
-    with interruptible() as interrupted, side_by_side(_solved, jobs) as explore:
-        ended = ""
-        while not ended:
-            left = max(_SHORTEST, min(_SECONDS, deadline - time.monotonic()))
-            tasks = [_Task(state.field, free, solver, left) for free in state.windows()]
-            state.take(tasks, explore(tasks))
-            progress(state.solved, state.energy)
-            over = {"interrupted": interrupted(), "time": time.monotonic() >= deadline, "windows": state.done}
-            ended = next((why for why, holds in over.items() if holds), "")
+    with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
+        try:
+            with interruptible() as interrupted, side_by_side(_solved, jobs) as explore:
+                while not (ended := _ended(state, deadline, interrupted())):
+                    tasks = [
+                        _Task(state.field, free, solver, deadline, Path(folder)) for free in state.windows()
+                    ]
+                    state.take(tasks, explore(tasks))
+                    progress(state.solved, state.energy)
+        except KeyboardInterrupt:
+            ended = "interrupted"
     return WindowSearch(state.field, state.solved, state.closed, state.lower, state.side, ended)
 
 
-def _solved(task: _Task) -> _Found:
-    """A window, solved by an external solver from the file that is written for it."""
+def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
+    """Why a search is over; empty when it goes on."""
+    late = deadline.later(-_SHORTEST).passed()
+    over = {"interrupted": interrupted, "windows": state.done, "time": late}
+    return next((why for why, holds in over.items() if holds), "")
+
+
+def _solved(task: _Task) -> _Found | None:
+    """A window, solved by an external solver from the file that is written for it; None where there was no time for it."""
+    deadline = task.deadline.within(_SECONDS)
+    if deadline.later(-_SHORTEST).passed():
+        return None
     piece = excerpt(task.field, task.free)
     formulation, _ = WINDOW_SOLVERS[task.solver]
     problem = with_rest_fixed(formulate(piece.field.instance, formulation), piece.field, piece.free)
-    found = solve(problem, task.solver, limits=Limits(task.seconds, threads=1), start=piece.field)
+    limits = Limits(threads=1).until(deadline)
+    with tempfile.TemporaryDirectory(dir=task.folder) as folder:
+        found = solve(problem, task.solver, folder, limits=limits, start=piece.field)
     return _Found(piece, _field_of(found), found.status.startswith("optimal"))
 
 
@@ -168,9 +185,11 @@ class _State:
         inside: Bools = np.all((off >= -first) & (off < side - first), axis=0)
         return inside
 
-    def take(self, tasks: list[_Task], found: list[_Found]) -> None:
+    def take(self, tasks: list[_Task], found: list[_Found | None]) -> None:
         """Take over what lowers the energy of the whole field, and note which windows are done with."""
         for centre, task, each in zip(self._chosen, tasks, found, strict=True):
+            if each is None:
+                continue
             self.solved += 1
             self.closed += each.closed
             self._open[centre] = False

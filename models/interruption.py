@@ -1,4 +1,4 @@
-"""Ctrl-C for work in rounds and in several processes: it ends at the next good place, and the other processes never hear of it."""
+"""Ctrl-C for work in rounds: it ends at the next good place."""
 
 from __future__ import annotations
 
@@ -22,25 +22,12 @@ def interruptible() -> Iterator[Callable[[], bool]]:
             raise KeyboardInterrupt
         pressed.append(number)
 
-    with _handled(note):
-        yield lambda: bool(pressed)
-
-
-@contextmanager
-def deaf_children() -> Iterator[None]:
-    """Processes that are started meanwhile ignore Ctrl-C, which a terminal sends to them too."""
-    with _handled(signal.SIG_IGN):
-        yield
-
-
-@contextmanager
-def _handled(handler: Any) -> Iterator[None]:
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
-        yield
+        yield lambda: False
         return
-    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGINT, note)
     try:
-        yield
+        yield lambda: bool(pressed)
     finally:
         signal.signal(signal.SIGINT, before)

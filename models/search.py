@@ -8,7 +8,7 @@ grids of lower resolution and the last round are cut off. What a round that was 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -33,7 +33,7 @@ from .side_by_side import side_by_side
 Progress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
 
-Explorers = Callable[[Iterable[Task]], list[Explored]]
+Explorers = Callable[[list[Task]], list[Explored]]
 """Explores windows side by side and gives what was found in the order of the tasks."""
 
 _WINDOW: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
@@ -85,7 +85,7 @@ def search(
     with interruptible() as interrupted:
         limits = _Limits(Deadline() if seconds is None else Deadline.after(seconds), rounds, interrupted)
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
-        alone = instance.grid.size <= _ALONE or limits.deadline.left < _HURRY
+        alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
                 if hunt.large:
@@ -125,8 +125,7 @@ class _Limits:
 
     def coarse(self) -> _Limits:
         """The limits of the search on the grid of half the resolution."""
-        left = self.deadline.left
-        deadline = self.deadline if left == np.inf else Deadline.after((1 - _FINE) * left)
+        deadline = self.deadline.share(1 - _FINE)
         many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
         return _Limits(deadline, many, self.interrupted)
 
@@ -210,7 +209,7 @@ class _Hunt:
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
             tasks = self.tasks()
-            found = explorers(replace(task, seconds=limits.deadline.left) for task in tasks)
+            found = explorers([replace(task, deadline=limits.deadline) for task in tasks])
             self._take(tasks, [each.better for each in found], limits.over)
             if all(each.whole for each in found) and not limits.over():
                 self.round += 1

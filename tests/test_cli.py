@@ -277,7 +277,6 @@ def test_help_loads_nothing_heavy():
         "pyomo",
         "jinja2",
         "jsonschema",
-        "joblib",
         "distributed",
     }
     for verb in ("run", "instance", "export", "solve", "read", "draw", "list", "samples"):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from children import interrupted
 from crossfield.models.coarse import halved, prolonged
+from crossfield.models.deadline import Deadline
 from crossfield.models.exploration import Task, explore
 from crossfield.models.field import CrossField
 from crossfield.models.greedy import greedy
@@ -241,7 +242,16 @@ def test_work_ends_soon_after_its_time_and_gives_a_field(work):
 def test_a_window_without_time_is_not_whole_and_its_walk_stops():
     field = first_field(cf.sample("mouse", 12))
     free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
-    task = Task(field.instance, angles(field), field.p, free, curve, kicks=10**9, seed=(0,), seconds=0.0)
+    task = Task(
+        field.instance,
+        angles(field),
+        field.p,
+        free,
+        curve,
+        kicks=10**9,
+        seed=(0,),
+        deadline=Deadline.after(0.0),
+    )
     assert explore(task) == (None, False)
 
 

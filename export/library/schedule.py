@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from typing import Any, Final, ParamSpec, TypeVar
 
 from ...models.errors import CrossfieldError, InputError
+from ...models.side_by_side import checked
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -59,7 +60,7 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
 
 @contextmanager
 def _local(jobs: int) -> Iterator[Executor]:
-    if jobs == 1:
+    if checked(jobs) == 1:
         yield _Here()
         return
     others = set(multiprocessing.active_children())
