@@ -221,7 +221,7 @@ def _solution(reader: str, message: bytes, code: int | None, values: Floats, row
 
 def _status(code: int | None, message: str, *, with_point: bool) -> Status:
     if code is None:
-        return Status.FEASIBLE if with_point else Status.ERROR
+        return Status.FEASIBLE if with_point else Status.NO_POINT
     if 0 <= code <= 99 and _GLOBAL.match(message):
         return Status.OPTIMAL_GLOBAL
     if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():

@@ -155,7 +155,9 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
 
 
 def parse_times(data: bytes) -> RawSolution:
-    """The status in a tim.lst, without a point. Raises SolutionError for codes that are none."""
+    """The status in a tim.lst, without a point. Raises SolutionError for codes that are none and a line that is cut off."""
+    if not data.endswith(b"\n"):
+        raise SolutionError("line 1: the line is cut off; let BARON write the file again")
     words = data.split()
     solver, model = _code(words[7]), _code(words[8])
     status, text = _MODEL.get(model, (Status.ERROR, f"model status {model}"))

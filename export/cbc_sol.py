@@ -5,7 +5,7 @@
     **    3 y                    200                       0      ** before what is out of its bounds
 
 Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file. `printingOptions all` or
-`rows` puts the rows before the columns: their numbers start from 0 again. Some versions and options omit columns at 0; a file that
+`rows` puts the rows before the columns: their numbers start again, and what stands before must be no columns. Some versions and options omit columns at 0; a file that
 holds a value of 0 does not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
 relaxation, (no integer solution - continuous used): both hold no point. Layouts: CBC 2.10.8.
 """
@@ -77,7 +77,14 @@ def parse(data: bytes) -> RawSolution:
     first = int(starts[0]) if len(starts) else 0
     values = numbers[first:, 1].copy()
     return RawSolution(
-        NAME, status, one_line(head[1]), objective, names[first:], values, omits_zeros=not (values == 0).any()
+        NAME,
+        status,
+        one_line(head[1]),
+        objective,
+        names[first:],
+        values,
+        omits_zeros=not (values == 0).any(),
+        of_rows=names[:first],
     )
 
 

@@ -217,17 +217,35 @@ def export_command(
 @app.command("read")
 def read_command(
     solution: Annotated[
-        Path, typer.Argument(metavar="SOLUTION", help="HiGHS solution file or AMPL .sol, plain or .gz.")
+        Path,
+        typer.Argument(
+            metavar="SOLUTION",
+            help="A solver's solution file, plain or .gz; its kind is told by its content, see `list`.",
+        ),
     ],
     manifest: Annotated[
         Path, typer.Option("--manifest", metavar="FILE", help="The .manifest.json that export wrote.")
     ],
     output: Output,
     *,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            "--tolerance",
+            metavar="X",
+            min=0,
+            help="How far the point may be off (radians, jumps; of the objective a part) before what the file claims is refused.",
+        ),
+    ] = 1e-5,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Read a solver's solution file back as a cross field; objective and violations are recomputed."""
+    """Read a solver's solution file back as a cross field; objective and violations are recomputed.
+
+    Where they contradict what the file claims, or the solver says that its values are no answer, the facts are shown, nothing is written
+    and the exit code is 1.
+    """
+    from ..models.errors import SolutionError
     from ..models.field_file import write_field
     from .manifest import read_manifest
     from .solution import read_solution
@@ -235,13 +253,18 @@ def read_command(
     _require_suffix(output, (".npz", ".json", ".rawfield"))
     with progress(quiet=quiet) as show:
         show("reading the solution")
-        found = read_solution(solution, read_manifest(manifest).problem())
+        found = read_solution(solution, read_manifest(manifest).problem(), tolerance=tolerance)
         if found.point is None:
             raise InputError(
                 f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution
             )
-        write_field(found.field, output)
-    tell_solution(found, output, quiet=quiet, as_json=as_json)
+        if not found.doubt:
+            write_field(found.field, output)
+    tell_solution(found, None if found.doubt else output, quiet=quiet, as_json=as_json)
+    if found.doubt:
+        raise SolutionError(
+            f"{found.doubt}; no field was written (--tolerance X allows for more)", file=solution
+        )
 
 
 @app.command("draw")

@@ -170,6 +170,7 @@ def _is_list_of_names(name: str) -> bool:
 _ONLY_IF_ANY: Final = (
     "furthest_rounding",
     "unknown_names",
+    "contradictions",
     "interrupted",
     "dual_bound",
     "worst_family",
@@ -177,10 +178,10 @@ _ONLY_IF_ANY: Final = (
 )
 
 
-def show_solution(solution: Solution, facts: dict[str, Any], field: Path) -> None:
-    """Print what a solution claims beside what was recomputed, and where its field lies."""
+def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None) -> None:
+    """Print what a solution claims beside what was recomputed, and where its field lies, if it was written."""
     show_facts(described(solution.problem.instance), facts)
-    if solution.point is not None:
+    if solution.point is not None and field is not None:
         say(f"field: {field}")
 
 
@@ -194,6 +195,8 @@ def show_facts(title: str, facts: dict[str, Any]) -> None:
 def _text(value: object) -> str:
     if value is None:
         return "not in the file"
+    if isinstance(value, list):
+        return "; ".join(map(str, value))
     return f"{value + 0.0:.10g}" if isinstance(value, float) else str(value)
 
 

@@ -4,7 +4,7 @@
     **** SOLVER STATUS     1 Normal Completion
     **** MODEL STATUS      2 Locally Optimal
 
-Several solves leave several summaries: the last one counts. A model that does not compile leaves none, but `**** 2 ERROR(S)`.
+Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model that does not compile leaves none, but `**** 2 ERROR(S)`.
 Layout: GAMS 54.6.1.
 """
 
@@ -22,6 +22,7 @@ NAME: Final = "gams-lst"
 _HEAD = re.compile(rb"GAMS [^\n]{1,200} Page 1[ \t]*$", re.MULTILINE)
 _SUMMARY: Final = b"S O L V E      S U M M A R Y"
 _LONGEST_SUMMARY: Final = 4096
+_END: Final = b"\n**** FILE SUMMARY"
 _STATES = re.compile(
     rb"^\*\*\*\* SOLVER STATUS +(\d{1,3})\b[^\n]*\n\*\*\*\* MODEL STATUS +(\d{1,3})\b[^\n]*\n", re.MULTILINE
 )
@@ -45,6 +46,8 @@ def parse(data: bytes) -> RawSolution:
     states = _STATES.search(data, at, at + _LONGEST_SUMMARY)
     if states is None:
         raise SolutionError("the listing is cut off in the summary of its last solve; run GAMS again")
+    if data.find(_END, states.end()) < 0:
+        raise SolutionError("the listing is cut off after a solve: it has no FILE SUMMARY; run GAMS again")
     status, words = status_of(int(states[2]), int(states[1]))
     return without_point(NAME, status, words)
 

@@ -8,7 +8,8 @@
     e o f
 
 Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the primal and one for the
-dual side. The order of the columns is told by the problem's name: our LP files put ONE first and have no name, our MPS files put it last.
+dual side. The order of the columns is told by the problem's name: our LP files put ONE first and have no name, our MPS files put it last;
+in a .mod the objective is named energy, which is the first row too.
 `glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its style 2 and counts the objective as
 one more row, which is found out when the sizes are compared. Layouts: GLPK 5.0.
 """
@@ -40,6 +41,7 @@ NAME: Final = "glpk"
 _HEAD = re.compile(rb"c Problem:|s (?:mip|bas|ipt) ")
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
+_GOAL_OF_MOD: Final = b"energy ="
 _WORDS: Final = {b"mip": 3, b"ipt": 4, b"bas": 5}
 _STATUS: Final = {
     b"o": Status.OPTIMAL_GLOBAL,
@@ -79,7 +81,7 @@ def parse(data: bytes) -> RawSolution:
     data = with_unix_ends(data)
     cursor = Cursor(data)
     comments = _comments(cursor)
-    order: Order = "mps" if comments.get(b"Problem") else "lp"
+    order = _order(comments)
     summary = _summary(cursor)
     message = comments.get(b"Status", b"").decode(errors="replace").lower()
     if not data.rstrip().endswith(b"\n" + _END):
@@ -99,6 +101,12 @@ def _comments(cursor: Cursor) -> dict[bytes, bytes]:
         label, _, text = cursor.line("a comment")[1:].partition(b":")
         found.setdefault(label.strip(), text.strip())
     return found
+
+
+def _order(comments: dict[bytes, bytes]) -> Order:
+    if comments.get(b"Objective", b"").startswith(_GOAL_OF_MOD):
+        return "mod"
+    return "mps" if comments.get(b"Problem") else "lp"
 
 
 def _summary(cursor: Cursor) -> _Summary:

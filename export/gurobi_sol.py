@@ -42,6 +42,7 @@ _OBJECTIVE = re.compile(rb"# ?Objective value ?=? *(\S+)", re.IGNORECASE)
 _START = re.compile(rb"# ?MIP start\b", re.IGNORECASE)
 _JSON = re.compile(rb'\s*\{\s*"SolutionInfo"')
 _LINES_TO_TELL: Final = 5
+_INFINITE: Final = 1e100
 
 _STATUS: Final = {
     2: (Status.OPTIMAL_GLOBAL, "optimal"),
@@ -118,10 +119,14 @@ def parse_json(data: bytes) -> RawSolution:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError("the file says optimal and holds no Vars; let Gurobi write it again")
         return without_point(JSON, _WITHOUT_POINT.get(status, status), words)
-    found = information.get("ObjVal")
-    objective = float(found) if isinstance(found, int | float) and abs(found) < 1e100 else None
     names, values = _columns(variables)
-    return RawSolution(JSON, status, words, objective, names, values, omits_zeros=True)
+    objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
+    return RawSolution(JSON, status, words, objective, names, values, omits_zeros=True, bound=bound)
+
+
+def _finite(value: Any) -> float | None:
+    """A number that is below Gurobi's infinity, else None."""
+    return float(value) if type(value) in {int, float} and abs(value) < _INFINITE else None
 
 
 def _document(data: bytes) -> dict[str, Any]:

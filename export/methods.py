@@ -61,6 +61,8 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
     facts = {
         "formulation": solution.problem.name,
         "status": str(solution.status),
+        "claimed": str(solution.claimed),
+        "contradictions": list(solution.contradictions),
         "message": solution.message,
         "objective_reported": solution.reported,
         "objective_recomputed": solution.objective,
@@ -72,10 +74,10 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
         "interrupted": solution.interrupted,
         "seconds": None if solution.seconds is None else round(solution.seconds, 3),
     }
-    return {key: _finite(value) for key, value in facts.items()}
+    return {key: finite(value) for key, value in facts.items()}
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """The value; None for an infinity, which JSON has not."""
     return None if isinstance(value, float) and not np.isfinite(value) else value
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import io
 import zlib
@@ -99,7 +100,8 @@ def read_raw(path: str | Path) -> RawSolution:
 
 
 def parse_raw(data: bytes) -> RawSolution:
-    """What the content of a solution file says. Raises SolutionError."""
+    """What the content of a solution file says; a byte order mark is passed over. Raises SolutionError."""
+    data = _without_mark(data)
     if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should say why it wrote no solution")
     head = data[:HEAD]
@@ -108,6 +110,16 @@ def parse_raw(data: bytes) -> RawSolution:
             return reader.parse(data)
     known = "; ".join(reader.description for reader in READERS)
     raise SolutionError(f"this is no solution file of a known kind; give one of these: {known}")
+
+
+def _without_mark(data: bytes) -> bytes:
+    """The text behind a byte order mark, in UTF-8: editors and shells of Windows put one before it, and some write UTF-16."""
+    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.removeprefix(codecs.BOM_UTF8)
+    try:
+        return data.decode("utf-16").encode()
+    except UnicodeError as error:
+        raise SolutionError("the text in UTF-16 is damaged or cut off; save it again") from error
 
 
 def _unpacked(data: bytes) -> bytes:

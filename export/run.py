@@ -14,7 +14,7 @@ from ..models.instance import Instance
 from ..models.storage import make_folder, write_bytes
 from .formats import generator
 from .manifest import Manifest, write_all
-from .methods import METHODS, Candidate, Method, Progress, Request, solution_facts
+from .methods import METHODS, Candidate, Method, Progress, Request, finite, solution_facts
 from .solution import Solution
 from .solvers import Limits
 
@@ -28,8 +28,8 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
     if solution.point is None:
         return facts
     return facts | {
-        "energy_2_norm": solution.field.energy(2).total,
-        "energy_1_norm": solution.field.energy(1).total,
+        "energy_2_norm": finite(solution.field.energy(2).total),
+        "energy_1_norm": finite(solution.field.energy(1).total),
     }
 
 

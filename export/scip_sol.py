@@ -6,7 +6,7 @@ r"""Solution files of SCIP.
 
 The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may be +infinity or
 -infinity; a partial solution has the value `unknown`, which no point can have. Without a point the last line is `no solution available`.
-SCIP adds columns of its own (nlobjvar, quadobjvar, qmatrixvar). Without a status a point is called feasible, and no more. Layouts:
+SCIP adds columns of its own (nlobjvar, quadobjvar, qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts:
 SCIP 10.0; words of the status: SCIPprintStatus.
 """
 
@@ -45,7 +45,7 @@ _STATUS: Final = {
 
 _WITHOUT_POINT: Final = {
     Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT,
-    Status.FEASIBLE: Status.ERROR,
+    Status.FEASIBLE: Status.NO_POINT,
     Status.OPTIMAL_GLOBAL: Status.ERROR,
 }
 

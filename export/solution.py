@@ -1,11 +1,12 @@
 """A solution: what a solver's file says, mapped by name onto a problem and checked against the instance.
 
-Nothing in the file is believed: integers are rounded, objective and violations are computed again from the declaration.
+Nothing in the file is believed: integers are rounded, objective and violations are computed again from the declaration, and a claim that
+they contradict is not passed on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,8 @@ from ..models.errors import SolutionError
 from ..models.field import CrossField
 from ..models.grid import Floats
 from ..models.problem import Problem, Violation, lifted
+from .contradictions import TOLERANCE, Claims, contradictions
+from .glpk_order import glpk_order
 from .lp import needs_one
 from .names import column_names
 from .nl import Layout
@@ -25,19 +28,24 @@ from .solution_text import RawSolution, Status, values_for, values_in_order
 ROUND: Final = 1e-5
 """An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
 
+LARGEST: Final = 1e8
+"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a column's, and could not be squared
+or be a jump of 32 bits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A point of a problem with what was claimed and what was recomputed.
 
     problem: as the file's columns have it (with products lifted, where the format needed it); point: float (columns,), or None.
-    status, message, reported: claims of the file; bound: the solver's dual bound, where one is known.
-    rounded: the furthest that rounding moved an integer column. interrupted: whether the user ended the search.
+    claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual bound, where one is known.
+    status is what remains of the claim. rounded: the furthest that rounding moved an integer column. tolerance: how far the point may be
+    off before it contradicts the claim, in units of a column. interrupted: whether the user ended the search.
     """
 
     problem: Problem
     point: Floats | None
-    status: Status
+    claimed: Status
     message: str
     reader: str
     reported: float | None = None
@@ -46,6 +54,29 @@ class Solution:
     unknown: int = 0
     seconds: float | None = None
     interrupted: bool = False
+    tolerance: float = TOLERANCE
+
+    @cached_property
+    def contradictions(self) -> tuple[str, ...]:
+        """What the recomputed point says against the claims of the file; empty when they agree or there is no point."""
+        if self.objective is None or self.violation is None:
+            return ()
+        claims = Claims(self.claimed, self.reported, self.bound, self.rounded)
+        return contradictions(self.problem, claims, self.objective, self.violation, self.tolerance)
+
+    @property
+    def status(self) -> Status:
+        """What is claimed, or UNKNOWN when the point contradicts it."""
+        return Status.UNKNOWN if self.contradictions else self.claimed
+
+    @property
+    def doubt(self) -> str:
+        """Why the point is no answer to go on with; empty when it is one."""
+        if self.contradictions:
+            return f"says {self.claimed}, but {'; '.join(self.contradictions)}"
+        if self.point is not None and not self.claimed.promises_point:
+            return f"says {self.claimed} ({self.message or 'and no more'}): the values in it are no answer"
+        return ""
 
     @cached_property
     def objective(self) -> float | None:
@@ -67,18 +98,19 @@ class Solution:
         return self.problem.field(self.point)
 
 
-def read_solution(path: str | Path, problem: Problem) -> Solution:
+def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLERANCE) -> Solution:
     """The solution that a file holds for the problem; the format is found by content.
 
     Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
     by the column order of the .nl, LP or MPS file. A file without a point gives a Solution without one.
+    tolerance: how far the point may be off, in units of a column, before its status is no longer what the file claims.
     Raises SolutionError, naming the file, when it is malformed or of another problem.
     """
     raw = read_raw(path)
     if not raw.has_point:
-        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective)
+        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
     try:
-        return _mapped(raw, problem)
+        return replace(_mapped(raw, problem), tolerance=tolerance)
     except SolutionError as error:
         raise SolutionError(str(error), file=path) from error
 
@@ -89,12 +121,30 @@ def _mapped(raw: RawSolution, problem: Problem) -> Solution:
         point = _by_position(raw, problem)
     else:
         problem, point, unknown = _by_name(raw, problem)
-    if not np.isfinite(point).all():
-        raise SolutionError("holds values that are not finite numbers; let the solver write it again")
+    _check_range(point, problem)
     point, moved = _rounded(point, problem)
     return Solution(
-        problem, point, raw.status, raw.message, raw.reader, raw.objective, rounded=moved, unknown=unknown
+        problem,
+        point,
+        raw.status,
+        raw.message,
+        raw.reader,
+        raw.objective,
+        raw.bound,
+        rounded=moved,
+        unknown=unknown,
     )
+
+
+def _check_range(point: Floats, problem: Problem) -> None:
+    if not np.isfinite(point).all():
+        raise SolutionError("holds values that are not finite numbers; let the solver write it again")
+    at = int(np.argmax(np.abs(point)))
+    if abs(point[at]) > LARGEST:
+        name = _names(problem)[at].decode()
+        raise SolutionError(
+            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
+        )
 
 
 def _by_position(raw: RawSolution, problem: Problem) -> Floats:
@@ -102,9 +152,19 @@ def _by_position(raw: RawSolution, problem: Problem) -> Floats:
         point = np.empty(problem.columns)
         point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
         return point
+    if raw.order == "mod":
+        return _of_model(raw, problem)
     one = int(needs_one(problem))  # a model without rows has the row c_ONE in LP and MPS
     point = values_in_order(problem.columns + one, max(problem.row_count, 1), raw)
     return point[one:] if raw.order == "lp" else point[: problem.columns]
+
+
+def _of_model(raw: RawSolution, problem: Problem) -> Floats:
+    """The point of a .mod that GLPK solved: its objective is one more row, and a column in no term, which it leaves out, may be anything."""
+    order = glpk_order(problem)
+    point: Floats = np.clip(0.0, problem.lower, problem.upper)
+    point[order] = values_in_order(len(order), problem.row_count + 1, raw)
+    return point
 
 
 def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:

@@ -24,8 +24,9 @@ Bytes = NDArray[np.bytes_]
 Letters = NDArray[np.uint8]
 Positions = NDArray[np.int64]
 
-Order = Literal["nl", "lp", "mps"]
-"""The kind of file whose columns a positional solution follows: .nl has an order of its own, LP and MPS put ONE first and last."""
+Order = Literal["nl", "lp", "mps", "mod"]
+"""The kind of file whose columns a positional solution follows: .nl has an order of its own, LP and MPS put ONE first and last, and of
+a .mod GLPK numbers the columns as it meets them."""
 
 TOKEN_LIMIT: Final = 63
 """Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
@@ -41,14 +42,26 @@ _WINDOWS_INFINITY = re.compile(rb"1\.#inf0*", re.IGNORECASE)
 _FORTRAN = bytes.maketrans(b"dD", b"eE")
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 
-_ARTEFACTS = re.compile(
-    rb"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objvar|GAMS_OBJECTIVE", re.DOTALL
-)
-# columns that readers and writers of models add: Gurobi (Constant, Rg*), SCIP (nlobjvar, ...), GAMS (objvar, GAMS_OBJECTIVE)
+ADDED_COLUMNS: Final = {
+    "crossfield": r"ONE",
+    "Gurobi": r"Constant|(?:MPS_)?Rg.*",
+    "CPLEX": r"Rg.*",
+    "SCIP": r"nlobjvar|quadobjvar|qmatrixvar|objconstvar",
+    "GLPK": r"~r_\d+",
+    "GAMS": r"objvar",
+    "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE",
+}
+"""Patterns of the columns that programs add when they read or write a model: for a constant of the objective, for its part that is not
+linear, for the range of a row. A solution may hold them beside the columns of the problem."""
+
+_ADDED = re.compile("|".join(ADDED_COLUMNS.values()).encode(), re.DOTALL)
 
 
 class Status(StrEnum):
-    """What a solver claims about its answer; never more than its file says."""
+    """What a solver claims about its answer, never more than its file says; and what remains of the claim once the point is checked.
+
+    no-point: there is none, and no word why. unknown: the point contradicts the claim.
+    """
 
     OPTIMAL_GLOBAL = "optimal-global"
     OPTIMAL_LOCAL = "optimal-local"
@@ -57,7 +70,19 @@ class Status(StrEnum):
     UNBOUNDED = "unbounded"
     LIMIT_WITH_POINT = "limit-with-point"
     LIMIT_WITHOUT_POINT = "limit-without-point"
+    NO_POINT = "no-point"
     ERROR = "error"
+    UNKNOWN = "unknown"
+
+    @property
+    def promises_point(self) -> bool:
+        """Whether there is a point behind it that is feasible."""
+        return self in _PROMISING
+
+
+_PROMISING: Final = frozenset(
+    {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL, Status.FEASIBLE, Status.LIMIT_WITH_POINT}
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +93,8 @@ class RawSolution:
     on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
-    order: the order of the values where there are no names.
+    order: the order of the values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file
+    lists as those of rows, whose values are left out.
     A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
     """
 
@@ -81,6 +107,8 @@ class RawSolution:
     omits_zeros: bool = False
     rows: int | None = None
     order: Order = "nl"
+    bound: float | None = None
+    of_rows: Bytes | None = None
 
     @property
     def has_point(self) -> bool:
@@ -110,9 +138,10 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in the file
     that are not among `names` are counted as unknown, but for the columns that readers of models are known to add.
 
-    Raises SolutionError when the file has no point or no names, or gives one name two values.
+    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of `names` as that of a row.
     """
     listed = _listed(raw)
+    _check_rows(names, raw)
     if np.array_equal(listed, names):
         return NamedValues(raw.values.copy(), 0, 0)
     place = dict(zip(names.tolist(), range(len(names)), strict=True))
@@ -121,7 +150,7 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     values = np.full(len(names), 0.0 if raw.omits_zeros else np.nan)
     values[index[known]] = raw.values[known]
     _check_repeats(listed[known], raw.values[known], values[index[known]])
-    strangers = sum(_ARTEFACTS.fullmatch(name) is None for name in listed[~known].tolist())
+    strangers = sum(_ADDED.fullmatch(name) is None for name in listed[~known].tolist())
     return NamedValues(values, int(np.isnan(values).sum()), strangers)
 
 
@@ -139,6 +168,18 @@ def _check_point(raw: RawSolution) -> None:
         words = f"{raw.status}: {raw.message}" if raw.message else str(raw.status)
         raise SolutionError(
             f"there is no point in it ({words}); give the solver more time or a problem that has a solution"
+        )
+
+
+def _check_rows(names: Bytes, raw: RawSolution) -> None:
+    if raw.of_rows is None:
+        return
+    misplaced = raw.of_rows[np.isin(raw.of_rows, names)]
+    if len(misplaced):
+        name = misplaced[0].decode(errors="replace")
+        raise SolutionError(
+            f"the column {name} stands before the numbers start again, where rows should; a line is there twice or out of order; "
+            "let the solver write the file again"
         )
 
 

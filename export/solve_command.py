@@ -171,8 +171,8 @@ def _tell_candidate(candidate: Candidate, field: Path, *, quiet: bool, as_json: 
         complain("interrupted; the best field so far was kept")
 
 
-def tell_solution(solution: Solution, field: Path, *, quiet: bool, as_json: bool) -> None:
-    """Print the facts of a solution whose field lies in a file."""
+def tell_solution(solution: Solution, field: Path | None, *, quiet: bool, as_json: bool) -> None:
+    """Print the facts of a solution; field: the file in which its field lies, None when it was not written."""
     from .run import facts_with_energies
 
     facts = facts_with_energies(solution)

@@ -62,7 +62,7 @@ def parse_slx(data: bytes) -> RawSolution:
     cursor = Cursor(data if data.endswith(b"\n") else data + b"\n")
     line = cursor.line("NAME")
     if line == _END:
-        return without_point(SLX, Status.ERROR, "the file holds no solution")
+        return without_point(SLX, Status.NO_POINT, "the file holds no solution")
     start = cursor.position
     stop = data.find(b"\n" + _END, start - 1) + 1
     _check_kinds(data, start, stop)

@@ -98,9 +98,9 @@ def of_json(text: str) -> Instance:
 
 
 def parse_json(text: str) -> object:
-    """The document that JSON text holds. Raises InstanceError with line and column."""
+    """The document that JSON text holds, behind a byte order mark or not. Raises InstanceError with line and column."""
     try:
-        return cast("object", json.loads(text))
+        return cast("object", json.loads(text.removeprefix("\ufeff")))
     except (ValueError, RecursionError) as error:
         raise InstanceError(f"is not valid JSON: {error}") from error
 

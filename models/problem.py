@@ -18,7 +18,7 @@ from .errors import FormulationError, InstanceError
 from .field import CrossField
 from .formulations import FORMULATIONS, Family, Formulation, declare, lift_products
 from .grid import Bools, Floats, Ints
-from .instance import Instance
+from .instance import Instance, whole_numbers
 from .monomials import beyond_noise, merged, monomials, ordered
 from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
 
@@ -404,15 +404,14 @@ class Problem:
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
-        """The cross field of a point, jumps rounded to the nearest integer."""
+        """The cross field of a point, jumps rounded to the nearest integer. Raises InstanceError for jumps beyond 32 bits."""
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
-            jumps = np.round(point[self.blocks["p"].columns]).astype(np.int32)
+            jumps = whole_numbers(np.round(point[self.blocks["p"].columns]), "p")
         else:
-            jumps = np.round(
-                point[self.blocks["p1"].columns] + 2 * np.round(point[self.blocks["p2"].columns])
-            ).astype(np.int32)
+            halves = np.round(point[self.blocks["p2"].columns])
+            jumps = whole_numbers(np.round(point[self.blocks["p1"].columns] + 2 * halves), "p")
         return CrossField(
             self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps
         )

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from crossfield.export.ampl_sol import write_ampl_sol
 from crossfield.export.cli import invoke
+from crossfield.export.nl import Layout
 from PIL import Image, ImageDraw
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
@@ -360,7 +361,8 @@ def test_truncated_solutions_are_refused(tmp_path, refused, good_solution, manif
 def test_truncated_sol_files_are_refused(tmp_path, refused, instance, manifest, binary):
     problem = cf.formulate(instance, "milp-mccormick")
     whole = tmp_path / "whole.sol"
-    write_ampl_sol(whole, "solved", problem.point(cf.greedy(instance)), problem.row_count, 0, binary=binary)
+    point = problem.point(cf.greedy(instance))[Layout(problem).order]
+    write_ampl_sol(whole, "solved", point, problem.row_count, 0, binary=binary)
     content = whole.read_bytes()
     end = content.index(b"objno") if not binary else len(content)
     for length in np.linspace(1, end - 3, 12).astype(int):

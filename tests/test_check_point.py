@@ -493,13 +493,13 @@ def test_a_packed_file_that_is_cut_off_is_refused(place, tmp_path, capsys):
     write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
     data = (tmp_path / "m.mps.gz").read_bytes()
     (tmp_path / "m.mps.gz").write_bytes(data[: int(len(data) * place)])
-    (tmp_path / "p").write_text("")
+    (tmp_path / "p").write_text("x 0\n")
     assert "damaged or cut off" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
 
 
 def test_a_packed_file_that_grows_without_end_is_refused_soon(tmp_path, capsys):
     (tmp_path / "m.mps.gz").write_bytes(gzip.compress(b"\0" * (1 << 27)))
-    (tmp_path / "p").write_text("")
+    (tmp_path / "p").write_text("x 0\n")
     begun = time.process_time()
     assert "unreasonably long" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
     assert time.process_time() - begun < 5

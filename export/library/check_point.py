@@ -11,7 +11,8 @@ the files, and decimals are added and multiplied without rounding (Python's deci
 Against an instance the energies of its cross field are computed from their definition; there the numbers are the doubles nearest to the
 decimals of the instance, and pi has 60 digits.
 
-Exit code 0: feasible within the tolerance; 1: not feasible; 2: wrong usage or a file that cannot be used.
+Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong usage or a file that cannot be
+used. An objective that a file claims is compared with that of an MPS file, to 1e-5 of its size, or of 1: solvers tell what they have to about 1e-6.
 """
 
 from __future__ import annotations
@@ -53,7 +54,11 @@ BOUNDS = {
 """Kinds of bounds: the ends that they set, and whether a value follows."""
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-ADDED = re.compile(r"ONE|Constant|(MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objvar|GAMS_OBJECTIVE")
+CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
+MARK = "\ufeff"  # a byte order mark, which some editors put before a text
+ADDED = re.compile(
+    r"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
+)
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
 ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
@@ -130,6 +135,11 @@ class Model:
             raise BadInputError(f"there is no row {name[:40]}")
         return self.rows[name]
 
+    def value(self, point: Sequence[Decimal]) -> Decimal:
+        """The objective at a point, its constant included."""
+        assert self.objective is not None
+        return self.objective.value(point) - self.objective.side
+
     def column(self, name: str) -> int:
         """The number of the column of that name."""
         if name not in self.number:
@@ -138,12 +148,20 @@ class Model:
 
 
 class Finding:
-    """What was found of a point: objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind."""
+    """What was found of a point: objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind,
+    and whether the file's own point has the objective that it claims, if it claims one that can be compared.
+    """
 
     def __init__(
-        self, objective: Decimal, lines: list[tuple[str, str]], violations: dict[str, Place]
+        self,
+        objective: Decimal,
+        lines: list[tuple[str, str]],
+        violations: dict[str, Place],
+        *,
+        agrees: bool = True,
     ) -> None:
         self.objective = objective
+        self.agrees = agrees
         self.lines = lines
         self.violations = violations
 
@@ -182,7 +200,8 @@ def lines_of(path: str) -> Iterator[tuple[int, str]]:
                 for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), b""), 1):
                     total += len(line)
                     _require(len(line) < LONGEST_LINE and total <= MOST_BYTES, "is unreasonably long")
-                    yield at, line.decode("utf-8")
+                    text = line.decode("utf-8")
+                    yield at, text[len(MARK) :] if at == 1 and text.startswith(MARK) else text
     except UnicodeDecodeError:
         raise BadInputError("is not a text file") from None
     except (EOFError, zlib.error, gzip.BadGzipFile):
@@ -413,6 +432,7 @@ def read_point(path: str) -> Point:
                 _value(point, words)
         except BadInputError as error:
             raise BadInputError(f"line {at}: {error}") from None
+    _require(point.values or point.claimed is not None, "holds no point: neither a value nor an objective")
     return point
 
 
@@ -443,10 +463,10 @@ def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
     foreign = [name for name in point.values if name not in model.number]
     _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
     values = point.of(model.columns)
+    agrees = point.claimed is None or _close(point.claimed, model.value(values))
     if rounded:
         values = [_nearest(v) if c.integer else v for c, v in zip(model.columns, values)]
-    assert model.objective is not None
-    objective = model.objective.value(values) - model.objective.side
+    objective = model.value(values)
     integers = [(c, v) for c, v in zip(model.columns, values) if c.integer]
     lines = [
         ("model", f"{len(model.columns)} columns ({len(integers)} integer), {len(model.rows)} rows"),
@@ -463,7 +483,12 @@ def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
         ),
         "integers": _worst((abs(v - _nearest(v)), c.name) for c, v in integers),
     }
-    return Finding(objective, lines, violations)
+    return Finding(objective, lines, violations, agrees=agrees)
+
+
+def _close(claimed: Decimal, objective: Decimal) -> bool:
+    """Whether a claimed objective is that objective."""
+    return abs(claimed - objective) <= CLAIM * max(ONE, abs(objective))
 
 
 def _refuse_foreign(names: list[str], count: int) -> None:
@@ -738,7 +763,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{kind:<10}{_brief(value)}{f' at {place}' if value else ''}")
     feasible = finding.worst <= given.tolerance
     print(f"{'feasible' if feasible else 'NOT feasible'} within {_brief(given.tolerance)}")
-    return 0 if feasible else 1
+    if not finding.agrees:
+        print("NOT the objective that the file claims")
+    return 0 if feasible and finding.agrees else 1
 
 
 class _Parser(argparse.ArgumentParser):
