@@ -40,8 +40,8 @@ MAX_SEGMENTS: Final = 5_000_000
 """Straight segments that curves are cut into."""
 MAX_PIECES: Final = 40_000_000
 """Pieces of segments between pixel edges."""
-MAX_SAMPLES: Final = 500_000
-"""Lines of a .scap file: samples of pen strokes."""
+MAX_LINES: Final = 500_000
+"""Lines of a .scap file, one for each sample of a pen stroke."""
 
 # Pictures
 MAX_SIDE: Final = 40_000

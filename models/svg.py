@@ -221,8 +221,8 @@ def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
     """What an element says of itself: by attributes, style sheets and its `style`, the last ones stronger."""
     attributes = element.attrib
     own = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
-    own |= sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
-    return own | style_properties(attributes.get("style", ""))
+    given = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
+    return {**own, **given, **style_properties(attributes.get("style", ""))}
 
 
 def _transform(element: Element, style: Mapping[str, str]) -> Any:

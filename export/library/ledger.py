@@ -15,6 +15,7 @@ from typing import Any, Final, Literal
 from ...models.errors import InputError, InstanceError
 from ...models.field import CrossField
 from ...models.field_file import read_field, write_field
+from ...models.input_limits import MAX_BYTES
 from ...models.instance_file import check_schema, check_version, parse_json
 from ...models.storage import read_bytes, sha256_of, write_bytes
 
@@ -94,7 +95,7 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     if not path.exists():
         return Ledger(Path(folder))
     try:
-        document = parse_json(read_bytes(path).decode())
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
         given = check_schema(document, "library-ledger", __package__.rpartition(".")[0])["records"]
     except UnicodeDecodeError as error:
