@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 
 import typer
 
-from ..models.errors import CrossfieldError, InputError
+from ..models.errors import CrossfieldError, InputError, shortened
 from .arguments import (
     BetaNorm,
     Facet,
@@ -40,6 +40,7 @@ from .arguments import (
 )
 from .console import (
     complain,
+    degrade,
     described,
     progress,
     say,
@@ -331,6 +332,7 @@ app.add_typer(library, name="library")
 
 def main() -> NoReturn:
     """Run the command line and leave with its exit code; asked to end (SIGTERM), nothing half done is left either."""
+    degrade()
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(invoke(sys.argv[1:]))
 
@@ -361,7 +363,7 @@ def _line(error: Exception) -> str:
         return "there is not enough memory; choose a smaller --size"
     if isinstance(error, OSError):
         return f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check the path and the free space"
-    return f"this should not happen, please report it: {type(error).__name__}: {error} (crossfield --debug ... shows where)"
+    return f"this should not happen, please report it: {type(error).__name__}: {shortened(error)} (crossfield --debug ... shows where)"
 
 
 def _field_or_instance(path: Path) -> CrossField | Instance:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from ..models.errors import CrossfieldError
+from ..models.errors import CrossfieldError, printable
 
 if TYPE_CHECKING:
     from ..models.instance import Instance
@@ -49,6 +51,13 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
         raise InterruptedRunError("interrupted; files that stand are whole") from stop
 
 
+def degrade() -> None:
+    """Have standard output and error write what their encoding does not have as escapes, rather than fail."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def say(text: str) -> None:
     """Print a line on standard output."""
     typer.echo(text)
@@ -61,7 +70,7 @@ def say_json(value: object) -> None:
 
 def complain(text: str) -> None:
     """Print one line on standard error."""
-    typer.echo(f"crossfield: {' '.join(text.split())}", err=True)
+    typer.echo(f"crossfield: {printable(text)}", err=True)
 
 
 def show_table(
@@ -86,11 +95,11 @@ def show_table(
             column, overflow="fold", no_wrap=first, justify="right" if column in numbers else "left"
         )
     for row in rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*(escape(printable(cell)) for cell in row))
     console = Console()
     if not console.is_terminal:
         console = Console(width=WIDTH)
-    console.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
+    console.print(printable(title), style="bold", markup=False, highlight=False, soft_wrap=True)
     console.print(table)
 
 

@@ -17,10 +17,12 @@ DEFAULT_SIZE: Final = 24
 
 def load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
     """The instance, of a size that can be written. Raises InputError."""
+    import numpy as np
+
     from ..models.sketch import available_memory, check_memory
 
     instance = _found(what, size, mask, gauge)
-    check_memory(instance.grid.size, available_memory())
+    check_memory(int(np.count_nonzero(instance.mask)), available_memory())
     return instance
 
 

@@ -29,6 +29,7 @@ from ..models.errors import (
 from ..models.field import CrossField
 from ..models.formulations import FORMULATIONS
 from ..models.grid import Ints
+from ..models.input_limits import MAX_BYTES
 from ..models.instance import Instance
 from ..models.instance_file import check_schema, check_version, parse_json, read_instance, write_instance
 from ..models.problem import Problem, formulate
@@ -101,7 +102,7 @@ class Manifest:
 def read_manifest(path: str | Path) -> Manifest:
     """The manifest in a file. Raises InputError when it cannot be read, InstanceError when it breaks its schema."""
     try:
-        document = parse_json(read_bytes(path).decode())
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
         return Manifest(check_schema(document, "manifest"), Path(path))
     except UnicodeDecodeError as error:

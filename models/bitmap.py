@@ -8,7 +8,11 @@ junctions and corners drop out (domain notes, 3.2 and 3.4).
 from __future__ import annotations
 
 import io
+import os
+import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -16,17 +20,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError, shortened
 from .grid import Bools, Floats
 from .ink import REDDISH, ink_of, redness
+from .input_limits import MAX_PIXELS, MAX_SIDE
 from .rasterise import Cover, Frame, block_means
 
 Ink = NDArray[np.float32]
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """What is read: formats that Pillow decodes by itself, without starting other programs."""
-MAX_SIDE: Final = 40_000
-MAX_PIXELS: Final = 80_000_000
 _ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are averaged down by whole factors first
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
@@ -35,6 +38,8 @@ _NOISE, _FULL = (
     0.15,
     0.85,
 )  # of the strokes' ink: below it paper and compression noise, above it full darkness
+_BAND: Final = 1 << 22  # pixels of a picture that are looked at together
+_SILENCE: Final = threading.Lock()
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
 _COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are told apart
@@ -137,8 +142,7 @@ def read_picture(data: bytes, size: int) -> Picture:
 def read_white(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError as read_picture."""
     image = _opened(data)
-    white: Bools = _eight_bit(image).mean(axis=-1) >= 127.5
-    return white
+    return np.concatenate([pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)])
 
 
 def _opened(data: bytes) -> Any:
@@ -149,49 +153,83 @@ def _opened(data: bytes) -> Any:
         warnings.simplefilter("ignore")
         try:
             image = Image.open(io.BytesIO(data), formats=FORMATS)
-            if max(image.size) > MAX_SIDE or image.size[0] * image.size[1] > MAX_PIXELS:
-                raise InputError(
-                    f"declares {image.size[0]} x {image.size[1]} pixels; at most {MAX_PIXELS // 10**6} million are read, scale it down"
-                )
-            image.load()
-            return ImageOps.exif_transpose(image)
+            _check_size(*image.size)
+            with _silenced():
+                image.load()
+            ImageOps.exif_transpose(image, in_place=True)
+        except InputError:
+            raise
         except Image.DecompressionBombError as error:
             raise InputError("declares absurdly many pixels; scale it down") from error
-        except (
-            OSError,
-            SyntaxError,
-            ValueError,
-            IndexError,
-            KeyError,
-            TypeError,
-            OverflowError,
-            EOFError,
-            MemoryError,
-        ) as error:
+        except Exception as error:  # damaged pictures make decoders raise nearly anything
             raise InputError(
                 f"is not a whole picture ({_short(error)}); expected {', '.join(FORMATS)}"
             ) from error
+    return image
+
+
+def _check_size(width: int, height: int) -> None:
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise InputError(
+            f"declares {width} x {height} pixels; at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
+        )
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself."""
+    with _SILENCE:
+        try:
+            kept = os.dup(2)
+        except OSError:  # there is none
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            os.close(nowhere)
 
 
 def _short(error: Exception) -> str:
     text = str(error)
-    return "unknown format" if "cannot identify" in text else text[:80] or type(error).__name__
+    return "unknown format" if "cannot identify" in text else shortened(text) or type(error).__name__
 
 
-def _eight_bit(image: Any) -> NDArray[np.uint8]:
-    """The picture composited on white as uint8 [h, w, 1 or 3]; 16 bit and floating point greys are scaled down."""
+def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
+    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows: colours of all pixels
+    at once would take many times the memory of the picture.
+    """
+    width, height = image.size
+    rows = max(1, _BAND // (width * multiple)) * multiple
+    bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
+    white = _white(image, bands)
+    return (_eight_bit(image.crop(band), white) for band in bands)
+
+
+def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
+    """The value of white in pictures of 16 bit and floating point greys, None in others. Raises InputError for values that are not finite."""
+    if image.mode.startswith("I;16") or image.mode == "I":
+        return 65535.0
+    if image.mode != "F":
+        return None
+    most = [float(np.asarray(image.crop(band)).max()) for band in bands]
+    least = [float(np.asarray(image.crop(band)).min()) for band in bands]
+    if not np.isfinite(most + least).all():
+        raise InputError("holds pixels that are no finite numbers; save it with 8 or 16 bits")
+    return next((top for top in (1.0, 255.0) if max(most) <= top), 65535.0)
+
+
+def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
+    """The picture composited on white as uint8 [h, w, 1 or 3]; greys of which `white` is the lightest are scaled down."""
     from PIL import Image
 
-    if image.mode.startswith("I;16") or image.mode in ("I", "F"):
+    if white is not None:
         values = np.asarray(image).astype(np.float32)
-        top = (
-            1.0
-            if image.mode == "F" and values.max() <= 1
-            else 255.0
-            if values.max() <= 255 and image.mode == "F"
-            else 65535.0
-        )
-        scaled: NDArray[np.uint8] = (255 * np.clip(values / top, 0, 1)).astype(np.uint8)
+        scaled: NDArray[np.uint8] = (255 * np.clip(values / white, 0, 1)).astype(np.uint8)
         return scaled[..., None]
     if "A" in image.getbands() or "transparency" in image.info:
         image = image.convert("RGBA")
@@ -201,15 +239,21 @@ def _eight_bit(image: Any) -> NDArray[np.uint8]:
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
-def _on_paper(image: Any, reduced: int) -> Floats:
-    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1], averaged down by a whole factor."""
+def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """The means over blocks of so many rows and columns."""
     from PIL import Image
 
-    pixels = _eight_bit(image)
+    if factor == 1:
+        return pixels
     channels = pixels.shape[-1]
-    if reduced > 1:
-        small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(reduced)
-        pixels = np.asarray(small).reshape(small.height, small.width, channels)
+    small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(factor)
+    return np.asarray(small).reshape(small.height, small.width, channels)
+
+
+def _on_paper(image: Any, reduced: int) -> Floats:
+    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1], averaged down by a whole factor."""
+    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
+    channels = pixels.shape[-1]
     colours = pixels.astype(np.float32)
     # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
     paper = np.percentile(colours.reshape(-1, channels), 75, axis=0).astype(np.float32)

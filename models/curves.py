@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .grid import Bools, Floats
+from .input_limits import MAX_SEGMENTS
 
-MAX_SEGMENTS: Final = 5_000_000
-"""More straight segments than any drawing needs; beyond it a file is refused."""
 _BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
 
 

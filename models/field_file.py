@@ -22,28 +22,35 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from .array_archive import Expected, pack_arrays, unpack_arrays
 from .errors import InputError, InstanceError
 from .field import CrossField
 from .grid import Bools, Floats, Grid, Ints
+from .input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from .instance import Instance
 from .instance_file import (
     arrays_of,
     check_schema,
     check_version,
+    decoded,
     head_of,
-    of_arrays,
+    number_table,
     of_document,
-    pack_arrays,
     parse_json,
-    require_arrays,
     to_json,
-    unpack_arrays,
+    unpacked,
 )
 from .storage import read_bytes, write_bytes
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
 _PREFIX = "instance_"
+_ARCHIVE: Final = {
+    "head": Expected(1, MAX_HEAD, "u"),
+    "alpha": Expected(1, MAX_GRID**2),
+    "beta": Expected(1, MAX_GRID**2),
+    "p": Expected(1, 2 * MAX_GRID**2),
+}
 _Kind = TypeVar("_Kind")
 
 
@@ -68,7 +75,7 @@ def read_field(path: str | Path) -> CrossField:
     path = Path(path)
     read = _of_suffix(_READERS, path, "read")
     try:
-        return read(read_bytes(path))
+        return read(read_bytes(path, MAX_ARCHIVE))
     except InstanceError as error:
         raise InstanceError(str(error), file=path) from error
 
@@ -94,13 +101,10 @@ def _npz(field: CrossField) -> bytes:
 
 
 def _of_npz(data: bytes) -> CrossField:
-    arrays = unpack_arrays(data)
-    require_arrays(arrays, ("head", "alpha", "beta", "p"))
+    arrays = unpack_arrays(data, _ARCHIVE)
     check_version(head_of(arrays), FORMAT, VERSION)
-    embedded = {
-        name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)
-    }
-    return CrossField(_embedded(of_arrays, embedded), arrays["alpha"], arrays["beta"], arrays["p"])
+    instance = _embedded(lambda given: unpacked(given, _PREFIX), data)
+    return CrossField(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 
 
 def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
@@ -136,12 +140,9 @@ def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
 
 
 def _of_json(data: bytes) -> CrossField:
-    try:
-        document = parse_json(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InstanceError("is not JSON text") from error
+    document = parse_json(decoded(data))
     check_version(document, FORMAT, VERSION)
-    checked = check_schema(document, "field")
+    checked = check_schema(document, "field", rows={"pixels": _are_pixels})
     instance = _embedded(of_document, checked["instance"])
     row, column, alpha, beta, upper, right = zip(*checked["pixels"], strict=True)
     _check_places(instance.grid, np.array([row, column], dtype=np.int32))
@@ -152,6 +153,20 @@ def _of_json(data: bytes) -> CrossField:
         return CrossField(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
+
+
+def _are_pixels(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a pixel: [row, column, alpha, beta, jump or null, jump or null]."""
+    if not rows or not all(type(row) is list and len(row) == 6 for row in rows):
+        return False
+    table = number_table([[0 if value is None else value for value in row] for row in rows], 6)
+    if table is None or any(None in row[:4] for row in rows):
+        return False
+    place, jumps = table[:, :2], table[:, 4:]
+    return bool(
+        ((place >= 0) & (place < MAX_GRID) & (place % 1 == 0)).all()
+        and ((np.abs(jumps) <= 1_000_000) & (jumps % 1 == 0)).all()
+    )
 
 
 def _check_places(grid: Grid, places: Ints) -> None:

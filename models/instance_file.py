@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import io
 import json
-import math
-import struct
-import tokenize
-import warnings
-import zipfile
-import zlib
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
 
-from .errors import InstanceError
+from .array_archive import Expected, pack_arrays, unpack_arrays
+from .errors import InstanceError, shortened
+from .grid import Floats
+from .input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from .instance import Instance
 from .storage import read_bytes, write_bytes
 
@@ -25,23 +23,15 @@ FORMAT: Final = "crossfield-instance"
 VERSION: Final = 1
 _SCALARS = ("name", "gauge", "source", "w_strokes", "w_beta", "pixel_size")
 _ARRAYS = ("mask", "stroke_pixels", "theta", "w")
-_MOST_BYTES: Final = 1 << 32  # a grid of 9999 x 9999 takes less; a small file that claims more is a trap
-_DAMAGE: Final = (
-    ValueError,
-    TypeError,
-    KeyError,
-    OSError,
-    EOFError,
-    RuntimeError,
-    SyntaxError,
-    MemoryError,
-    OverflowError,
-    Warning,
-    struct.error,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
+_MOST_ERRORS: Final = 100  # of a document, among which the outermost one is told
+_ARCHIVE: Final = {
+    "head": Expected(1, MAX_HEAD, "u"),
+    "origin": Expected(1, 2),
+    "mask": Expected(2, MAX_GRID, "b"),
+    "stroke_pixels": Expected(2, MAX_GRID**2, "iuf"),
+    "theta": Expected(1, MAX_GRID**2),
+    "w": Expected(1, MAX_GRID**2),
+}
 
 
 def write_instance(instance: Instance, path: str | Path) -> Path:
@@ -58,11 +48,9 @@ def read_instance(path: str | Path) -> Instance:
 
     Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the schema.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, MAX_ARCHIVE)
     try:
-        return of_arrays(unpack_arrays(data)) if data[:2] == b"PK" else of_json(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InstanceError("is neither JSON nor .npz; expected an instance file", file=path) from error
+        return unpacked(data) if data[:2] == b"PK" else of_json(decoded(data))
     except InstanceError as error:
         raise InstanceError(str(error), file=path) from error
 
@@ -92,6 +80,16 @@ def to_json(instance: Instance) -> str:
     )
 
 
+def decoded(data: bytes) -> str:
+    """The text of a JSON file. Raises InstanceError when it is none or has more than MAX_BYTES bytes."""
+    if len(data) > MAX_BYTES:
+        raise InstanceError(f"has {len(data)} bytes of JSON; at most {MAX_BYTES} are read, write it as .npz")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InstanceError("is neither JSON nor .npz; expected a file written by crossfield") from error
+
+
 def of_json(text: str) -> Instance:
     """The instance that JSON text describes. Raises InstanceError with the place in the document."""
     return of_document(parse_json(text))
@@ -102,21 +100,23 @@ def parse_json(text: str) -> object:
     try:
         return cast("object", json.loads(text.removeprefix("\ufeff")))
     except (ValueError, RecursionError) as error:
-        raise InstanceError(f"is not valid JSON: {error}") from error
+        raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
 
 
 def of_document(document: object) -> Instance:
     """The instance that a parsed JSON document describes. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
-    document = check_schema(document, "instance")
+    document = check_schema(document, "instance", rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
         if len(row) != width:
             raise InstanceError(
                 f"mask row {number} has {len(row)} pixels, the first one {width}; make them equal"
             )
-    mask = np.array([[pixel == "#" for pixel in row] for row in document["mask"]], dtype=bool)
+    letters = "".join(document["mask"]).encode()
+    mask = np.frombuffer(letters, dtype=np.uint8).reshape(-1, width) == ord("#")
     strokes = document["strokes"]
+    check_counts(len(strokes), int(np.count_nonzero(mask)))
     try:
         return Instance(
             mask=mask,
@@ -130,15 +130,63 @@ def of_document(document: object) -> Instance:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
 
-def check_schema(document: object, schema: str, package: str = __package__) -> dict[str, Any]:
-    """The document, which obeys the `<schema>.schema.json` that ships with a package. Raises InstanceError with the place."""
+def check_counts(strokes: int, pixels: int) -> None:
+    """Nothing, when there are no more stroke pixels than pixels; else raises InstanceError."""
+    if strokes > pixels:
+        raise InstanceError(
+            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each stroke pixel once"
+        )
+
+
+def _are_strokes(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a stroke."""
+    table = number_table(rows, 4)
+    if table is None:
+        return False
+    place, w = table[:, :2], table[:, 3]
+    return bool(((place >= 0) & (place < MAX_GRID) & (place % 1 == 0)).all() and ((w > 0) & (w <= 1)).all())
+
+
+def number_table(rows: list[Any], width: int) -> Floats | None:
+    """Rows of numbers as an array (k, width), None when one of them is something else."""
+    if not all(type(row) is list and len(row) == width for row in rows):
+        return None
+    if not {type(value) for row in rows for value in row} <= {int, float}:
+        return None
+    try:
+        return np.array(rows, dtype=np.float64).reshape(-1, width)
+    except OverflowError:
+        return None
+
+
+def check_schema(
+    document: object,
+    schema: str,
+    package: str = __package__,
+    rows: Mapping[str, Callable[[list[Any]], bool]] | None = None,
+) -> dict[str, Any]:
+    """The document, which obeys the `<schema>.schema.json` that ships with a package. Raises InstanceError with the place.
+
+    rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not looked at one by one.
+    """
     import jsonschema
 
-    errors = jsonschema.Draft202012Validator(_schema(schema, package)).iter_errors(cast("Any", document))
-    error = min(errors, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
+    assert isinstance(document, dict)
+    quick = {
+        key: document[key][:1]
+        for key, are_good in (rows or {}).items()
+        if _is_list(document.get(key)) and are_good(document[key])
+    }
+    errors = jsonschema.Draft202012Validator(_schema(schema, package)).iter_errors({**document, **quick})
+    first = islice(errors, _MOST_ERRORS)
+    error = min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
     if error is not None:
-        raise InstanceError(f"{error.json_path}: {error.message[:200]}")
+        raise InstanceError(f"{error.json_path}: {shortened(error.message, 200)}")
     return cast("dict[str, Any]", document)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list)
 
 
 @cache
@@ -174,18 +222,23 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     return arrays | {key: getattr(instance, key) for key in _ARRAYS}
 
 
+def unpacked(data: bytes, prefix: str = "") -> Instance:
+    """The instance in an .npz, the names of its arrays led by a prefix. Raises InstanceError with the array's name."""
+    return of_arrays(unpack_arrays(data, _ARCHIVE, prefix))
+
+
 def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     """The instance that `arrays_of` gave. Raises InstanceError with the array's name."""
-    require_arrays(arrays, ("head", "origin", *_ARRAYS))
     head = head_of(arrays)
     check_version(head, FORMAT, VERSION)
+    check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
         scalars = {key: head[key] for key in _SCALARS}
         origin = (float(arrays["origin"][0]), float(arrays["origin"][1]))
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
         return Instance(origin=origin, **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-        raise InstanceError(f"has an entry of the wrong kind: {error}") from error
+        raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
 
 
 def head_of(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
@@ -195,48 +248,3 @@ def head_of(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InstanceError("its array 'head' is not JSON text") from error
     return cast("dict[str, Any]", head)
-
-
-def require_arrays(arrays: dict[str, np.ndarray[Any, Any]], names: tuple[str, ...]) -> None:
-    """Nothing, when all the arrays are there and hold numbers; else raises InstanceError."""
-    for name in names:
-        if name not in arrays:
-            raise InstanceError(f"holds no array {name!r}; expected a file written by crossfield")
-        if arrays[name].dtype.kind not in "biuf":
-            raise InstanceError(f"array {name!r} holds {arrays[name].dtype}, not numbers")
-
-
-def pack_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> bytes:
-    """The bytes of a compressed .npz that depend on the arrays alone, not on the clock."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in arrays.items():
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, np.ascontiguousarray(array), allow_pickle=False)
-            member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-            member.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(member, entry.getvalue())
-    return buffer.getvalue()
-
-
-def unpack_arrays(data: bytes) -> dict[str, np.ndarray[Any, Any]]:
-    """The arrays of a .npz. Raises InstanceError when it is damaged, unreasonably large, or holds pickled objects."""
-    try:
-        with warnings.catch_warnings(action="error"), zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
-            if sum(member.file_size for member in members) > _MOST_BYTES:
-                raise InstanceError(f"is a .npz of more than {_MOST_BYTES >> 20} MiB when unpacked")
-            return {member.filename[:-4]: _array(archive.read(member)) for member in members}
-    except _DAMAGE as error:
-        raise InstanceError(f"is a damaged or unsafe .npz: {error}") from error
-
-
-def _array(entry: bytes) -> np.ndarray[Any, Any]:
-    """The array of one .npy entry, whose header may not promise more than the entry holds."""
-    stream = io.BytesIO(entry)
-    read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-    shape, _, kind = read_header[np.lib.format.read_magic(stream)](stream)
-    if kind.hasobject or math.prod(shape) * kind.itemsize != len(entry) - stream.tell():
-        raise ValueError("an array is pickled or has another length than its header says")
-    stream.seek(0)
-    return cast("np.ndarray[Any, Any]", np.lib.format.read_array(stream, allow_pickle=False))

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .grid import Floats
+from .input_limits import MAX_PIECES
 
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
 MARGIN: Final = 0.04
 """Empty border round a drawing, in parts of its longer side; at least one pixel."""
-MAX_PIECES: Final = 40_000_000
 LEAST_R: Final = 0.5
 """Least R of a pixel with a direction. Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither
 of them; a single line that bends by as much as a right angle inside the pixel still has R = 0.64."""

@@ -7,6 +7,7 @@ bound the samples. Strokes of one cluster are meant as one curve; here each coun
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 import numpy as np
@@ -14,13 +15,17 @@ import numpy as np
 from .curves import Curves, lines_as_cubics
 from .errors import InputError
 from .grid import Floats
+from .input_limits import LEAST_LENGTH, MAX_LINES
 
 _GREATEST: Final = 1e9
 
 
 def read_scap(data: bytes) -> Curves:
     """The strokes of a .scap file. Raises InputError with the number of the line that breaks the layout."""
-    lines = data.decode("utf-8", errors="replace").lstrip("\ufeff").splitlines()
+    if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
+        raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
+    text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
+    lines = re.split(r"\r\n?|\n", text)
     canvas = _canvas(lines[0] if lines else "")
     strokes: list[list[tuple[float, float]]] = []
     samples: list[tuple[float, float]] = []
@@ -57,18 +62,20 @@ def _curves(strokes: list[list[tuple[float, float]]], canvas: tuple[float, float
 
 
 def _canvas(line: str) -> tuple[float, float, float, float]:
-    fields = line.strip().removeprefix("#").split()
+    fields = line.strip().removeprefix("#").split(maxsplit=3)
     try:
         width, height = (float(field) for field in fields)
     except ValueError as error:
         raise InputError(f"line 1: expected '#width height', found {line.strip()[:30]!r}") from error
-    if not (0 < width <= _GREATEST and 0 < height <= _GREATEST):
-        raise InputError(f"line 1: the size {line.strip()[:30]!r} is not two positive numbers")
+    if not (min(width, height) >= LEAST_LENGTH and max(width, height) <= _GREATEST):
+        raise InputError(
+            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to {_GREATEST:g}"
+        )
     return 0.0, 0.0, width, height
 
 
 def _sample(line: str, number: int) -> tuple[float, float]:
-    fields = line.split()
+    fields = line.split(maxsplit=2)
     try:
         x, y = (float(field) for field in fields[:2])
     except ValueError as error:

@@ -21,6 +21,7 @@ from .bitmap import Picture, read_picture, read_white
 from .curves import Curves, bounding_box, flatten
 from .errors import InputError
 from .grid import Bools
+from .input_limits import MAX_BYTES
 from .instance import Gauge, Instance
 from .rasterise import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .scap import read_scap
@@ -29,7 +30,6 @@ from .storage import read_bytes
 from .svg import read_svg
 
 MAX_SIZE: Final = 4096
-MAX_BYTES: Final = 200_000_000
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
 LEAST_WEIGHT: Final = 0.1

@@ -1,8 +1,8 @@
 """Reading SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements knows the grammars of path data, transforms, lengths and colours. The document itself is walked here: what it leaves
-to a browser (style sheets at any place and in any order, `use` of symbols, invisible parts) decides which strokes there are. The
-bytes first pass defusedxml, which refuses entities; nothing outside the file is ever loaded: pictures and `use` of other files are left
+svgelements knows the grammars of path data, transforms, lengths and colours, tinycss2 that of style sheets. The document itself is walked here:
+what it leaves to a browser (style sheets at any place, `use` of symbols, invisible parts) decides which strokes there are. Each element is parsed
+once, however often it is used, and the work is bounded by the limits of `input_limits`. The bytes first pass defusedxml, which refuses entities; nothing outside the file is ever loaded: pictures and `use` of other files are left
 out. Clip paths, masks, dashes and text are not looked at.
 
 What counts as a stroke: the path of every shape with a visible `stroke`; and the outline of a shape that is only filled, since drawing programs
@@ -13,38 +13,35 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError
 
 import numpy as np
 
-from .curves import Curves, lines_as_cubics
+from .curves import Curves
 from .errors import InputError
 from .grid import Floats
 from .ink import is_paper, is_red
+from .input_limits import (
+    LEAST_LENGTH,
+    MAX_CURVES,
+    MAX_DATA,
+    MAX_ELEMENTS,
+    MAX_LENGTH,
+    MAX_TAGS,
+    MAX_TRANSFORM,
+    MAX_USE_DEPTH,
+    MAX_USES,
+)
+from .path_data import SHAPES, outline, pixels, too_many_curves
+from .style_sheet import KNOWN, StyleSheet, style_properties, style_sheet
 
-MAX_ELEMENTS: Final = 100_000
-"""Elements drawn, those repeated by `use` counted each time."""
-MAX_USES: Final = 10_000
-"""Copies made by `use`."""
-MAX_DATA: Final = 10_000_000
-"""Characters of path data and point lists."""
 _GREATEST: Final = 1e9
-_PPI: Final = 96.0  # CSS pixels per inch
 _SVG: Final = "http://www.w3.org/2000/svg"
 _HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
-_SHAPES: Final = {
-    "path": "Path",
-    "polyline": "Polyline",
-    "polygon": "Polygon",
-    "line": "SimpleLine",
-    "circle": "Circle",
-    "ellipse": "Ellipse",
-    "rect": "Rect",
-}
 _INHERITED: Final = (
     "stroke",
     "fill",
@@ -55,31 +52,6 @@ _INHERITED: Final = (
     "fill-opacity",
 )
 _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
-_COMMENT: Final = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
-_AT_RULE: Final = re.compile(r"@[^{};]*(;|\{(?:[^{}]|\{[^{}]*\})*\})")
-_RULE: Final = re.compile(r"([^{}]+)\{([^{}]*)\}")
-_SIMPLE_SELECTOR: Final = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
-
-
-@dataclass(frozen=True)
-class _Rule:
-    """One style rule with a simple selector: tag (or empty), id (or empty), classes."""
-
-    tag: str
-    id: str
-    classes: frozenset[str]
-    properties: Mapping[str, str]
-
-    @property
-    def rank(self) -> tuple[bool, int, bool]:
-        return bool(self.id), len(self.classes), bool(self.tag)
-
-    def fits(self, tag: str, attributes: Mapping[str, str]) -> bool:
-        return (
-            self.tag in ("", tag)
-            and self.id in ("", attributes.get("id"))
-            and (not self.classes or self.classes <= set(attributes.get("class", "").split()))
-        )
 
 
 @dataclass(frozen=True)
@@ -103,21 +75,26 @@ def read_svg(data: bytes) -> Curves:
             f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
         )
     canvas = _canvas(root)
-    shapes = list(_shapes(root))
-    cubics = [_cubics(shape, canvas) for shape in shapes]
-    count = [len(each) for each in cubics]
-    if sum(count) == 0:
+    walk = _Walk(style_sheet(_style_texts(root)), canvas)
+    shapes = list(walk.shapes(root))
+    if not sum(len(points) for _, points in shapes):
         raise InputError(
             "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
         )
-    red = is_red(np.array([_paint(shape.style) for shape in shapes]))
-    return Curves(np.concatenate(cubics), np.repeat(red, count), canvas)
+    red = is_red(np.array([_paint(style) for style, _ in shapes]))
+    return Curves(
+        np.concatenate([points for _, points in shapes]),
+        np.repeat(red, [len(points) for _, points in shapes]),
+        canvas,
+    )
 
 
 def _parsed(data: bytes) -> Element:
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
+    if data.count(b"<") + data.count(b"=") > MAX_TAGS:
+        raise InputError(f"has more than {MAX_TAGS} tags and attributes; simplify the drawing")
     try:
         root: Element = fromstring(data, forbid_dtd=False, forbid_entities=True, forbid_external=True)
     except DefusedXmlException as error:
@@ -129,81 +106,140 @@ def _parsed(data: bytes) -> Element:
     return root
 
 
-def _shapes(root: Element) -> Iterator[_Place]:
-    """Every visible shape with its final style and transform, in drawing order."""
-    from svgelements import Matrix
+def _style_texts(root: Element) -> Iterator[str]:
+    return ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
 
-    rules = _rules(root)
-    named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-    stack = [_Place(root, _START, Matrix(), ())]
-    visited = used = characters = 0
-    while stack:
-        place = _styled(stack.pop(), rules)
-        tag, element = _tag(place.element), place.element
-        visited += 1
-        characters += len(element.get("d", "")) + len(element.get("points", ""))
-        if visited > MAX_ELEMENTS or characters > MAX_DATA:
+
+@dataclass(eq=False)
+class _Walk:
+    """A walk through a drawing. What depends on an element alone is found once and kept for all its uses."""
+
+    sheet: StyleSheet
+    canvas: tuple[float, float, float, float] | None
+    own: dict[Element, tuple[Mapping[str, str], Any]] = field(default_factory=dict)
+    outlines: dict[Element, Floats] = field(default_factory=dict)
+    visited: int = 0
+    used: int = 0
+    characters: int = 0
+    curves: int = 0
+
+    def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
+        """The style of every visible shape and its control points in the units of the root, in drawing order."""
+        from svgelements import Matrix
+
+        named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
+        stack = [_Place(root, _START, Matrix(), ())]
+        while stack:
+            place = self._styled(stack.pop())
+            tag, element = _tag(place.element), place.element
+            self._count()
+            if _hidden(place.style):
+                continue
+            if tag in SHAPES and _painted(place.style):
+                yield place.style, self._placed(place)
+            elif tag in _CONTAINERS:
+                inner = _view(place, element) if element is not root else place.matrix
+                stack += [_Place(child, place.style, inner, place.uses) for child in reversed(element)]
+            elif tag == "use":
+                stack += self._used(place, named)
+
+    def _count(self) -> None:
+        self.visited += 1
+        if self.visited > MAX_ELEMENTS:
+            raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
+
+    def _styled(self, place: _Place) -> _Place:
+        """The place with the element's own style and transform applied."""
+        if place.element not in self.own:
+            self._read(place.element)
+            style = _own_style(place.element, self.sheet)
+            self.own[place.element] = style, _transform(place.element, style)
+        own, transform = self.own[place.element]
+        inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
+        style = inherited | {key: value for key, value in own.items() if value != "inherit"}
+        matrix = place.matrix if transform is None else transform * place.matrix
+        return _Place(place.element, style, matrix, place.uses)
+
+    def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
+        """What a `use` element stands for; nothing when it points into another file or at itself."""
+        from svgelements import Matrix
+
+        self.used += 1
+        if self.used > MAX_USES:
+            raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
+        element = place.element
+        link = next((element.get(key, "") for key in _HREFS if key in element.attrib), "")
+        target = named.get(link[1:]) if link.startswith("#") else None
+        if target is None or link in place.uses:
+            return []
+        if len(place.uses) == MAX_USE_DEPTH:
             raise InputError(
-                f"draws more than {MAX_ELEMENTS} elements or {MAX_DATA} characters of paths; simplify the drawing"
+                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; expand them in the drawing program"
             )
-        if _hidden(place.style):
-            continue
-        if tag in _SHAPES and _painted(place.style):
-            yield place
-        elif tag in _CONTAINERS:
-            inner = _view(place, element) if element is not root else place.matrix
-            stack += [_Place(child, place.style, inner, place.uses) for child in reversed(element)]
-        elif tag == "use":
-            used += 1
-            if used > MAX_USES:
-                raise InputError(
-                    f"draws more than {MAX_USES} <use> elements; expand them in the drawing program"
-                )
-            stack += _used(place, named)
+        moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
+        uses = (*place.uses, link)
+        if _tag(target) != "symbol":
+            return [_Place(target, place.style, moved, uses)]
+        inner = _view(_Place(element, place.style, moved, uses), target)
+        return [_Place(child, place.style, inner, uses) for child in reversed(target)]
 
-
-def _styled(place: _Place, rules: list[_Rule]) -> _Place:
-    """The place with the element's own style and transform applied."""
-    from svgelements import Matrix
-
-    attributes, tag = place.element.attrib, _tag(place.element)
-    own = {
-        key: value.strip()
-        for key, value in attributes.items()
-        if key in (*_INHERITED, "display", "opacity", "transform")
-    }
-    for rule in rules:
-        if rule.fits(tag, attributes):
-            own |= rule.properties
-    own |= _properties(attributes.get("style", ""))
-    inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
-    style = inherited | {key: value for key, value in own.items() if value != "inherit"}
-    matrix = place.matrix
-    if own.get("transform"):
-        try:
-            matrix = Matrix(own["transform"]) * matrix
-        except (ValueError, TypeError, IndexError) as error:
+    def _placed(self, place: _Place) -> Floats:
+        """Control points (k, 4, 2) of a shape in the units of the root."""
+        if place.element not in self.outlines:
+            self.outlines[place.element] = self._outline(place.element)
+        points, m = self.outlines[place.element], place.matrix
+        self.curves += len(points)
+        if self.curves > MAX_CURVES:
+            raise too_many_curves()
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed: Floats = points @ np.array([[m.a, m.b], [m.c, m.d]], dtype=float) + np.array(
+                [m.e, m.f], dtype=float
+            )
+        if not (np.abs(placed) <= _GREATEST).all():
             raise InputError(
-                f"{_named(place.element)}: its transform {own['transform'][:40]!r} cannot be read"
-            ) from error
-    return _Place(place.element, style, matrix, place.uses)
+                f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
+            )
+        drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
+        return drawn
+
+    def _read(self, element: Element) -> None:
+        self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
+        if self.characters > MAX_DATA:
+            raise InputError(
+                f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
+            )
+
+    def _outline(self, element: Element) -> Floats:
+        _, _, width, height = self.canvas or (0.0, 0.0, 100.0, 100.0)
+        try:
+            return outline(_tag(element), element.attrib, (width, height))
+        except InputError as error:
+            raise InputError(f"{_named(element)}: {error}") from error
 
 
-def _used(place: _Place, named: Mapping[str, Element]) -> list[_Place]:
-    """What a `use` element stands for; nothing when it points into another file or at itself."""
+def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
+    """What an element says of itself: by attributes, style sheets and its `style`, the last ones stronger."""
+    attributes = element.attrib
+    own = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
+    given = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
+    return {**own, **given, **style_properties(attributes.get("style", ""))}
+
+
+def _transform(element: Element, style: Mapping[str, str]) -> Any:
+    """The matrix of an element's own transform, None without one. Raises InputError."""
     from svgelements import Matrix
 
-    element = place.element
-    link = next((element.get(key, "") for key in _HREFS if key in element.attrib), "")
-    target = named.get(link[1:]) if link.startswith("#") else None
-    if target is None or link in place.uses:
-        return []
-    moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
-    uses = (*place.uses, link)
-    if _tag(target) != "symbol":
-        return [_Place(target, place.style, moved, uses)]
-    inner = _view(_Place(element, place.style, moved, uses), target)
-    return [_Place(child, place.style, inner, uses) for child in reversed(target)]
+    text = style.get("transform", "")
+    if not text:
+        return None
+    if len(text) > MAX_TRANSFORM:
+        raise InputError(
+            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; export the drawing again"
+        )
+    try:
+        return Matrix(text)
+    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
+        raise InputError(f"{_named(element)}: its transform {text[:40]!r} cannot be read") from error
 
 
 def _view(place: _Place, element: Element) -> Any:
@@ -221,69 +257,6 @@ def _view(place: _Place, element: Element) -> Any:
     scale = min(wide / width, high / height)
     centre = Matrix.translate((wide - scale * width) / 2, (high - scale * height) / 2)
     return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
-
-
-def _cubics(place: _Place, canvas: tuple[float, float, float, float] | None) -> Floats:
-    """Control points (k, 4, 2) of a shape in the units of the root."""
-    path = _path(place.element, canvas)
-    lines: list[tuple[complex, ...]] = []
-    cubics: list[tuple[complex, ...]] = []
-    for segment in path:
-        _collect(segment, lines, cubics)
-    straight, curved = _as_points(lines, 2), _as_points(cubics, 4)
-    m = place.matrix
-    with np.errstate(over="ignore", invalid="ignore"):
-        points = np.concatenate([lines_as_cubics(straight[:, 0], straight[:, 1]), curved])
-        placed: Floats = points @ np.array([[m.a, m.b], [m.c, m.d]], dtype=float) + np.array(
-            [m.e, m.f], dtype=float
-        )
-    if not (np.abs(placed) <= _GREATEST).all():
-        raise InputError(f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}")
-    drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
-    return drawn
-
-
-def _path(element: Element, canvas: tuple[float, float, float, float] | None) -> Any:
-    """The svgelements path of a shape, its own transform left out. Raises InputError when its numbers are damaged."""
-    import svgelements
-
-    kind = getattr(svgelements, _SHAPES[_tag(element)])
-    values = {
-        key: value for key, value in element.attrib.items() if key not in ("transform", "style", "class")
-    }
-    _, _, width, height = canvas or (0.0, 0.0, 100.0, 100.0)
-    try:
-        shape = kind(values)
-        shape.render(ppi=_PPI, width=width, height=height)
-        return svgelements.Path(shape)
-    except (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError) as error:
-        raise InputError(
-            f"{_named(element)}: its numbers cannot be read; export the drawing again"
-        ) from error
-
-
-def _collect(segment: Any, lines: list[tuple[complex, ...]], cubics: list[tuple[complex, ...]]) -> None:
-    """Adds a path segment to the straight or the curved ones."""
-    import svgelements
-
-    if isinstance(segment, svgelements.Line | svgelements.Close):
-        if segment.start is not None and segment.end is not None:
-            lines.append((complex(segment.start), complex(segment.end)))
-    elif isinstance(segment, svgelements.CubicBezier):
-        cubics.append(
-            tuple(complex(p) for p in (segment.start, segment.control1, segment.control2, segment.end))
-        )
-    elif isinstance(segment, svgelements.QuadraticBezier):
-        start, control, end = (complex(p) for p in (segment.start, segment.control, segment.end))
-        cubics.append((start, (start + 2 * control) / 3, (end + 2 * control) / 3, end))
-    elif isinstance(segment, svgelements.Arc):
-        for curve in segment.as_cubic_curves():
-            _collect(curve, lines, cubics)
-
-
-def _as_points(rows: list[tuple[complex, ...]], width: int) -> Floats:
-    values = np.array(rows, dtype=complex).reshape(-1, width)
-    return np.stack([values.real, values.imag], axis=-1)
 
 
 def _hidden(style: Mapping[str, str]) -> bool:
@@ -315,6 +288,8 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     """The colour on white paper; black for gradients and for what cannot be read."""
     from svgelements import Color
 
+    if len(colour) > MAX_LENGTH:
+        return 0.0, 0.0, 0.0
     try:
         parsed = Color(colour)
         alpha = parsed.alpha / 255
@@ -326,42 +301,13 @@ def _rgb(colour: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _rules(root: Element) -> list[_Rule]:
-    """The style rules of the document with simple selectors, weakest first."""
-    rules = []
-    for element in root.iter():
-        if _tag(element) == "style":
-            text = _AT_RULE.sub("", _COMMENT.sub(" ", "".join(element.itertext())))
-            for selectors, body in _RULE.findall(text):
-                rules += [rule for selector in selectors.split(",") for rule in _rule(selector.strip(), body)]
-    return sorted(rules, key=lambda rule: rule.rank)
-
-
-def _rule(selector: str, body: str) -> list[_Rule]:
-    """The rule, or nothing when its selector depends on other elements."""
-    match = _SIMPLE_SELECTOR.fullmatch(selector)
-    if not selector or match is None:
-        return []
-    marks = re.findall(r"[.#][\w-]+", match[2])
-    ids = [mark[1:] for mark in marks if mark[0] == "#"]
-    classes = frozenset(mark[1:] for mark in marks if mark[0] == ".")
-    return [_Rule((match[1] or "").replace("*", ""), ids[0] if ids else "", classes, _properties(body))]
-
-
-def _properties(text: str) -> dict[str, str]:
-    pairs = (declaration.partition(":") for declaration in text.split(";"))
-    return {
-        key.strip().lower(): value.replace("!important", "").strip() for key, colon, value in pairs if colon
-    }
-
-
 def _canvas(root: Element) -> tuple[float, float, float, float] | None:
     """The viewBox, or else width and height from (0, 0), or None."""
     box = _view_box(root)
     if box is not None:
         return box
     width, height = _length(root, "width", 0.0), _length(root, "height", 0.0)
-    return (0.0, 0.0, width, height) if width > 0 and height > 0 else None
+    return (0.0, 0.0, width, height) if min(width, height) >= LEAST_LENGTH else None
 
 
 def _view_box(element: Element) -> tuple[float, float, float, float] | None:
@@ -374,23 +320,15 @@ def _view_box(element: Element) -> tuple[float, float, float, float] | None:
         raise InputError(
             f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
         ) from error
-    if not (np.isfinite([x, y, width, height]).all() and width > 0 and height > 0):
+    if not (np.abs([x, y, width, height]) <= _GREATEST).all() or min(width, height) < LEAST_LENGTH:
         raise InputError(f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
     return x, y, width, height
 
 
 def _length(element: Element, key: str, default: float) -> float:
     """A length in CSS pixels; `default` when it is missing, a percentage or unreadable."""
-    from svgelements import Length
-
-    text = element.get(key, "")
-    if not text or text.endswith("%"):
-        return default
-    try:
-        value = float(Length(text).value(ppi=_PPI))
-    except (ValueError, TypeError, AttributeError):
-        return default
-    return value if np.isfinite(value) else default
+    found = pixels(element.get(key, ""))
+    return default if found is None else found
 
 
 def _number(text: str | None) -> float:

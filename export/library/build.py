@@ -6,7 +6,8 @@ file beside and renamed, the one that says "done" last. So a build that was stop
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from ...models.errors import CrossfieldError
 from ...models.storage import make_folder, read_bytes, write_bytes
 from .entry import Entry, make_entry
 from .index import write_index
-from .ledger import Ledger, Record, merged, read_ledger
+from .ledger import Ledger, Record, keep, merged, read_ledger
+from .lock import changing
 from .points import Provenance
 from .preparing import Files, Preparation, Submitted, about_file, prepare
 from .recipe import InstancePlan, plan
@@ -39,7 +41,28 @@ def build(
     is made. Same specification and ledger, same bytes, wherever they are made. Raises InputError, OutputError, BuildError.
     """
     plans = plan(spec)
-    folder = make_folder(folder)
+    folder, is_new = Path(folder), not Path(folder).exists()
+    make_folder(folder)
+    try:
+        with changing(folder, "a build of the library", progress):
+            return _built(spec, plans, folder, jobs=jobs, scheduler=scheduler, progress=progress)
+    except BaseException:
+        if is_new:
+            with suppress(OSError):  # it may hold what is whole, for the next build
+                folder.rmdir()
+        raise
+
+
+def _built(
+    spec: Spec,
+    plans: Sequence[InstancePlan],
+    folder: Path,
+    *,
+    jobs: int,
+    scheduler: str | None,
+    progress: Progress,
+) -> Library:
+    """The library, by a caller who holds its lock. The ledger is written when all else is there: a build that is refused leaves none."""
     _sweep(folder)
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
@@ -50,6 +73,7 @@ def build(
         ):  # the last one goes first: small ones, whose faults show at once
             work.begin(each)
         tasks.run()
+    keep(ledger)
     progress("index and checksums")
     write_index(folder, spec, plans)
     return read_library(folder)
@@ -57,7 +81,15 @@ def build(
 
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
     """A library brought up to date after its ledger changed; only what the change touches is made again."""
-    return build(read_library(folder).spec, folder, jobs=jobs, progress=progress)
+    folder = read_library(folder).folder
+    with changing(folder, "a build of the library", progress):
+        return rebuilt(folder, jobs=jobs, progress=progress)
+
+
+def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+    """As `rebuild`, for a caller who holds the lock of the library."""
+    spec = read_library(folder).spec
+    return _built(spec, plan(spec), folder, jobs=jobs, scheduler=None, progress=progress)
 
 
 def _sweep(folder: Path) -> None:
@@ -146,7 +178,7 @@ class _Build:
     def _submission(self, record: Record) -> Submitted:
         self.ledger.field(record)  # damage is told here, with the file's name
         provenance = Provenance(record.solver, record.version, record.seconds, record.by)
-        return Submitted(read_bytes(self.ledger.folder / str(record.point)), provenance)
+        return Submitted(read_bytes(self.ledger.path(record)), provenance)
 
     def _write(self, files: Files) -> None:
         for name, data in files.items():

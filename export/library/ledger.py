@@ -7,14 +7,15 @@ of the problem it is about, and counts for that problem alone.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from ...models.errors import InputError, InstanceError
 from ...models.field import CrossField
 from ...models.field_file import read_field, write_field
+from ...models.input_limits import MAX_BYTES
 from ...models.instance_file import check_schema, check_version, parse_json
 from ...models.storage import read_bytes, sha256_of, write_bytes
 
@@ -54,10 +55,11 @@ class Record:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Records in order, and the folder where the files of their fields lie."""
+    """Records in order, and the folder where the files of their fields lie, or are to lie: elsewhere says where those lie that are not there yet."""
 
     folder: Path
     records: tuple[Record, ...] = ()
+    elsewhere: Mapping[str, Path] = field(default_factory=dict)
 
     def of(self, entry: str, problem_sha256: str) -> list[Record]:
         """The records of an entry that are about this very problem."""
@@ -68,9 +70,13 @@ class Ledger:
         found = [each for each in self.records if each.entry == entry and each.point is not None]
         return found[-1] if found else None
 
+    def path(self, record: Record) -> Path:
+        """The file of a record's field."""
+        return self.elsewhere.get(str(record.point), self.folder / str(record.point))
+
     def field(self, record: Record) -> CrossField:
         """The field of a record. Raises InputError, InstanceError when the file is missing, damaged or another one."""
-        path = self.folder / str(record.point)
+        path = self.path(record)
         if path.is_file() and sha256_of(path) != record.point_sha256:
             raise InstanceError(
                 "is another file than the one its ledger names; restore it, or submit the point again",
@@ -94,7 +100,7 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     if not path.exists():
         return Ledger(Path(folder))
     try:
-        document = parse_json(read_bytes(path).decode())
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
         given = check_schema(document, "library-ledger", __package__.rpartition(".")[0])["records"]
     except UnicodeDecodeError as error:
@@ -111,14 +117,14 @@ def write_ledger(ledger: Ledger) -> Path:
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
-    """The record, now in the ledger of a folder; with a field, that is from now on the kept one of the entry.
+    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry, that is from now on the kept one.
 
-    The field's file is written first, so that the ledger never names what is not there. Records of the same entry that named the file before lose
+    The caller holds the lock of the library. The field's file is written first, so that the ledger never names what is not there. Records of the same entry that named the file before lose
     their field, which is not there any more. Raises OutputError.
     """
     ledger = read_ledger(folder)
     records = list(ledger.records)
-    if field is not None:
+    if field is not None and _is_better(record, ledger.with_point(record.entry)):
         path = write_field(field, ledger.folder / field_file(record.entry))
         record = replace(record, point=path.name, point_sha256=sha256_of(path))
         records = [_without_point(each) if each.entry == record.entry else each for each in records]
@@ -127,29 +133,42 @@ def add_record(folder: str | Path, record: Record, field: CrossField | None = No
     return record
 
 
+def _is_better(record: Record, kept: Record | None) -> bool:
+    """Whether the field of a record is to be kept in place of another one, which may have come while it was looked for."""
+    if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
+        return True
+    return record.primal is None or record.primal < kept.primal
+
+
 def _without_point(record: Record) -> Record:
     return replace(record, point=None, point_sha256=None)
 
 
 def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
-    """The ledger of a folder after it took over the records of another one about these entries, with their fields.
+    """The ledger of a folder with the records of another one about these entries and their fields; nothing is written yet.
 
     A field that the folder has for an entry already stays.
     """
     ledger, wanted = read_ledger(folder), set(entries)
-    taken = [record for record in other.records if record.entry in wanted]
-    have = {replace(record, point=None, point_sha256=None) for record in ledger.records}
+    have = {_without_point(record) for record in ledger.records}
     fresh: list[Record] = []
-    for record in taken:
-        if _without_point(record) in have:
+    elsewhere: dict[str, Path] = {}
+    for record in other.records:
+        if record.entry not in wanted or _without_point(record) in have:
             continue
         if record.point is not None and ledger.with_point(record.entry) is None:
             other.field(record)  # checked before it is taken over
-            write_bytes(folder / field_file(record.entry), read_bytes(other.folder / record.point))
+            elsewhere[record.point] = other.path(record)
             fresh.append(record)
         else:
             fresh.append(_without_point(record))
-    if fresh or not (folder / FILE).exists():
-        ledger = replace(ledger, records=tuple(sorted({*ledger.records, *fresh}, key=lambda each: each.rank)))
+    records = sorted({*ledger.records, *fresh}, key=lambda each: each.rank)
+    return replace(ledger, records=tuple(records), elsewhere=elsewhere)
+
+
+def keep(ledger: Ledger) -> None:
+    """Write a ledger that was merged, its fields first. Raises OutputError."""
+    for name, path in ledger.elsewhere.items():
+        write_bytes(ledger.folder / name, read_bytes(path))
+    if not (ledger.folder / FILE).exists() or read_ledger(ledger.folder).records != ledger.records:
         write_ledger(ledger)
-    return ledger

@@ -17,6 +17,7 @@ import numpy as np
 from ...models.errors import InputError, InstanceError
 from ...models.formulations import FORMULATIONS
 from ...models.grid import Ints
+from ...models.input_limits import MAX_BYTES
 from ...models.instance import Instance
 from ...models.instance_file import check_schema, check_version, parse_json, read_instance
 from ...models.problem import Problem, formulate
@@ -81,7 +82,7 @@ def read_about(path: str | Path) -> dict[str, Any]:
 
 def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
     try:
-        document = parse_json(read_bytes(path).decode())
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, form, VERSION)
         return check_schema(document, schema, _EXPORT)
     except UnicodeDecodeError as error:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,7 +23,7 @@ from ... import templates
 from ...models.errors import InputError, InstanceError, OutputError
 from ...models.field_file import read_field
 from ...models.instance_file import read_instance
-from ...models.storage import make_folder, read_bytes, sha256_of, write_bytes
+from ...models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ...templates import ENVIRONMENT
 from ..formats import FORMATS
 from .index import SOLU, SUMS
@@ -314,14 +313,15 @@ def _replacing_folder(output: Path) -> Iterator[Path]:
     _check_replaceable(output)
     make_folder(output.parent)
     try:
-        stage = Path(tempfile.mkdtemp(dir=output.parent, prefix=f".{output.name}.", suffix=".part"))
+        remove_dead(output.parent)
+        stage = neighbour(output)
+        stage.mkdir()
     except OSError as error:
         raise OutputError(
             f"cannot be written: {error.strerror}; choose another folder", file=output
         ) from error
     try:
         yield stage
-        stage.chmod(0o755)
         _take_place(stage, output)
     except OSError as error:
         raise OutputError(

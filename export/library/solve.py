@@ -19,6 +19,7 @@ from ..solution_text import Status
 from ..solvers import SOLVERS, Limits, refusal, solve
 from .build import rebuild
 from .ledger import Ending, Record, add_record, read_ledger
+from .lock import changing
 from .points import complete_point, field_of
 from .sidecar import Library, problem_of, read_library
 from .spec import RUNGS
@@ -56,7 +57,8 @@ def solve_library(
     for number, (document, solver) in enumerate(runs):
         progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
         record, field = _run(library, document, solver, time_limit, by)
-        found.append(asdict(add_record(library.folder, record, field)))
+        with changing(library.folder, "a solve of the library", progress):
+            found.append(asdict(add_record(library.folder, record, field)))
     rebuild(library.folder, progress=progress)
     return found
 

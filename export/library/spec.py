@@ -31,8 +31,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ...models.errors import InputError
+from ...models.errors import InputError, shortened
 from ...models.formulations import FACETS, FORMULATIONS
+from ...models.input_limits import MAX_BYTES
 from ...models.instance import GAUGES
 from ...models.samples import SAMPLES, sample_svg
 from ...models.storage import read_bytes
@@ -153,10 +154,10 @@ def read_spec(path: str | Path) -> Spec:
     """The specification in a TOML file. Raises InputError that names file, key and remedy."""
     path = Path(path)
     try:
-        document = tomllib.loads(read_bytes(path).decode())
+        document = tomllib.loads(read_bytes(path, MAX_BYTES).decode())
     except UnicodeDecodeError as error:
         raise InputError("is not UTF-8 text; save it as TOML in UTF-8", file=path) from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         raise InputError(f"is not valid TOML: {error}", file=path) from error
     return spec_of(document, path)
 
@@ -202,7 +203,9 @@ class _Table:
         found = self.list(key, str, "text in quotes", list(known if default is None else default))
         for word in found:
             if word not in known:
-                raise InputError(f"{self.at(key)}: there is no {word!r}; choose from {', '.join(known)}")
+                raise InputError(
+                    f"{self.at(key)}: there is no {shortened(word)!r}; choose from {', '.join(known)}"
+                )
         return found
 
     def numbers(self, key: str, least: int, most: int) -> tuple[int, ...]:
@@ -210,7 +213,9 @@ class _Table:
         found = self.list(key, int, "whole numbers", None)
         for value in found:
             if not least <= value <= most:
-                raise InputError(f"{self.at(key)}: {value} is out of range; choose {least} to {most}")
+                raise InputError(
+                    f"{self.at(key)}: {shortened(value)} is out of range; choose {least} to {most}"
+                )
         return found
 
     def list(self, key: str, kind: type[Any], words: str, default: Any) -> tuple[Any, ...]:
@@ -220,7 +225,7 @@ class _Table:
             raise InputError(f"{self.at(key)}: must be a list of {words}, at least one")
         twice = [value for number, value in enumerate(found) if value in found[:number]]
         if twice:
-            raise InputError(f"{self.at(key)}: {twice[0]!r} is listed twice; list it once")
+            raise InputError(f"{self.at(key)}: {shortened(twice[0])!r} is listed twice; list it once")
         return tuple(found)
 
     def flag(self, key: str) -> bool:
@@ -334,7 +339,7 @@ def _sample(table: _Table, name: str, rungs: tuple[str, ...], _folder: Path) -> 
     what = table.text("sample")
     if what not in SAMPLES:
         raise InputError(
-            f"{table.at('sample')}: there is no sample {what!r}; choose from {', '.join(SAMPLES)}"
+            f"{table.at('sample')}: there is no sample {shortened(what)!r}; choose from {', '.join(SAMPLES)}"
         )
     return Sketch(name, "sample", what, table.text("title", SAMPLES[what].description), rungs)
 
@@ -342,7 +347,9 @@ def _sample(table: _Table, name: str, rungs: tuple[str, ...], _folder: Path) -> 
 def _random(table: _Table, name: str, rungs: tuple[str, ...], _folder: Path) -> Sketch:
     what = table.text("random")
     if what not in SHAPES:
-        raise InputError(f"{table.at('random')}: there is no shape {what!r}; choose from {', '.join(SHAPES)}")
+        raise InputError(
+            f"{table.at('random')}: there is no shape {shortened(what)!r}; choose from {', '.join(SHAPES)}"
+        )
     seeds = table.numbers("seeds", 0, _MOST_SEED)
     title = f"random strokes on a {'full square' if what == 'full' else 'ragged part of a square'}"
     return Sketch(name, "random", what, table.text("title", title), rungs, seeds=seeds)
@@ -371,4 +378,4 @@ def _content(path: Path, place: str) -> bytes:
         raise InputError(
             f"{place}: there is no file {path}; check the path, which starts at the specification's folder"
         )
-    return read_bytes(path)
+    return read_bytes(path, MAX_BYTES)

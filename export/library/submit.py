@@ -20,10 +20,11 @@ from ..formats import FORMATS, generator
 from ..readers import read_raw
 from ..solution import Solution, read_solution
 from ..solution_text import RawSolution
-from .build import rebuild
+from .build import rebuilt
 from .index import SUMS
 from .ledger import FILE as LEDGER
 from .ledger import Record, add_record
+from .lock import changing
 from .points import complete_point, field_of
 from .sidecar import Library, problem_of, read_library
 from .verify_entry import FEASIBLE, SAME, slack
@@ -68,12 +69,29 @@ def submit_point(
     seconds, by: who found it, as the ledger keeps it. The point is taken as it is, with integers rounded. Raises InputError, SolutionError for a
     point of another entry, one that is not feasible to within 1e-8, and one that a dual bound of the library contradicts.
     """
-    file, library = Path(file), _settled(folder, progress)
+    file = Path(file)
     texts = {"solver": solver or UNKNOWN, "version": version or UNKNOWN, "by": by or UNKNOWN}
     for name, text in texts.items():
         if not text.isprintable() or len(text) > _LONGEST:
             raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
-    progress("checking the point")
+    library = _library(folder)
+    with changing(library.folder, f"a submission of {file.name}", progress):
+        library = _settled(library, progress)
+        progress("checking the point")
+        return _submitted(file, library, entry=entry, texts=texts, seconds=seconds, by=by, progress=progress)
+
+
+def _submitted(
+    file: Path,
+    library: Library,
+    *,
+    entry: str | None,
+    texts: dict[str, str],
+    seconds: float | None,
+    by: str | None,
+    progress: Progress,
+) -> Submission:
+    """What happened to a point, by a caller who holds the lock of the library."""
     sidecar, problem, solution = _found(file, library, entry)
     _check_feasible(file, sidecar["name"], solution)
     assert solution.point is not None
@@ -94,21 +112,26 @@ def submit_point(
             by=by,
         )
         add_record(library.folder, record, field)
-        rebuild(library.folder, progress=progress)
+        rebuilt(library.folder, progress=progress)
     return Submission(sidecar["name"], known, objective, better)
 
 
-def _settled(folder: str | Path, progress: Progress) -> Library:
-    """The library in a folder, after what an earlier submission that was stopped has left to do."""
+def _library(folder: str | Path) -> Library:
+    """The library in a folder. Raises InputError for an archive, and for a library of another version."""
     if Path(folder).is_file():
         raise InputError("is a file; unpack the archive and give its folder", file=folder)
     library = read_library(folder)
     if library.document["generator"] != generator():
         made = library.document["generator"]
         raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)
+    return library
+
+
+def _settled(library: Library, progress: Progress) -> Library:
+    """The library, after what an earlier submission that was stopped has left to do."""
     digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
     sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
-    return library if f"{digest}  {LEDGER}" in sums else rebuild(folder, progress=progress)
+    return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
 def _found(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:

@@ -19,6 +19,7 @@ from .archive import opened
 from .index import CHECKER, SOLU, SUMS, TEXTS
 from .ledger import FILE as LEDGER
 from .ledger import Ledger, read_ledger
+from .lock import FILE as LOCK
 from .preparing import about_file
 from .recipe import plan
 from .sidecar import INDEX, Library, read_about, read_library, read_sidecar
@@ -72,6 +73,8 @@ class _Verification:
     def _files(self) -> Iterator[Finding]:
         """Everything in the folder is a plain file."""
         for path in sorted(self.folder.iterdir()):
+            if path.name == LOCK:  # of a change under way, or of one that was killed
+                continue
             if path.is_symlink() or not path.is_file():
                 kind = "a link" if path.is_symlink() else "a folder, or no plain file"
                 yield Finding(path.name, f"is {kind}; a library is flat and holds files alone", REMOVE)
