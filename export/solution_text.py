@@ -68,7 +68,7 @@ class RawSolution:
     on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
-    order: the order of the values where there are no names.
+    order: the order of the values where there are no names. stamp: of the problem, where the solver repeated it, else empty.
     A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
     """
 
@@ -81,6 +81,7 @@ class RawSolution:
     omits_zeros: bool = False
     rows: int | None = None
     order: Order = "nl"
+    stamp: str = ""
 
     @property
     def has_point(self) -> bool:

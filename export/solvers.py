@@ -32,6 +32,7 @@ from ..models.storage import make_folder
 from .capabilities import takes_in
 from .child import run_child
 from .formats import FORMATS, write
+from .manifest import is_recordable, leave_manifest
 from .names import ONE, column_names
 from .solution import Solution, read_solution
 
@@ -165,6 +166,7 @@ def _casadi(solver: str) -> Run:
             str(job.model),
             str(job.solution),
             *limits,
+            job.problem.stamp,
         ]
         ending = run_child(command, job.log, job.limits.seconds)
         if not job.solution.exists():
@@ -241,7 +243,7 @@ def solve(
 ) -> Solution:
     """The solution that a local solver finds, read back from the file it leaves and checked.
 
-    Written file, log and solution stay in `folder` when one is given. start: a field whose complete point is handed over as
+    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the solution back. start: a field whose complete point is handed over as
     incumbent or starting point. Ctrl-C ends the solver and gives its best point so far.
     Raises UnsupportedBySolverError, MissingSolverError, SolverError, OutputError.
     """
@@ -249,18 +251,27 @@ def solve(
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
             return _solve_in(Path(temporary), problem, chosen, limits or Limits(), start)
-    return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start)
+    return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start, lasting=True)
 
 
 def _solve_in(
-    folder: Path, problem: Problem, solver: Solver, limits: Limits, start: CrossField | None
+    folder: Path,
+    problem: Problem,
+    solver: Solver,
+    limits: Limits,
+    start: CrossField | None,
+    *,
+    lasting: bool = False,
 ) -> Solution:
     stem = f"{problem.instance.name}.{problem.name}"
     model, solution, log = (
         folder / f"{stem}{suffix}"
         for suffix in (FORMATS[solver.format].suffix, f".{solver.name}.sol", f".{solver.name}.log")
     )
-    held = write(problem, model, start=start).problem
+    written = write(problem, model, start=start)
+    held = written.problem
+    if lasting and is_recordable(problem):
+        leave_manifest(problem, written, folder)
     for stale in (solution, log):
         stale.unlink(missing_ok=True)
     begin = time.perf_counter()

@@ -29,7 +29,7 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 def first_field(instance: Instance) -> CrossField:
-    """The greedy field, improved: what solvers and searches start from. Deterministic."""
+    """The greedy field, improved: what solvers and searches start from, and whose jumps `qp-fixed` has by default. Deterministic."""
     return improved(greedy(instance))
 
 
