@@ -58,6 +58,7 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
     violation = solution.violation
     facts = {
         "formulation": solution.problem.name,
+        "lifted": solution.problem.formulation.lifted,
         "status": str(solution.status),
         "message": solution.message,
         "objective_reported": solution.reported,

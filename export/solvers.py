@@ -31,7 +31,7 @@ from ..models.problem import Problem
 from ..models.storage import make_folder
 from .capabilities import takes_in
 from .child import run_child
-from .formats import FORMATS, write
+from .formats import FORMATS, carried, write
 from .manifest import is_recordable, leave_manifest
 from .names import ONE, column_names
 from .solution import Solution, read_solution
@@ -198,7 +198,7 @@ _PREFERRED: Final = ("highs", "ipopt", "bonmin")
 
 
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
-    """The solver of that name, or the preferred one for the problem's class.
+    """The solver of that name, or the preferred one for the problem's class, before those whose format holds a weaker relaxation of it.
 
     Raises UnsupportedBySolverError when it does not take the class, MissingSolverError when its package is absent.
     """
@@ -220,7 +220,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
         raise MissingSolverError(
             f"{first.name} needs the Python package {first.package}, which is not installed; pip install {first.package}"
         )
-    return installed[0]
+    return min(installed, key=lambda entry: carried(problem, FORMATS[entry.format]).formulation.weakened)
 
 
 def refusal(problem: Problem, solver: Solver) -> str:

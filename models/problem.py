@@ -512,7 +512,7 @@ def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem
 
 
 def lifted(problem: Problem) -> Problem:
-    """The same problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic."""
+    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic; see `Formulation.weakened`."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 
