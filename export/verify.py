@@ -140,8 +140,18 @@ class _Subject:
         self, consumer: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any
     ) -> Finding:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
-        groups = {"group": own, "relaxes": of} if self.held.formulation.weakened else {"group": of}
-        return Finding(_title(self.problem), self.name, consumer, step, verdict, reason, **numbers, **groups)
+        group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
+        return Finding(
+            _title(self.problem),
+            self.name,
+            consumer,
+            step,
+            verdict,
+            reason,
+            **numbers,
+            group=group,
+            relaxes=relaxes,
+        )
 
 
 def _title(problem: Problem) -> str:
