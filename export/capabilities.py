@@ -79,7 +79,7 @@ EXTERNALS: Final = {
             "a non-convex quadratic objective": Refusal("solve", "HiGHS solves convex QPs only, and may call a stationary point of another one optimal"),
         }),
         External("scip", "SCIP", ("nl", "mps", "lp", "osil")),
-        External("baron", "BARON", ("gms", "nl"), {"a cosine": Refusal("solve", "BARON has no trigonometric functions; write minlp-quartic, which is the same problem")}),
+        External("baron", "BARON", ("gms", "nl"), {"a cosine": Refusal("solve", "BARON has no trigonometric functions; write minlp-quartic, which is the same problem for whole jumps")}),
         External("bonmin", "Bonmin", ("nl", "gms"), {"non-convexity": Refusal("local", "Bonmin is exact for convex problems, elsewhere a heuristic")}),
         External("ipopt", "Ipopt", ("nl", "gms"), {
             "integers": Refusal("solve", "Ipopt drops integrality; relax it, or fix the jumps"),

@@ -1,8 +1,10 @@
 """A solver driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
-Run as a child process, `python -m crossfield.export.casadi_driver ipopt model.nl model.sol deadline gap`: a crash of a solver takes
+Run as a child process, `python -m crossfield.export.casadi_driver ipopt model.nl model.sol deadline gap stamp`: a crash of a solver takes
 the child alone, and its log is the child's output. The log's first line says that the solver starts now; from then on an
 interrupt (SIGINT) ends the search and leaves the best point so far. It ends with its parent: when its standard input closes.
+
+The stamp says of which problem the model is, and is repeated in the message.
 
 Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better points only, and the
 start is the answer when there is none.
@@ -203,13 +205,13 @@ def _without_better(words: str, code: int, model: Model, best: float | None) -> 
 
 def main(arguments: list[str]) -> int:
     """0 when a .sol was written; the solver's status stands in it."""
-    solver, path, solution, deadline, gap = arguments
+    solver, path, solution, deadline, gap, stamp = arguments
     leave_with_parent()
     model = read_model(Path(path))
     seconds = max(Deadline(float(deadline)).left(), _LEAST)
     line = f"{solver}: {model.columns} columns, {model.rows} rows, at most {seconds:.3g} s"
     ending = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201 - the log
-    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {ending.words}"
+    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {ending.words}\n{stamp}"
     write_ampl_sol(solution, message, ending.point, model.rows, ending.code, columns=model.columns)
     return 0
 

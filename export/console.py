@@ -177,6 +177,7 @@ def _is_list_of_names(name: str) -> bool:
 
 
 _ONLY_IF_ANY: Final = (
+    "lifted",
     "furthest_rounding",
     "unknown_names",
     "contradictions",

@@ -1,6 +1,7 @@
 """The table of file formats, and the one function that writes a problem to a file.
 
-A format states what it carries; what it cannot carry is lifted where that is exact, else refused by name before the first byte.
+A format states what it carries; what it cannot carry is lifted, which is exact for whole jumps and said to be a relaxation for others,
+or refused by name before the first byte.
 """
 
 from __future__ import annotations
@@ -174,7 +175,7 @@ def header(problem: Problem) -> list[str]:
     """Lines of comment that say what a file holds."""
     formulation, options = problem.formulation, problem.formulation.options
     lines = [
-        f"{generator()}: {formulation.name} (section {formulation.paper}), {problem.problem_class}, {formulation.summary}",
+        f"{generator()}: {'continuous relaxation of ' if options.relax else ''}{formulation.name} (section {formulation.paper}), {problem.problem_class}, {formulation.summary}",
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
         f"facet {options.facet}, stroke norm {options.stroke_norm}, beta norm {options.beta_norm}, integrality {'dropped' if options.relax else 'kept'}",
     ]

@@ -89,6 +89,7 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
         "gams_scalar.gms.j2",
         blocks,
         header=header,
+        stamp=problem.stamp,
         model_type=MODEL_TYPES[problem.problem_class],
         start=objective,
     )

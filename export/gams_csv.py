@@ -2,6 +2,7 @@
 
     model_status,1
     solver_status,1
+    problem,sha256_1a2b3c4d5e6f               older files have no such line
     objective, 5.565360828459345E-01
     alpha_00_00, 1.146018366025520E-01     every column in order; EPS is a zero, +INF and -INF occur, NA and UNDF are no values
 
@@ -81,6 +82,8 @@ def parse(data: bytes) -> RawSolution:
     data = with_unix_ends(data)
     cursor = Cursor(data)
     status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))
+    if data.startswith(b"problem,", cursor.position):
+        _field(cursor, b"problem")  # what reads every kind of file looks at it
     text = _field(cursor, b"objective")
     objective = None if text in _NO_VALUE else cursor.number(b"0" if text == b"EPS" else text)
     if status not in _HAS_POINT:

@@ -71,7 +71,9 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
     }
     objective = None if start is None else number(problem.objective_value(start))
     context = _data_context(problem) | _model_context(problem)
-    yield from stream("gams_indexed.gms.j2", blocks, header=header, start=objective, **context)
+    yield from stream(
+        "gams_indexed.gms.j2", blocks, header=header, stamp=problem.stamp, start=objective, **context
+    )
 
 
 def _data_context(problem: Problem) -> dict[str, Any]:

@@ -2,7 +2,7 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
 
     \ comment
     Minimize
-     obj: + 7 ONE
+     obj_sha256_1a2b3c4d5e6f: + 7 ONE  Gurobi takes this label for the model's name and repeats it in its solution, GLPK as the objective's
      + 2 s_00_00_u                     every column, in order, also with cost 0: fixes the order of columns (L16, L31)
      + [
      + 4 d_00_00_u ^2                  twice the coefficient, because of / 2 (L9, L12); no blank after the caret (L34)
@@ -38,7 +38,7 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     has_one = needs_one(problem)
     for line in header:
         yield f"\\ {line}\n".encode()
-    yield b"Minimize\n obj:"
+    yield f"Minimize\n obj_{problem.stamp}:".encode()
     yield from render([b" ", words(constant, signed), b" ONE\n"] if has_one else [b"\n"], 1)
     yield from _objective(problem, names)
     yield b"Subject To\n"

@@ -180,7 +180,7 @@ class _Sets:
                     refused[name] = str(error)
             document = _document(problem, _instance_file(problem.instance, self.folder), written, refused)
             path = stem.with_name(f"{stem.name}.manifest.json")
-            write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
+            write_bytes(path, _as_bytes(document))
             return Manifest(document, path)
 
         return manifest
@@ -191,11 +191,38 @@ class _Sets:
 
 
 def _check_recordable(problem: Problem) -> None:
-    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
-    if plain.sha256 != problem.sha256:
+    if not is_recordable(problem):
         raise InputError(
             f"a manifest cannot record {problem.name} with columns fixed or products lifted; write it as a single file"
         )
+
+
+def is_recordable(problem: Problem) -> bool:
+    """Whether formulation, options and jumps say all of a problem: no columns are fixed and no products were lifted beforehand."""
+    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
+    return plain.sha256 == problem.sha256
+
+
+def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+    """The manifest, now in the folder with the instance, of a problem of which one format was just written there.
+
+    Files of the same problem that a manifest there lists stay listed. Raises OutputError.
+    """
+    path = folder / f"{problem.instance.name}.{problem.name}.manifest.json"
+    document = _document(problem, _instance_file(problem.instance, folder), [written], {})
+    try:
+        earlier = read_manifest(path).document
+    except CrossfieldError:
+        earlier = {"sha256": ""}
+    if earlier["sha256"] == problem.sha256:
+        others = [file for file in earlier["files"] if file["name"] not in written.files]
+        document |= {"files": others + document["files"], "refused": earlier["refused"]}
+    write_bytes(path, _as_bytes(document))
+    return Manifest(document, path)
+
+
+def _as_bytes(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1) + "\n").encode()
 
 
 def write_all(
@@ -213,7 +240,7 @@ def write_all(
 ) -> list[Manifest]:
     """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
 
-    start: a field, for starting points and for the jumps of `qp-fixed`; without one the greedy baseline gives the jumps.
+    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says which.
     options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written at once.
     progress: called with each name.
     """
@@ -231,13 +258,21 @@ def write_all(
 
 def _formulated(instance: Instance, name: str, start: CrossField | None, options: dict[str, Any]) -> Problem:
     recipe = FORMULATIONS.get(name)
-    jumps = None
-    if recipe is not None and recipe.fixed:
-        from ..models.greedy import greedy
-
-        jumps = (start or greedy(instance)).p
     chosen = {key: value for key, value in options.items() if recipe is None or key in recipe.settable}
-    return formulate(instance, name, p=jumps, **chosen)
+    return formulate(instance, name, p=fixed_jumps(instance, name, start), **chosen)
+
+
+def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
+    """The jumps that a formulation takes as data, None where it has them as variables: those of `start`, by default of the improved greedy field.
+
+    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions are of one problem.
+    """
+    recipe = FORMULATIONS.get(name)
+    if recipe is None or not recipe.fixed:
+        return None
+    from ..models.improvement import first_field
+
+    return (start or first_field(instance)).p
 
 
 def _instance_file(instance: Instance, folder: Path) -> str:

@@ -60,6 +60,7 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
     violation = solution.violation
     facts = {
         "formulation": solution.problem.name,
+        "lifted": solution.problem.formulation.lifted,
         "status": str(solution.status),
         "claimed": str(solution.claimed),
         "contradictions": list(solution.contradictions),

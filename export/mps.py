@@ -1,6 +1,6 @@
 """Free MPS, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
 
-    NAME cylinder FREE                 FREE is for CBC (M20)
+    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated by Gurobi, Xpress and GLPK in their solutions; FREE is for CBC (M20)
     ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
     COLUMNS                            ` column row value`, one pair a line, `obj 0` for columns without cost (M19);
         MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
@@ -23,7 +23,7 @@ from ..models.grid import Bools, Grid, Ints
 from ..models.notation import SLOTS
 from ..models.problem import Block, Bound, Problem, Term
 from .lp import linear_costs, needs_one, scalar_when_constant
-from .names import Names
+from .names import Names, problem_name
 from .records import OnlyWhere, Piece, Pieces, Tagged, check_coefficients, number, render, words
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
@@ -34,7 +34,7 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     names = Names(problem)
     for line in header:
         yield f"* {line}\n".encode()
-    yield f"NAME {problem.instance.name} FREE\nROWS\n N obj\n".encode()
+    yield f"NAME {problem_name(problem)} FREE\nROWS\n N obj\n".encode()
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:

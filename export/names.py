@@ -25,6 +25,11 @@ OBJECTIVE: Final = b"obj"
 """Name of the objective row."""
 
 
+def problem_name(problem: Problem) -> str:
+    """Name of a problem where solvers repeat it in their solution files: instance and stamp, at most 52 letters, digits and underscores."""
+    return f"{problem.instance.name}_{problem.stamp}"
+
+
 class Names:
     """Names of a problem's columns and rows as pieces of records: a tag, and words for where the elements lie.
 

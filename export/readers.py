@@ -5,9 +5,10 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +30,7 @@ from . import (
 )
 from .solution_text import HEAD, RawSolution
 
+_STAMP = re.compile(rb"sha256_[0-9a-f]{12}(?![0-9a-f])")
 _GZIP: Final = b"\x1f\x8b"
 _LARGEST: Final = 1 << 31  # bytes that a packed file may unpack to
 
@@ -107,7 +109,7 @@ def parse_raw(data: bytes) -> RawSolution:
     head = data[:HEAD]
     for reader in READERS:
         if reader.recognises(head):
-            return reader.parse(data)
+            return replace(reader.parse(data), stamp=_stamp(head))
     known = "; ".join(reader.description for reader in READERS)
     raise SolutionError(f"this is no solution file of a known kind; give one of these: {known}")
 
@@ -120,6 +122,12 @@ def _without_mark(data: bytes) -> bytes:
         return data.decode("utf-16").encode()
     except UnicodeError as error:
         raise SolutionError("the text in UTF-16 is damaged or cut off; save it again") from error
+
+
+def _stamp(head: bytes) -> str:
+    """The stamp of a problem (`Problem.stamp`) wherever a solver repeats it: in a name or a message; empty where none does."""
+    found = _STAMP.search(head)
+    return found[0].decode() if found else ""
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -104,9 +104,16 @@ def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLE
     Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
     by the column order of the .nl, LP or MPS file. A file without a point gives a Solution without one.
     tolerance: how far the point may be off, in units of a column, before its status is no longer what the file claims.
+    Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
     Raises SolutionError, naming the file, when it is malformed or of another problem.
     """
     raw = read_raw(path)
+    if raw.stamp and raw.stamp != problem.stamp:
+        raise SolutionError(
+            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; instance, options or fixed jumps "
+            "differ, give the manifest that lies beside the solver's model",
+            file=path,
+        )
     if not raw.has_point:
         return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
     try:

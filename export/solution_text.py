@@ -94,7 +94,7 @@ class RawSolution:
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
     order: the order of the values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file
-    lists as those of rows, whose values are left out.
+    lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated it, else empty.
     A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
     """
 
@@ -109,6 +109,7 @@ class RawSolution:
     order: Order = "nl"
     bound: float | None = None
     of_rows: Bytes | None = None
+    stamp: str = ""
 
     @property
     def has_point(self) -> bool:

@@ -140,14 +140,14 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     from ..models.formulations import FORMULATIONS
     from ..models.improvement import first_field
     from ..models.problem import formulate
+    from .manifest import fixed_jumps
     from .solvers import solve
 
     known([name], FORMULATIONS, "formulation")
     instance, deadline = request.instance, Deadline.after(request.limits.seconds)
     request.progress("greedy start")
     start = request.start or first_field(instance)
-    jumps = start.p if FORMULATIONS[name].fixed else None
-    problem = formulate(instance, name, p=jumps, **request.options)
+    problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")
     solution = solve(problem, request.solver, request.folder, limits=limits, start=start)

@@ -34,7 +34,8 @@ from ..models.storage import make_folder
 from .ampl_sol import write_ampl_sol
 from .capabilities import takes_in
 from .child import Ending, run_child
-from .formats import FORMATS, write
+from .formats import FORMATS, carried, write
+from .manifest import is_recordable, leave_manifest
 from .names import ONE, column_names
 from .nl import Layout
 from .solution import Solution, read_solution
@@ -182,6 +183,7 @@ def _casadi(solver: str) -> Run:
             str(job.solution),
             repr(job.deadline.at),
             repr(float(job.limits.gap)),
+            job.problem.stamp,
         ]
         ending = run_child(command, job.log, job.deadline)
         if not job.solution.exists() and (ending.interrupted or ending.killed):
@@ -205,7 +207,7 @@ def _no_answer(solver: str, job: Job, ending: Ending) -> str:
 def _hand_over_start(solver: str, job: Job) -> None:
     """Leave the start as the answer of a solver that was stopped before it had one, if it is a point of the problem."""
     if job.start is not None and job.problem.violation(job.start).worst <= _FEASIBLE:
-        message = f"{solver}: stopped at its limit or by Ctrl-C, nothing better than the start"
+        message = f"{solver}: stopped at its limit or by Ctrl-C, nothing better than the start\n{job.problem.stamp}"
         point = job.start[Layout(job.problem).order]
         write_ampl_sol(job.solution, message, point, job.problem.row_count, _LIMIT)
 
@@ -227,7 +229,7 @@ _PREFERRED: Final = ("highs", "ipopt", "bonmin")
 
 
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
-    """The solver of that name, or the preferred one for the problem's class.
+    """The solver of that name, or the preferred one for the problem's class, before those whose format holds a weaker relaxation of it.
 
     Raises UnsupportedBySolverError when it does not take the class, MissingSolverError when its package is absent.
     """
@@ -249,7 +251,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
         raise MissingSolverError(
             f"{first.name} needs the Python package {first.package}, which is not installed; pip install {first.package}"
         )
-    return installed[0]
+    return min(installed, key=lambda entry: carried(problem, FORMATS[entry.format]).formulation.weakened)
 
 
 def refusal(problem: Problem, solver: Solver) -> str:
@@ -272,7 +274,7 @@ def solve(
 ) -> Solution:
     """The solution that a local solver finds, read back from the file it leaves and checked, all within the time limit.
 
-    Written file, log and solution stay in `folder` when one is given. start: a field whose complete point is handed over as
+    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the solution back. start: a field whose complete point is handed over as
     incumbent or starting point. Ctrl-C ends the solver and gives its best point so far.
     Raises UnsupportedBySolverError, MissingSolverError, SolverError, OutputError.
     """
@@ -280,11 +282,17 @@ def solve(
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
             return _solve_in(Path(temporary), problem, chosen, limits or Limits(), start)
-    return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start)
+    return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start, lasting=True)
 
 
 def _solve_in(
-    folder: Path, problem: Problem, solver: Solver, limits: Limits, start: CrossField | None
+    folder: Path,
+    problem: Problem,
+    solver: Solver,
+    limits: Limits,
+    start: CrossField | None,
+    *,
+    lasting: bool = False,
 ) -> Solution:
     deadline = Deadline.after(limits.seconds)
     stem = f"{problem.instance.name}.{problem.name}"
@@ -292,7 +300,10 @@ def _solve_in(
         folder / f"{stem}{suffix}"
         for suffix in (FORMATS[solver.format].suffix, f".{solver.name}.sol", f".{solver.name}.log")
     )
-    held = write(problem, model, start=start).problem
+    written = write(problem, model, start=start)
+    held = written.problem
+    if lasting and is_recordable(problem):
+        leave_manifest(problem, written, folder)
     for stale in (solution, log):
         stale.unlink(missing_ok=True)
     begin = time.perf_counter()

@@ -92,7 +92,7 @@ def _carriage(problem: Problem, name: str) -> str:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError:
         return f"refused: write {problem.formulation.equivalent}"
-    return "lifted, exact" if held.formulation.lifted else "yes"
+    return "lifted, exact; relaxed, weaker" if held.formulation.lifted else "yes"
 
 
 def _format_row(name: str) -> Row:

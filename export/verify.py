@@ -3,7 +3,7 @@
 For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its format. What a program reads
 is compared with the problem by name: sense, constant, costs, quadratic terms, types, bounds, rows; and as numbers at random points.
 With `seconds`, each solver solves it: the point is checked against the problem, its energy computed again, and the optima of one
-formulation compared with each other. Nothing passes silently: what was not tried is a finding, with its reason.
+problem compared with each other across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes silently: what was not tried is a finding, with its reason.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class Finding:
     """What became of a file at a consumer: reading it, or solving it with one of its solvers.
 
     problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound; energy: the objective
-    again, with every other column at the value that follows from angles and jumps. group: where it is equal, so is the optimum.
+    again, with every other column at the value that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the
+    group of which the file holds a relaxation, whose optimum is no higher.
     """
 
     problem: str
@@ -85,6 +86,7 @@ class Finding:
     seconds: float | None = None
     proven: bool = False
     group: str = ""
+    relaxes: str = ""
 
 
 @dataclass(frozen=True)
@@ -137,10 +139,18 @@ class _Subject:
     def finding(
         self, consumer: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any
     ) -> Finding:
-        # Lifting is exact for integer jumps only: relaxed, the lifted problem is another one.
-        of = self.problem if self.problem.integer.any() else self.held
+        own, of = self.held.sha256[:16], self.problem.sha256[:16]
+        group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
         return Finding(
-            _title(self.problem), self.name, consumer, step, verdict, reason, **numbers, group=of.sha256[:16]
+            _title(self.problem),
+            self.name,
+            consumer,
+            step,
+            verdict,
+            reason,
+            **numbers,
+            group=group,
+            relaxes=relaxes,
         )
 
 
@@ -178,7 +188,7 @@ def verify(
                 for subject in chosen:
                     progress(f"{subject.name}: {consumer.title}")
                     found.findings.extend(bench.findings(subject))
-    found.findings[:] = _compared(found.findings)
+    found.findings[:] = compared(found.findings)
     write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
     return found
 
@@ -200,6 +210,9 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             path = _unpacked(source, place)
             if path.suffix == FORMATS[entry["format"]].suffix:
                 held = carried(problem, FORMATS[entry["format"]])
+                if entry["lifted"] != held.formulation.lifted:
+                    words = f"the manifest says of it {entry['lifted']!r}, and it holds {held.formulation.lifted!r}; export again"
+                    broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
                 points = place / f"points_{len(held.blocks)}.npz"
                 if not points.exists():
                     save(_points(held), points)
@@ -400,30 +413,51 @@ def same(first: float, second: float) -> bool:
     return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
 
 
-def _compared(findings: list[Finding]) -> list[Finding]:
-    """The findings, those solves marked as different whose proven optimum, or whose bound, contradicts the best of their formulation."""
+def compared(findings: list[Finding]) -> list[Finding]:
+    """The findings, those solves marked as different whose proven optimum, or whose bound, contradicts the best of their problem."""
     return [_against(finding, findings) for finding in findings]
 
 
 def _against(finding: Finding, findings: list[Finding]) -> Finding:
     if finding.step != "solve" or finding.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
         return finding
-    values = [
-        each.objective for each in findings if each.group == finding.group and each.objective is not None
-    ]
-    best = min(values, default=None)
+    wrong = _beside_others(finding, findings) or _above_what_it_relaxes(finding, findings)
+    if wrong:
+        return replace(finding, verdict=Verdict.DIFFERS, reason=wrong)
+    return replace(finding, reason=_as_relaxation(finding, findings)) if finding.relaxes else finding
+
+
+def _beside_others(finding: Finding, findings: list[Finding]) -> str:
+    """How a proven optimum or a bound contradicts the best point of the same problem; empty when it does not."""
+    best = _best(findings, finding.group)
     if best is None:
-        return finding
+        return ""
     if finding.proven and finding.objective is not None and not same(finding.objective, best):
-        return replace(
-            finding,
-            verdict=Verdict.DIFFERS,
-            reason=f"its optimum is {finding.objective:.9g}, another has {best:.9g}",
-        )
+        return f"its optimum is {finding.objective:.9g}, another has {best:.9g}"
     if finding.bound is not None and finding.bound > best and not same(finding.bound, best):
-        return replace(
-            finding,
-            verdict=Verdict.DIFFERS,
-            reason=f"its bound {finding.bound:.9g} is above a point of {best:.9g}",
-        )
-    return finding
+        return f"its bound {finding.bound:.9g} is above a point of {best:.9g}"
+    return ""
+
+
+def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
+    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when it does not."""
+    best = _best(findings, finding.relaxes)
+    lower = finding.objective if finding.proven else finding.bound
+    if best is None or lower is None or lower <= best or same(lower, best):
+        return ""
+    return f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {best:.9g}"
+
+
+def _as_relaxation(finding: Finding, findings: list[Finding]) -> str:
+    """What is told of the solve of a relaxation: beside the best point of the problem itself, where one was found."""
+    best, told = _best(findings, finding.relaxes), f"; {finding.reason}" if finding.reason else ""
+    beside = (
+        f", no higher than {best:.9g} of the problem itself" if best is not None and finding.proven else ""
+    )
+    return f"a relaxation: products lifted without integrality{beside}{told}"
+
+
+def _best(findings: list[Finding], group: str) -> float | None:
+    """The least objective that was found in a group."""
+    values = [each.objective for each in findings if each.group == group and each.objective is not None]
+    return min(values, default=None)

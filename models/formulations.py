@@ -95,7 +95,7 @@ class Formulation:
     """A declared formulation: names, families, and what is known of it.
 
     fixed: variables that are data (p1, p2 of `qp-fixed`); convex: of the continuous relaxation;
-    equivalent: another formulation of the very same problem; lifted: how products were lifted, empty when they were not.
+    equivalent: another formulation of the very same problem, empty for a relaxation; lifted: how products were lifted, empty when they were not.
     """
 
     name: str
@@ -118,6 +118,11 @@ class Formulation:
             for symbol in family.symbols
         }
         return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
+
+    @property
+    def weakened(self) -> bool:
+        """Whether lifting made it a relaxation of itself: z between its facets is p1 beta_i at p1 = 0 and 1 alone, and here p1 may lie between."""
+        return bool(self.lifted) and self.options.relax
 
 
 def on_pairs(tag: str, expression: sp.Expr, paper: str, only: tuple[str, int] | None = None) -> Family:
@@ -291,7 +296,7 @@ def declare(name: str, **chosen: Any) -> Formulation:
         rows=(*recipe.smooth_rows(options.facet), *stroke_rows, *skew_rows),
         convex=recipe.convex,
         fixed=recipe.fixed,
-        equivalent=recipe.equivalent,
+        equivalent="" if options.relax else recipe.equivalent,
     )
 
 
@@ -313,10 +318,14 @@ def _options(recipe: Recipe, chosen: dict[str, Any]) -> Options:
     return options
 
 
-def lift_products(formulation: Formulation) -> Formulation:
-    """The same problem with z for every product p1 beta_i, and the hull facets that make it exact.
+_EXACT: Final = "z = p1 beta_i with the hull facets (26)-(29), exact"
+_WEAKER: Final = "z for p1 beta_i between the hull facets (26)-(29), a relaxation: p1 is not only 0 or 1 here; .nl and .gms hold the products"
 
-    For formats that hold nothing beyond quadratic. A square stays a square of a linear expression, so that (8) becomes convex;
+
+def lift_products(formulation: Formulation) -> Formulation:
+    """The formulation with z for every product p1 beta_i, and its hull facets: the same problem while p1 is 0 or 1.
+
+    For formats that hold nothing beyond quadratic. With integrality dropped the result is a relaxation (see `weakened`). A square stays a square of a linear expression, so that (8) becomes convex;
     (9) stays the expanded polynomial with 4 z beta_j.
     """
     lifted = tuple(replace(family, expression=_lift(family.expression)) for family in formulation.objective)
@@ -325,7 +334,7 @@ def lift_products(formulation: Formulation) -> Formulation:
         objective=lifted,
         rows=(*product_rows("hull"), *formulation.rows),
         convex=all(map(_is_sum_of_squares, lifted)),
-        lifted="z = p1 beta_i with the hull facets (26)-(29), exact",
+        lifted=_WEAKER if formulation.options.relax else _EXACT,
     )
 
 

@@ -30,7 +30,10 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """The greedy field, improved, as far as time allows: what solvers and searches start from. Deterministic where it does."""
+    """The greedy field, improved as far as time allows: what solvers and searches start from, and whose jumps `qp-fixed` has by default.
+
+    Deterministic where time does not cut it off.
+    """
     return improved(greedy(instance, over=over), over)
 
 

@@ -419,7 +419,15 @@ class Problem:
     @cached_property
     def sha256(self) -> str:
         """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
-        text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {self.formulation.lifted}"
+        return self._digest(self.formulation.lifted)
+
+    @cached_property
+    def stamp(self) -> str:
+        """`sha256_` and the first 12 digits of the hash before products were lifted: the one that a manifest has, short enough for names."""
+        return f"sha256_{self._digest('')[:12]}"
+
+    def _digest(self, lifting: str) -> str:
+        text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {lifting}"
         digest = hashlib.sha256(text.encode())
         for jumps in (self.jumps, None if self.pinned is None else self.pinned.p):
             digest.update(b"" if jumps is None else jumps.astype("<i4").tobytes())
@@ -503,7 +511,7 @@ def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem
 
 
 def lifted(problem: Problem) -> Problem:
-    """The same problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic."""
+    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic; see `Formulation.weakened`."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 

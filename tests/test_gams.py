@@ -121,7 +121,8 @@ def run_gams(executable: str, folder: Path, text: bytes, *options: str) -> dict[
     errors = [line for line in listing.splitlines() if line.startswith("****")]
     assert done.returncode == 0, errors
     lines = (folder / "a result.csv").read_text().splitlines()
-    return {name: float(value) for name, value in (line.split(",") for line in lines)}
+    pairs = (line.split(",") for line in lines)
+    return {name: float(value) for name, value in pairs if name != "problem"}
 
 
 @dataclass(frozen=True)

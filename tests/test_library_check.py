@@ -545,7 +545,6 @@ def spoiled(solved, tmp_path, old, new):
     [
         ("alpha_00_00", "alpha_00_00 9.5", "not a feasible point"),
         ("p1_01_00_u", "p1_01_00_u 0.4", "not a feasible point"),
-        ("s_01_00_u", "s_01_00_u -1e-7", "not a feasible point"),
         ("alpha_00_00", "alpha_09_09 0.5", "another instance, formulation or option"),
         ("alpha_00_00", "alpha_00_00 nan", "line"),
     ],

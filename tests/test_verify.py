@@ -156,7 +156,7 @@ WRONG = {
     "sign": ("milp-mccormick", "lp", r"(c15_00_00_r:.* )\+ 1 alpha", r"\1- 1 alpha"),
     "name": ("milp-mccormick", "lp", r"\bz_00_00_r\b", "zz_00_00_r"),
     "half": ("miqp-exact", "lp", r"4 d_00_00_r \^2", "2 d_00_00_r ^2"),
-    "constant": ("miqp-exact", "lp", r"obj: \+ \S+ ONE", "obj: + 1 ONE"),
+    "constant": ("miqp-exact", "lp", r"obj(\w*): \+ \S+ ONE", r"obj\1: + 1 ONE"),
     "double": ("miqp-exact", "mps", r" d_00_00_r d_00_00_r 4", " d_00_00_r d_00_00_r 8"),
     "product": ("miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"),
     "number": ("minlp-quartic", "nl", r"\nn1\.5707963267948966\n", "\nn1.571\n"),

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from ...models.errors import CrossfieldError
-from ...models.storage import make_folder, read_bytes, write_bytes
+from ...models.storage import make_folder, write_bytes
 from .entry import Entry, make_entry
 from .index import write_index
-from .ledger import Ledger, Record, keep, merged, read_ledger
+from .inputs import Inputs
+from .ledger import Ledger, keep, merged, read_ledger
 from .lock import changing
-from .points import Provenance
-from .preparing import Files, Preparation, Submitted, about_file, prepare
+from .preparing import Files, about_file, prepare
 from .recipe import InstancePlan, plan
 from .schedule import Tasks, ahead, executor
 from .sidecar import Library, are_whole, read_about, read_library, read_sidecar
@@ -110,25 +110,21 @@ class _Build:
     def __init__(
         self, folder: Path, ledger: Ledger, plans: Iterable[InstancePlan], tasks: Tasks, progress: Progress
     ) -> None:
-        self.folder, self.ledger, self.tasks, self.progress = folder, ledger, tasks, progress
-        names = [entry.name for each in plans for entry in each.entries]
-        self.total, self.done = len(names), 0
-        self.relatives: dict[str, list[str]] = {}
-        for each in plans:
-            self.relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
+        self.folder, self.tasks, self.progress = folder, tasks, progress
+        self.inputs = Inputs(ledger, plans)
+        self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
 
     def begin(self, each: InstancePlan) -> None:
         """Have an instance made, unless it is whole, and then its entries."""
-        submitted = self._submitted(each)
-        task = Preparation(each.recipe, submitted)
+        task = self.inputs.preparation(each)
         about = self._whole(task.name, task.sha256)
         if about is not None:
-            self._entries(each, about, submitted)
+            self._entries(each, about)
             return
 
         def finish(files: Files) -> None:
             self._write(files)
-            self._entries(each, read_about(self.folder / about_file(task.name)), submitted)
+            self._entries(each, read_about(self.folder / about_file(task.name)))
 
         self.tasks.add(prepare, task, finish)
 
@@ -140,12 +136,8 @@ class _Build:
             return None
         return about if about["recipe_sha256"] == sha256 and are_whole(self.folder, about["files"]) else None
 
-    def _entries(self, each: InstancePlan, about: dict[str, Any], submitted: tuple[Submitted, ...]) -> None:
-        files = {facts["name"]: read_bytes(self.folder / facts["name"]) for facts in about["files"]}
-        relatives = tuple(self.relatives[_relation(each)])
-        records = self._records(each)
-        for recipe in reversed(each.entries):
-            task = Entry(recipe, about, files, records, submitted, relatives)
+    def _entries(self, each: InstancePlan, about: dict[str, Any]) -> None:
+        for task in reversed(list(self.inputs.entries(each, about, self.folder))):
             if self._is_done(task):
                 self.done += 1
             else:
@@ -166,25 +158,6 @@ class _Build:
             return False
         return sidecar["recipe_sha256"] == task.sha256 and are_whole(self.folder, sidecar["files"])
 
-    def _records(self, each: InstancePlan) -> tuple[Record, ...]:
-        names = {entry.name for entry in each.entries}
-        return tuple(record for record in self.ledger.records if record.entry in names)
-
-    def _submitted(self, each: InstancePlan) -> tuple[Submitted, ...]:
-        """The fields that the ledger keeps for the entries of an instance."""
-        records = (self.ledger.with_point(entry.name) for entry in each.entries)
-        return tuple(self._submission(record) for record in records if record is not None)
-
-    def _submission(self, record: Record) -> Submitted:
-        self.ledger.field(record)  # damage is told here, with the file's name
-        provenance = Provenance(record.solver, record.version, record.seconds, record.by)
-        return Submitted(read_bytes(self.ledger.path(record)), provenance)
-
     def _write(self, files: Files) -> None:
         for name, data in files.items():
             write_bytes(self.folder / name, data)
-
-
-def _relation(each: InstancePlan) -> str:
-    """What instances share whose entries may be related: everything but the gauge."""
-    return each.recipe.name.removesuffix("_box")

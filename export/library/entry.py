@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ...models.errors import UnsupportedByFormatError
+from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field_file import read_field
 from ...models.formulations import FORMULATIONS
 from ...models.grid import Ints
@@ -26,12 +26,14 @@ from ..nl import Layout
 from ..records import number
 from ..starts import Start, start_of
 from .counts import counts, curvature, probtype, ranges, tangent_bound
+from .dual_bounds import contradicts, cut, is_proven, relative_gap
+from .ledger import FILE as LEDGER
 from .ledger import Record
 from .points import Best, Known, Provenance, best_point, complete_point, ours
 from .preparing import Files, Submitted
 from .recipe import EntryRecipe, digest
 from .relations import equivalent, not_equivalent, notes_of, siblings, transformations
-from .sidecar import FORMAT, LICENCE, VERSION, as_bytes, is_proven, listed_jumps, relative_gap
+from .sidecar import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
 
 REFERENCES = (
     "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization: the formulations, whose equation numbers are in the names of the rows",
@@ -162,7 +164,21 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
         chosen.setdefault(record.solver, record)
     found = [_bound(record, task.name) for record in sorted(chosen.values(), key=lambda each: each.solver)]
     tangent = tangent_bound(best.problem, best.point)
-    return found if tangent is None else [*found, _tangent(tangent)]
+    if tangent is not None:
+        found.append(_tangent(tangent))
+    return [each | {"bound": _within(each, best, task.name)} for each in found]
+
+
+def _within(told: dict[str, Any], best: Best, entry: str) -> float:
+    """A bound, cut to the objective of the best point. Raises InputError for one that the point contradicts."""
+    bound = float(told["bound"])
+    if contradicts(bound, best.objective):
+        raise InputError(
+            f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, but {entry} has a feasible point of {best.objective!r}; "
+            "that bound is wrong, take its record out",
+            file=LEDGER,
+        )
+    return cut(bound, best.objective)
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:

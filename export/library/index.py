@@ -32,7 +32,7 @@ def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None
     """Write all that is about the library as a whole, SHA256SUMS last; files of entries that are no longer in it are removed."""
     plans = tuple(plans)
     sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
-    written = _general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
+    written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
     for name, data in written.items():
         write_bytes(folder / name, data)
     present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *_of_ledger(folder)]
@@ -41,8 +41,8 @@ def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None
     write_bytes(folder / SUMS, sums.encode())
 
 
-def _general(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, bytes]:
-    """Texts, drawings, checker and library.solu."""
+def general(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, bytes]:
+    """The files that tell of the library as a whole, by name: texts, drawings, checker and library.solu."""
     context = _context(spec, sidecars)
     texts = {name: ENVIRONMENT.get_template(f"library_{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}

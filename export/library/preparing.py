@@ -123,7 +123,7 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         "title": task.recipe.sketch.title,
         "rung": task.recipe.rung,
         "generator": generator(),
-        "source": _source(instance, task.recipe),
+        "source": source_of(instance, task.recipe),
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
@@ -140,7 +140,8 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
     }
 
 
-def _source(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
+def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
+    """What is told of where an instance comes from."""
     parameters: dict[str, Any] = {"w_strokes": instance.w_strokes, "w_beta": instance.w_beta}
     if recipe.sketch.kind == "random":
         parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": STROKE_SHARE}

@@ -30,8 +30,6 @@ ABOUT_FORMAT: Final = "crossfield-library-instance"
 VERSION: Final = 1
 INDEX: Final = "library.json"
 LICENCE: Final = "CC-BY-4.0"
-PROVEN: Final = (1e-6, 1e-9)
-"""A point is optimal when it is no further above a dual bound than this: relative to its objective, plus this much."""
 
 _EXPORT: Final = __package__.rpartition(".")[0]
 
@@ -143,13 +141,3 @@ def are_whole(folder: Path, files: Iterable[dict[str, Any]]) -> bool:
     """Whether every listed file is in the folder with its SHA-256."""
     paths = ((folder / each["name"], each["sha256"]) for each in files)
     return all(path.is_file() and sha256_of(path) == expected for path, expected in paths)
-
-
-def is_proven(objective: float, bound: float) -> bool:
-    """Whether a point of that objective is optimal by a dual bound: see PROVEN."""
-    return objective - bound <= PROVEN[0] * abs(objective) + PROVEN[1]
-
-
-def relative_gap(objective: float, bound: float) -> float:
-    """Objective minus bound over the objective's size, at least 0; 1 is the most that is told of an objective near 0."""
-    return min(max(objective - bound, 0.0) / max(abs(objective), PROVEN[1]), 1.0)

@@ -18,6 +18,7 @@ from ..solution import Solution, read_solution
 from ..solution_text import Status
 from ..solvers import SOLVERS, Limits, refusal, solve
 from .build import rebuild
+from .dual_bounds import contradicts
 from .ledger import Ending, Record, add_record, read_ledger
 from .lock import changing
 from .points import complete_point, field_of
@@ -124,13 +125,13 @@ def _run(
     if found.interrupted:
         raise KeyboardInterrupt
     seconds = None if found.seconds is None else round(found.seconds, 3)
-    record = replace(record, bound=_bound(problem, solver, found), seconds=seconds)
+    best = document["best"]["objective"]
+    record = replace(record, bound=_bound(problem, solver, found, best), seconds=seconds)
     if found.point is None:
         return record, None
     field = field_of(found.problem, found.point)
     primal = problem.objective_value(complete_point(problem, field))
     record = replace(record, status=_ending(problem, solver, found), primal=primal)
-    best = document["best"]["objective"]
     return record, field if primal < best - _BETTER * max(abs(best), _BETTER) else None
 
 
@@ -152,10 +153,11 @@ def _proves(problem: Problem, solver: str, found: Solution) -> bool:
     return ended and problem.convex and solver in _PROVES
 
 
-def _bound(problem: Problem, solver: str, found: Solution) -> float | None:
-    """The dual bound that the solver tells; where it tells none and proves an optimum, that optimum less the gap it was allowed."""
+def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:
+    """The dual bound that the solver tells, unless a feasible point contradicts it; where it tells none and proves an optimum, that less the gap it was allowed."""
     if found.bound is not None:
-        return found.bound
+        return None if contradicts(found.bound, known) else found.bound
     if found.objective is None or not _proves(problem, solver, found):
         return None
-    return found.objective - GAP * abs(found.objective)
+    bound = found.objective - GAP * abs(found.objective)
+    return None if contradicts(bound, known) else bound

@@ -9,25 +9,26 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ...models.errors import CrossfieldError, InputError, SolutionError
-from ...models.problem import Problem
+from ...models.problem import Problem, Violation
 from ...models.storage import read_bytes
 from ..formats import FORMATS, generator
 from ..readers import read_raw
 from ..solution import Solution, read_solution
 from ..solution_text import RawSolution
 from .build import rebuilt
+from .dual_bounds import contradicts
 from .index import SUMS
 from .ledger import FILE as LEDGER
 from .ledger import Record, add_record
 from .lock import changing
 from .points import complete_point, field_of
 from .sidecar import Library, problem_of, read_library
-from .verify_entry import FEASIBLE, SAME, slack
+from .verify_finding import FEASIBLE, SAME
 
 UNKNOWN: Final = "unknown"
 _LONGEST: Final = 200  # characters of a text in the ledger
@@ -66,7 +67,7 @@ def submit_point(
     """What happened to the point in a solution file of any kind that is read.
 
     entry: name of the entry; by default the one with which the file's name begins, or the only one whose columns the file has. solver, version,
-    seconds, by: who found it, as the ledger keeps it. The point is taken as it is, with integers rounded. Raises InputError, SolutionError for a
+    seconds, by: who found it, as the ledger keeps it. Angles and jumps are taken as they are, integers rounded, and all else computed again. Raises InputError, SolutionError for a
     point of another entry, one that is not feasible to within 1e-8, and one that a dual bound of the library contradicts.
     """
     file = Path(file)
@@ -93,7 +94,7 @@ def _submitted(
 ) -> Submission:
     """What happened to a point, by a caller who holds the lock of the library."""
     sidecar, problem, solution = _found(file, library, entry)
-    _check_feasible(file, sidecar["name"], solution)
+    _check_feasible(file, sidecar["name"], problem, solution)
     assert solution.point is not None
     field = field_of(solution.problem, solution.point)
     objective = problem.objective_value(complete_point(problem, field))
@@ -186,12 +187,14 @@ def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Librar
     return found.unknown == 0 and (beyond or not found.problem.formulation.lifted)
 
 
-def _check_feasible(file: Path, entry: str, solution: Solution) -> None:
-    """Nothing, when the point is feasible. Raises SolutionError with the worst violations."""
-    found = solution.violation
-    if found is not None and found.worst <= FEASIBLE:
+def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
+    """Nothing, when angles and jumps are feasible. Raises SolutionError with the worst violations.
+
+    Every other column follows from them and is computed again, so that a solver's tolerance in those rows does not count.
+    """
+    found = _violation(problem, solution)
+    if found.worst <= FEASIBLE:
         return
-    assert found is not None
     worst = f" (family {found.worst_family})" if found.rows > FEASIBLE else ""
     raise SolutionError(
         f"is not a feasible point of {entry}: violations of rows {found.rows:.3g}{worst}, bounds {found.bounds:.3g}, integrality "
@@ -200,10 +203,18 @@ def _check_feasible(file: Path, entry: str, solution: Solution) -> None:
     )
 
 
+def _violation(problem: Problem, solution: Solution) -> Violation:
+    """The worst violations of angles and jumps as the file has them, with every other column at the value that follows from them."""
+    assert solution.point is not None
+    assert solution.violation is not None
+    completed = problem.violation(complete_point(problem, solution.field))
+    return replace(completed, integrality=solution.violation.integrality)
+
+
 def _check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
     """Nothing, when no dual bound lies above the objective of a feasible point. Raises SolutionError."""
     bound = sidecar["bound"]
-    if bound is not None and bound - objective > slack(objective):
+    if bound is not None and contradicts(bound, objective):
         raise SolutionError(
             f"is feasible with objective {objective!r}, but the library has the dual bound {bound!r} of {sidecar['name']}; "
             f"that bound is wrong, take its record out of {LEDGER} first",

@@ -16,14 +16,18 @@ from ...models.field_file import read_field
 from ...models.storage import read_bytes, sha256_of
 from ..formats import generator
 from .archive import opened
-from .index import CHECKER, SOLU, SUMS, TEXTS
+from .entry import Entry
+from .index import CHECKER, SOLU, SUMS, TEXTS, general
+from .inputs import Inputs
 from .ledger import FILE as LEDGER
 from .ledger import Ledger, read_ledger
 from .lock import FILE as LOCK
+from .made_again import instance_findings
 from .preparing import about_file
 from .recipe import plan
 from .sidecar import INDEX, Library, read_about, read_library, read_sidecar
-from .verify_entry import BUILD, Finding, close, of_error, verify_entry
+from .verify_entry import verify_entry
+from .verify_finding import BUILD, Finding, close, of_error
 
 FETCH: Final = "fetch it again, or build the library again"
 REMOVE: Final = "remove it"
@@ -46,11 +50,12 @@ def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lamb
 
 
 class _Verification:
-    """A verification under way: which files are there, and which of them belong to something."""
+    """A verification under way: which files are there, which are not as SHA256SUMS says, and which belong to something."""
 
     def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
         self.folder, self.progress = folder, progress
         self.present: set[str] = set()
+        self.damaged: set[str] = set()
         self.known = {SUMS, INDEX, LEDGER, SOLU, CHECKER, *TEXTS}
 
     def findings(self) -> Iterator[Finding]:
@@ -108,6 +113,7 @@ class _Verification:
         if name not in self.present:
             yield Finding(name, "is missing", FETCH)
         elif sha256_of(self.folder / name) != expected:
+            self.damaged.add(name)
             yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
 
     def _index(self, library: Library) -> Iterator[Finding]:
@@ -147,7 +153,7 @@ class _Verification:
             yield of_error(error, LEDGER)
             ledger = Ledger(self.folder)
         yield from self._ledger(ledger, library)
-        sidecars = []
+        inputs, sidecars, sound = self._inputs(library, ledger), [], True
         names = library.document["entries"]
         for number, name in enumerate(names, 1):
             self.progress(f"{number} of {len(names)}: {name}")
@@ -159,18 +165,54 @@ class _Verification:
                 continue
             sidecars.append(sidecar)
             self.known |= {file["name"] for file in sidecar["files"]}
-            yield from self._entry(name, sidecar, ledger)
-        yield from self._instances(sidecars)
+            wrong = list(self._entry(name, sidecar, ledger, inputs))
+            yield from wrong
+            sound = sound and not wrong
+        yield from self._instances(sidecars, inputs)
         yield from self._solu(sidecars)
+        if sound and len(sidecars) == len(names):
+            yield from self._texts(library, sidecars)
 
-    def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger) -> Iterator[Finding]:
+    def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
+        """What the library was made of; nothing, when its specification is damaged, which is told with the index."""
+        try:
+            return Inputs(ledger, plan(library.spec))
+        except CrossfieldError:
+            return Inputs(ledger, ())
+
+    def _task(self, name: str, inputs: Inputs) -> Entry | None:
+        """What an entry was made of; None where that is damaged or missing, which is told elsewhere."""
+        for each in inputs.plans:
+            if name in {entry.name for entry in each.entries}:
+                try:
+                    about = read_about(self.folder / about_file(each.recipe.name))
+                    return next(
+                        task for task in inputs.entries(each, about, self.folder) if task.name == name
+                    )
+                except CrossfieldError:
+                    return None
+        return None
+
+    def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
+        """Texts and drawings are those that this version makes of sound sidecars."""
+        if library.document["generator"] != generator():
+            return
+        try:
+            made = general(library.spec, sidecars)
+        except CrossfieldError:
+            return  # told with the index
+        for name in sorted({*made} - {CHECKER, SOLU}):
+            if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
+                yield Finding(name, "is not what follows from the specification and the sidecars", BUILD)
+
+    def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger, inputs: Inputs) -> Iterator[Finding]:
         if sidecar["name"] != name:
             yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}", BUILD)
         lost = list(self._listed(f"{name}.json", sidecar["files"]))
         yield from lost
         try:
             if not lost:
-                yield from verify_entry(self.folder, sidecar, ledger)
+                yield from verify_entry(self.folder, sidecar, ledger, self._task(name, inputs))
         except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
             yield Finding(f"{name}.json", "holds values that no entry can have", BUILD)
 
@@ -200,7 +242,7 @@ class _Verification:
                 except CrossfieldError as error:
                     yield of_error(error, record.point)
 
-    def _instances(self, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
+    def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
         """Every instance with its fields is as its own document says, and as the sidecars of its entries do."""
         self.progress("instances")
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
@@ -219,6 +261,17 @@ class _Verification:
                 yield Finding(name, "is about another instance than the sidecars of its entries", BUILD)
             elif not lost:
                 yield from self._fields(name, about)
+                yield from self._recipe(name, about, inputs)
+
+    def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
+        """An instance is told to be what its recipe says, made by the same version."""
+        planned = [each for each in inputs.plans if about_file(each.recipe.name) == name]
+        if about["generator"] != generator() or not planned:
+            return
+        try:
+            yield from instance_findings(self.folder, name, about, inputs.preparation(planned[0]))
+        except CrossfieldError as error:
+            yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
         """Every field is on its instance and has the energies that are told of it; the least ones are least."""

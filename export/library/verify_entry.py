@@ -1,80 +1,62 @@
 """Checking an entry of a library against its problem, formulated again from the instance: facts, model files, points, bounds.
 
-Model files are written again and compared with what is in the library, unpacked; the best known point is read by the readers of solution
+The entry is made again from what it was made of, and compared with what is in the library, model files unpacked; the best known point is read by the readers of solution
 files and evaluated, and, by the checker that ships with every library, against the .mps and the instance without any rounding.
 """
 
 from __future__ import annotations
 
-import gzip
-import tempfile
-import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from ...models.errors import CrossfieldError, UnsupportedByFormatError
+from ...models.errors import CrossfieldError
 from ...models.problem import Problem
-from ..formats import FORMATS, generator, write
+from ..formats import generator
 from ..solution import Solution, read_solution
 from .check_point import BadInputError, check
 from .counts import counts, curvature, probtype, ranges
+from .dual_bounds import is_proven, relative_gap
+from .entry import Entry
+from .ledger import FILE as LEDGER
 from .ledger import Ledger
+from .made_again import entry_findings
 from .points import complete_point
-from .sidecar import is_proven, problem_of, relative_gap
-
-BUILD: Final = "build the library again"
-FEASIBLE: Final = 1e-8
-"""The greatest violation of a point that a library takes."""
-SAME: Final = 1e-9
-"""Objectives this close, relative to their size or absolute, are the same."""
-_BLOCK: Final = 1 << 20
+from .sidecar import problem_of
+from .verify_finding import BUILD, FEASIBLE, Finding, close, of_error
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something that is wrong with a library: in which file, what, and what helps."""
+def verify_entry(
+    folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None
+) -> Iterator[Finding]:
+    """What is wrong with an entry whose sidecar obeys its schema and whose files are those that it lists.
 
-    file: str
-    what: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"{self.file}: {self.what}; {self.remedy}"
-
-
-def of_error(error: CrossfieldError, file: str) -> Finding:
-    """An error about a file as a finding; its message names what is wrong and what helps."""
-    message = str(error).removeprefix(f"{error.file}: ")
-    what, _, remedy = message.partition("; ")
-    return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message, BUILD)
-
-
-def close(first: float, second: float) -> bool:
-    """Whether two objectives are the same up to rounding."""
-    try:
-        return abs(first - second) <= SAME * max(1.0, abs(first), abs(second))
-    except OverflowError:  # JSON may hold whole numbers beyond all doubles
-        return False
-
-
-def verify_entry(folder: Path, sidecar: dict[str, Any], ledger: Ledger) -> Iterator[Finding]:
-    """What is wrong with an entry whose sidecar obeys its schema and whose files are those that it lists."""
+    task: what it was made of; None where that is damaged or missing, which is told elsewhere.
+    """
     name = f"{sidecar['name']}.json"
     try:
         problem = problem_of(folder, sidecar)
     except CrossfieldError as error:
         yield of_error(error, Path(error.file or name).name)
         return
-    yield from _facts(name, sidecar, problem)
-    yield from _models(folder, sidecar, problem)
+    if sidecar["generator"] != generator():
+        made = f"was made by {sidecar['generator']}, so that {generator()} cannot make it again to compare it"
+        yield Finding(name, made, f"verify with {sidecar['generator']}")
+        task = None
+    yield from _facts(name, sidecar, problem) if task is None else _again(folder, sidecar, task)
     if sidecar["best"] is not None:
         yield from _points(folder, sidecar, problem)
         yield from _exactly(folder, sidecar)
         yield from _unused(sidecar, problem, ledger)
     yield from _bounds(name, sidecar)
+
+
+def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
+    """What differs from the entry made again, or why it cannot be made."""
+    try:
+        yield from entry_findings(folder, sidecar, task)
+    except CrossfieldError as error:
+        yield of_error(error, Path(error.file or f"{task.name}.json").name)
 
 
 def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
@@ -93,46 +75,6 @@ def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Fin
     for key, value in facts.items():
         if sidecar[key] != value:
             yield Finding(name, f"tells another {key} than its problem has", BUILD)
-
-
-def _models(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """The model files are what is written of the problem today, and what is refused is refused."""
-    listed: dict[tuple[str, str], set[str]] = {}
-    for file in sidecar["files"]:
-        if file["format"] in FORMATS:
-            listed.setdefault((file["format"], file["dialect"]), set()).add(file["name"])
-    if listed and sidecar["generator"] != generator():
-        made = f"was made by {sidecar['generator']}, so that {generator()} cannot write its files again to compare them"
-        yield Finding(f"{sidecar['name']}.json", made, f"verify with {sidecar['generator']}")
-        listed = {}
-    for (kind, dialect), names in listed.items():
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as made:
-            yield from _model(folder, names, problem, Path(made) / f"{sidecar['name']}.{kind}", dialect)
-
-
-def _model(folder: Path, names: set[str], problem: Problem, path: Path, dialect: str) -> Iterator[Finding]:
-    """The files of one format are those that are written again at a path."""
-    try:
-        written = write(problem, path, dialect=dialect)
-    except UnsupportedByFormatError as error:
-        yield Finding(min(names), f"cannot be: {error}", BUILD)
-        return
-    expected = {name: name if name in names else f"{name}.gz" for name in written.files}
-    for name in sorted(names ^ set(expected.values())):
-        yield Finding(name, f"is not what is written as {path.suffix} of this problem", BUILD)
-    for name, held in expected.items():
-        if held in names and not _same(path.with_name(name), folder / held):
-            yield Finding(held, "does not hold the problem that its sidecar describes", BUILD)
-
-
-def _same(first: Path, second: Path) -> bool:
-    """Whether two files have the same content, the second one unpacked."""
-    try:
-        with first.open("rb") as one, (gzip.open if second.suffix == ".gz" else open)(second, "rb") as other:
-            pairs = zip_longest(iter(lambda: one.read(_BLOCK), b""), iter(lambda: other.read(_BLOCK), b""))
-            return all(mine == theirs for mine, theirs in pairs)
-    except (OSError, EOFError, zlib.error):
-        return False
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
@@ -162,8 +104,13 @@ def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
         yield f"has objective {solution.objective!r}, but its sidecar tells {best['objective']!r}"
     if solution.reported is not None and not close(solution.reported, best["objective"]):
         yield f"claims objective {solution.reported!r}, but its sidecar tells {best['objective']!r}"
-    if solution.violation.worst > FEASIBLE:
-        yield f"is not feasible: worst violation {solution.violation.worst:.3g}"
+    found = solution.violation
+    if found.worst > FEASIBLE:
+        yield f"is not feasible: worst violation {found.worst:.3g}"
+    elif not close(max(found.rows, found.bounds), best["violation"]) or not close(
+        found.integrality, best["integrality"]
+    ):
+        yield "has other violations than its sidecar tells"
     if not close(solution.field.energy().total, best["energy_2norm"]):
         yield f"is of a field of energy {solution.field.energy().total!r}, but its sidecar tells {best['energy_2norm']!r}"
 
@@ -205,6 +152,12 @@ def _unused(sidecar: dict[str, Any], problem: Problem, ledger: Ledger) -> Iterat
         objective = problem.objective_value(complete_point(problem, ledger.field(record)))
     except CrossfieldError:
         return  # told with the ledger
+    if record.primal is not None and not close(objective, record.primal):
+        yield Finding(
+            LEDGER,
+            f"tells another objective of {record.point} than it has",
+            "restore it, or submit the point again",
+        )
     told = sidecar["best"]["objective"]
     if objective < told and not close(objective, told):
         yield Finding(
@@ -223,7 +176,7 @@ def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
     if sidecar["best"] is None:
         return
     objective = sidecar["best"]["objective"]
-    if bound is not None and bound - objective > slack(objective):
+    if bound is not None and bound > objective:
         yield Finding(
             name, f"has a dual bound {bound!r} above the objective {objective!r} of its point", BUILD
         )
@@ -232,8 +185,3 @@ def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
         expected = "optimal" if is_proven(objective, bound) else "best known", relative_gap(objective, bound)
     if (sidecar["status"], sidecar["gap"]) != expected:
         yield Finding(name, "tells another status or gap than follows from its bounds and its point", BUILD)
-
-
-def slack(objective: float) -> float:
-    """How far a solver's bound may lie above the optimum by its own tolerances."""
-    return 1e-6 * max(1.0, abs(objective))

@@ -1,5 +1,5 @@
 * for people to read
-NAME golden FREE
+NAME golden_sha256_1c4e6333640a FREE
 ROWS
  N obj
  G c14_00_00_r

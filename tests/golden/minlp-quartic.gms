@@ -67,6 +67,7 @@ $ifThen set RESULTS
 File results / "%RESULTS%" /;
 put results;
 put 'model_status,' m.modelStat:0:0 / 'solver_status,' m.solveStat:0:0 /;
+put 'problem,sha256_6dd96a9a6a79' /;
 results.nr = 2; results.nd = 15; results.nw = 24;
 put 'objective,' objvar.l:0 /;
 loop(I(r,c), put 'alpha_' r.tl:0 '_' c.tl:0 ',' alpha.l(r,c):0 /);
