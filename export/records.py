@@ -340,6 +340,12 @@ def check_coefficients(values: Floats | float, where: str) -> None:
     size = np.abs(np.atleast_1d(np.asarray(values, dtype=np.float64)))
     wrong = ~np.isfinite(size) | (size >= MOST) | ((size < LEAST) & (size > 0))
     if wrong.any():
+        worst = float(size[wrong][0])
+        remedy = _LARGER if worst < LEAST else _SMALLER
         raise UnsupportedByFormatError(
-            f"{where} has the coefficient {size[wrong][0]!r}; readers drop or refuse what is outside [1e-9, 1e15): change w, w_strokes or w_beta"
+            f"{where} has the coefficient {worst!r}; readers drop or refuse what is outside [1e-9, 1e15): {remedy}"
         )
+
+
+_LARGER: Final = "make w, w_strokes or w_beta larger (0 leaves a term out), or the direction of a stroke that is nearly horizontal exactly 0"
+_SMALLER: Final = "make w_strokes or w_beta smaller"
