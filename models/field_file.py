@@ -172,7 +172,8 @@ def _are_pixels(rows: list[Any]) -> bool:
 def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
     """The field. Raises InstanceError for numbers that are no angles."""
     for name, values in (("alpha", alpha), ("beta", beta)):
-        if (np.abs(np.asarray(values, dtype=np.float64)) > _MOST_ANGLE).any():
+        size = np.abs(np.asarray(values, dtype=np.float64))
+        if (np.isfinite(size) & (size > _MOST_ANGLE)).any():  # CrossField tells of those that are not finite
             raise InstanceError(
                 f"{name} holds numbers beyond {_MOST_ANGLE:g}, which are no angles; write it again"
             )
