@@ -152,9 +152,9 @@ def _opened(data: bytes) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            image = Image.open(io.BytesIO(data), formats=FORMATS)
-            _check_size(*image.size)
             with _silenced():
+                image = Image.open(io.BytesIO(data), formats=FORMATS)
+                _check_size(*image.size)
                 image.load()
             ImageOps.exif_transpose(image, in_place=True)
         except InputError:
@@ -177,7 +177,7 @@ def _check_size(width: int, height: int) -> None:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself."""
+    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself, Pillow by its log."""
     with _SILENCE:
         try:
             kept = os.dup(2)

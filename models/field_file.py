@@ -29,6 +29,7 @@ from .grid import Bools, Floats, Grid, Ints
 from .input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from .instance import Instance
 from .instance_file import (
+    are_places,
     arrays_of,
     check_schema,
     check_version,
@@ -51,6 +52,8 @@ _ARCHIVE: Final = {
     "beta": Expected(1, MAX_GRID**2),
     "p": Expected(1, 2 * MAX_GRID**2),
 }
+_MOST_JUMP: Final = 1_000_000
+_MOST_ANGLE: Final = 1e6  # radians; beyond, nothing is left of the angle itself
 _Kind = TypeVar("_Kind")
 
 
@@ -104,7 +107,7 @@ def _of_npz(data: bytes) -> CrossField:
     arrays = unpack_arrays(data, _ARCHIVE)
     check_version(head_of(arrays), FORMAT, VERSION)
     instance = _embedded(lambda given: unpacked(given, _PREFIX), data)
-    return CrossField(instance, arrays["alpha"], arrays["beta"], arrays["p"])
+    return _field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 
 
 def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
@@ -150,7 +153,7 @@ def _of_json(data: bytes) -> CrossField:
     for name, table, jumps in zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True):
         _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
     try:
-        return CrossField(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
+        return _field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
@@ -162,11 +165,19 @@ def _are_pixels(rows: list[Any]) -> bool:
     table = number_table([[0 if value is None else value for value in row] for row in rows], 6)
     if table is None or any(None in row[:4] for row in rows):
         return False
-    place, jumps = table[:, :2], table[:, 4:]
-    return bool(
-        ((place >= 0) & (place < MAX_GRID) & (place % 1 == 0)).all()
-        and ((np.abs(jumps) <= 1_000_000) & (jumps % 1 == 0)).all()
-    )
+    jumps = table[:, 4:]
+    return are_places(table[:, :2]) and bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
+
+
+def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
+    """The field. Raises InstanceError for numbers that are no angles."""
+    for name, values in (("alpha", alpha), ("beta", beta)):
+        size = np.abs(np.asarray(values, dtype=np.float64))
+        if (np.isfinite(size) & (size > _MOST_ANGLE)).any():  # CrossField tells of those that are not finite
+            raise InstanceError(
+                f"{name} holds numbers beyond {_MOST_ANGLE:g}, which are no angles; write it again"
+            )
+    return CrossField(instance, alpha, beta, p)
 
 
 def _check_places(grid: Grid, places: Ints) -> None:

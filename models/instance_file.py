@@ -143,8 +143,13 @@ def _are_strokes(rows: list[Any]) -> bool:
     table = number_table(rows, 4)
     if table is None:
         return False
-    place, w = table[:, :2], table[:, 3]
-    return bool(((place >= 0) & (place < MAX_GRID) & (place % 1 == 0)).all() and ((w > 0) & (w <= 1)).all())
+    w = table[:, 3]
+    return are_places(table[:, :2]) and bool(((w > 0) & (w <= 1)).all())
+
+
+def are_places(numbers: Floats) -> bool:
+    """Whether all numbers are rows and columns of a grid."""
+    return bool(((numbers >= 0) & (numbers < MAX_GRID)).all() and (numbers % 1 == 0).all())
 
 
 def number_table(rows: list[Any], width: int) -> Floats | None:
