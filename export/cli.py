@@ -39,6 +39,7 @@ from .arguments import (
     What,
 )
 from .console import (
+    INTERRUPTED,
     complain,
     described,
     progress,
@@ -322,7 +323,7 @@ def invoke(arguments: list[str]) -> int:
     except SystemExit as stop:
         if stop.code != _STOPPED:
             return int(stop.code or 0)
-        complain("interrupted")
+        complain(INTERRUPTED)
     except Exception as error:
         if "--debug" in arguments:
             raise

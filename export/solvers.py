@@ -64,8 +64,7 @@ class Limits:
                 f"a time limit of {self.seconds} s and a gap of {self.gap} cannot be; "
                 "give a positive number of seconds, and a gap that is not negative"
             )
-        if self.threads:
-            checked(self.threads, "threads")
+        checked(self.threads, "threads", least=0)
 
     def until(self, deadline: Deadline) -> Limits:
         """The same with what is left until then."""
