@@ -7,7 +7,25 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..models.side_by_side import MOST
+from ..models.errors import InputError
+from ..models.side_by_side import MOST, checked
+
+
+def _permitted(count: int, what: str, least: int) -> int:
+    """The number, if so many threads or processes may be asked for."""
+    try:
+        return checked(count, what, least=least)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _jobs(count: int) -> int:
+    return _permitted(count, "jobs", 1)
+
+
+def _threads(count: int) -> int:
+    return _permitted(count, "threads", 0)
+
 
 What = Annotated[
     str,
@@ -69,15 +87,18 @@ Gap = Annotated[
     float, typer.Option("--gap", min=0.0, help="Relative gap at which a discrete search may stop.")
 ]
 Jobs = Annotated[
-    int, typer.Option("--jobs", min=1, max=MOST, help="Solver files written at once, in threads.")
+    int,
+    typer.Option("--jobs", callback=_jobs, help=f"Solver files written at once, in threads; 1 to {MOST}."),
 ]
 Processes = Annotated[
-    int, typer.Option("--jobs", min=1, max=MOST, help="Entries built at once, in processes.")
+    int, typer.Option("--jobs", callback=_jobs, help=f"Entries built at once, in processes; 1 to {MOST}.")
 ]
 Threads = Annotated[
     int,
     typer.Option(
-        "--threads", min=0, max=MOST, help="Threads of HiGHS, processes of searches; 0: their own choice."
+        "--threads",
+        callback=_threads,
+        help=f"Threads of HiGHS, processes of searches; 1 to {MOST}, or 0: their own choice.",
     ),
 ]
 Start = Annotated[

@@ -39,6 +39,7 @@ from .arguments import (
     What,
 )
 from .console import (
+    INTERRUPTED,
     complain,
     degrade,
     described,
@@ -347,7 +348,7 @@ def invoke(arguments: list[str]) -> int:
     except SystemExit as stop:
         if stop.code != _STOPPED:
             return int(stop.code or 0)
-        complain("interrupted")
+        complain(INTERRUPTED)
     except Exception as error:
         if "--debug" in arguments:
             raise

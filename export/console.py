@@ -26,6 +26,9 @@ WIDTH: Final = 80
 """Columns that tables are made for; a wider terminal is used where it helps."""
 
 
+INTERRUPTED: Final = "interrupted; files that stand are whole"
+
+
 class InterruptedRunError(CrossfieldError):
     """Ctrl-C where there is no best point so far to be kept."""
 
@@ -48,7 +51,7 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
             task = bar.add_task("starting")
             yield lambda text: bar.update(task, description=text)
     except KeyboardInterrupt as stop:
-        raise InterruptedRunError("interrupted; files that stand are whole") from stop
+        raise InterruptedRunError(INTERRUPTED) from stop
 
 
 def degrade() -> None:

@@ -92,7 +92,7 @@ def plan(limits: Limits) -> str:
     """How long the searches of a run may take in all, and each."""
     timed = [method.name for method in _tried() if method.timed]
     each = ", ".join(f"{name} {limits.seconds:g} s" for name in timed)
-    return f"at most {len(timed) * limits.seconds:g} s of searching: {each}; files, greedy fields and pictures besides"
+    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures come on top"
 
 
 def _tried() -> list[Method]:

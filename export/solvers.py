@@ -65,8 +65,7 @@ class Limits:
                 f"a time limit of {self.seconds} s and a gap of {self.gap} cannot be; "
                 "give a positive number of seconds, and a gap that is not negative"
             )
-        if self.threads:
-            checked(self.threads, "threads")
+        checked(self.threads, "threads", least=0)
 
     def until(self, deadline: Deadline) -> Limits:
         """The same with what is left until then."""
@@ -207,7 +206,9 @@ def _no_answer(solver: str, job: Job, ending: Ending) -> str:
 def _hand_over_start(solver: str, job: Job) -> None:
     """Leave the start as the answer of a solver that was stopped before it had one, if it is a point of the problem."""
     if job.start is not None and job.problem.violation(job.start).worst <= _FEASIBLE:
-        message = f"{solver}: stopped at its limit or by Ctrl-C, nothing better than the start\n{job.problem.stamp}"
+        message = (
+            f"{solver}: stopped at its limit or by Ctrl-C, nothing better than the start\n{job.problem.stamp}"
+        )
         point = job.start[Layout(job.problem).order]
         write_ampl_sol(job.solution, message, point, job.problem.row_count, _LIMIT)
 

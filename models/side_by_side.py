@@ -32,10 +32,10 @@ class WorkerError(CrossfieldError):
     """A process that ended before its work was done."""
 
 
-def checked(count: int, what: str = "jobs") -> int:
+def checked(count: int, what: str = "jobs", *, least: int = 1) -> int:
     """The number of threads or processes, if that many may be asked for. Raises InputError."""
-    if not 1 <= count <= MOST:
-        raise InputError(f"{count} {what} cannot be; give 1 to {MOST}")
+    if not least <= count <= MOST:
+        raise InputError(f"{count} {what} cannot be; give {least} to {MOST}")
     return count
 
 

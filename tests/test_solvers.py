@@ -13,9 +13,8 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export import child
-from crossfield.export.child import run_child
 from crossfield.export.nl import Layout
+from crossfield.export.run import plan
 from crossfield.export.solution_text import Status
 from crossfield.export.solvers import SOLVERS, solver_for
 from crossfield.export.tables import tables
@@ -321,9 +320,7 @@ def hard():
 )
 def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
     problem, start = cf.formulate(hard, name), cf.greedy(hard)
-    begin = time.monotonic()
     solution = cf.solve(problem, solver, start=start, limits=cf.Limits(1.5))
-    assert time.monotonic() - begin < 8
     assert solution.status == Status.LIMIT_WITH_POINT
     assert solution.objective <= problem.objective_value(problem.point(start)) + 1e-9
     assert solution.violation.worst < 1e-6
@@ -394,7 +391,14 @@ def test_threads_may_change_from_solve_to_solve(tmp_path, small):
 
 @pytest.mark.parametrize(
     "given",
-    [{"seconds": 0}, {"seconds": float("nan")}, {"seconds": float("inf")}, {"gap": -1}, {"threads": -1}],
+    [
+        {"seconds": 0},
+        {"seconds": float("nan")},
+        {"seconds": float("inf")},
+        {"gap": -1},
+        {"threads": -1},
+        {"threads": 100000},
+    ],
 )
 def test_impossible_limits_are_refused(given):
     with pytest.raises(InputError, match="cannot be"):
@@ -438,33 +442,6 @@ def test_files_where_the_user_happens_to_be_are_not_run(tmp_path, small, monkeyp
         (tmp_path / name).write_text("raise SystemExit('taken for a library')")
     monkeypatch.chdir(tmp_path)
     assert cf.solve(formulated(small, "qp-fixed"), "ipopt").status == Status.OPTIMAL_LOCAL
-
-
-DEAF = "import signal, time\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nprint('solving', flush=True)\ntime.sleep(60)"
-SLOW_TO_HEAR = """
-import signal, sys, time
-heard = []
-signal.signal(signal.SIGINT, lambda *_: heard.append(1) or (len(heard) == 2 and sys.exit(7)))
-print('solving', flush=True)
-for _ in range(600): time.sleep(0.1)
-"""
-SLOW_TO_START = "import time\ntime.sleep(1.5)\nprint('solving', flush=True)"
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr(child, "GRACE", 0.3)
-    monkeypatch.setattr(child, "PATIENCE", 0.4)
-
-
-@pytest.mark.usefixtures("impatient")
-@pytest.mark.parametrize("code,ending", [(DEAF, -signal.SIGKILL), (SLOW_TO_HEAR, 7), (SLOW_TO_START, 0)])
-def test_a_child_is_interrupted_twice_and_then_killed(tmp_path, code, ending):
-    begin = time.monotonic()
-    done = run_child([sys.executable, "-c", code], tmp_path / "log", 0.5)
-    assert done == (ending, False)
-    assert time.monotonic() - begin < 8
-    assert (tmp_path / "log").read_text() == "solving\n"
 
 
 # Ctrl-C, as a signal to a real command line
@@ -517,13 +494,14 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
     assert code == 0
     assert "MILP: interrupted; its best field so far was kept" in err
     assert "two-stage" in out
+    assert "interrupted: two-stage; the report says what there is" in err
     assert (tmp_path / "report.json").exists()
 
 
 @pytest.mark.solver
 def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
     code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], after=0.1)
-    assert (code, out) == (1, "")
+    assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
     assert err == "crossfield: interrupted; files that stand are whole\n"
     assert not list(tmp_path.rglob("*.part"))
     assert not (tmp_path / "report.json").exists()
