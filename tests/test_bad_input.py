@@ -13,6 +13,7 @@ import pytest
 from crossfield.export.ampl_sol import write_ampl_sol
 from crossfield.export.cli import invoke
 from crossfield.export.nl import Layout
+from loops import for_each
 from PIL import Image, ImageDraw
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
@@ -111,8 +112,8 @@ SKETCHES = {
 }
 
 
-@pytest.mark.parametrize("name", SKETCHES)
-@pytest.mark.parametrize("command", ["run", "instance"])
+@for_each("name", SKETCHES)
+@for_each("command", ["run", "instance"])
 def test_bad_sketches_are_refused(tmp_path, refused, name, command):
     content, reason = SKETCHES[name]
     (tmp_path / name).write_bytes(content)
@@ -181,8 +182,8 @@ def test_a_mask_of_several_parts_is_allowed_and_said(tmp_path, capsys):
     assert cf.read_instance(tmp_path / "two.json").grid.parts == 2
 
 
-@pytest.mark.parametrize("what", ["mouse", "wave_sheet", "sketch.png"])
-@pytest.mark.parametrize("size", [0, -1, 10**6])
+@for_each("what", ["mouse", "wave_sheet", "sketch.png"])
+@for_each("size", [0, -1, 10**6])
 def test_impossible_sizes_are_refused(tmp_path, refused, monkeypatch, what, size):
     picture(tmp_path / "sketch.png")
     monkeypatch.chdir(tmp_path)
@@ -204,7 +205,7 @@ def instance_document(instance, tmp_path):
     return json.loads((tmp_path / "instance.json").read_text())
 
 
-@pytest.mark.parametrize(
+@for_each(
     "change,reason",
     [
         (lambda d: d["strokes"][0].__setitem__(2, float("nan")), "theta is not a finite number"),
@@ -216,7 +217,6 @@ def instance_document(instance, tmp_path):
         (lambda d: d.__setitem__("w_beta", "much"), "w_beta"),
         (lambda d: d["mask"].append("#"), "mask row 2"),
     ],
-    ids=["theta", "w", "outside", "version", "format", "missing", "text", "ragged"],
 )
 def test_bad_instances_are_refused(tmp_path, refused, instance, change, reason):
     document = instance_document(instance, tmp_path)
@@ -442,7 +442,7 @@ def in_child(*arguments, prelude=""):
     """A command line in a child process, after some lines of Python."""
     code = f"import sys\n{prelude}\nfrom crossfield.export.cli import invoke\nsys.exit(invoke(sys.argv[1:]))"
     command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(
@@ -562,9 +562,7 @@ def test_a_full_device_is_said(tmp_path):
         pytest.skip("there is no /dev/full")
     with Path("/dev/full").open("wb") as full:
         command = [sys.executable, "-m", "crossfield", "list", "--json"]
-        done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=60
-        )
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
     assert "no space left on device" in done.stderr
     assert done.stderr.count("\n") == 1

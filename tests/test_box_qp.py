@@ -12,6 +12,7 @@ from crossfield.models.power_field import power_field
 from crossfield.models.samples import sample, samples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loops import for_each
 from scipy.optimize import lsq_linear
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -104,7 +105,7 @@ def test_contact_along_the_strokes_of_a_drawing():
     assert assert_optimal(fitted(power_field(sample("mouse", 96, "box")))) > 200
 
 
-@pytest.mark.parametrize("seed", range(8))
+@for_each("seed", range(8))
 def test_same_energy_as_bounded_dense_least_squares(seed):
     instance = random_instance(seed, (4, 5), ("strokes", "box")[seed % 2])
     field = random_field(instance, seed)

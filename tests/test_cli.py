@@ -18,6 +18,7 @@ from crossfield.export.methods import METHODS
 from crossfield.export.solvers import SOLVERS
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.samples import SAMPLES
+from loops import for_each
 from PIL import Image, ImageDraw
 
 
@@ -48,7 +49,7 @@ def instance_file(tmp_path, instance):
 
 def child(*arguments, **options):
     command = [sys.executable, "-m", "crossfield", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, **options)
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
 
 
 # The verbs, one after the other
@@ -236,7 +237,7 @@ def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
 # Usage, help, exit codes
 
 
-@pytest.mark.parametrize(
+@for_each(
     "arguments",
     [
         ["fly"],
@@ -249,7 +250,6 @@ def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
         ["export", "mouse", "-o", "x", "--stroke-norm", "3"],
         ["read", "a.sol", "-o", "x.npz"],
     ],
-    ids=" ".join,
 )
 def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -262,9 +262,7 @@ def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
 
 def test_help_loads_nothing_heavy():
     code = "import sys; from crossfield.export.cli import invoke; invoke(['--help']); print(*sorted(sys.modules), file=sys.stderr)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stderr.split()}
     assert not loaded & {
         "numpy",
@@ -283,7 +281,7 @@ def test_help_loads_nothing_heavy():
         assert re.search(rf"^\W*{verb} ", done.stdout, re.MULTILINE)
 
 
-@pytest.mark.parametrize("verb", ["run", "instance", "export", "solve", "read", "draw", "list", "samples"])
+@for_each("verb", ["run", "instance", "export", "solve", "read", "draw", "list", "samples"])
 def test_every_verb_has_help(verb, crossfield):
     for flag in ("--help", "-h"):
         assert f"crossfield {verb}" in crossfield(verb, flag)
@@ -320,7 +318,7 @@ def test_what_should_not_happen_is_one_line_too(tmp_path, instance_file):
     )
     arguments = ["solve", str(instance_file), "-f", "qp-fixed", "-o", str(tmp_path / "out")]
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.count("\n") == 1
@@ -409,7 +407,7 @@ def in_terminal(arguments, columns=80):
         command, stdin=follower, stdout=follower, stderr=follower, env=environment
     ) as process:
         os.close(follower)
-        while select.select([leader], [], [], 60)[0]:
+        while select.select([leader], [], [])[0]:
             try:
                 piece = os.read(leader, 1 << 16)
             except OSError:  # the other end was closed
@@ -417,7 +415,7 @@ def in_terminal(arguments, columns=80):
             if not piece:
                 break
             written += piece
-        code = process.wait(60)
+        code = process.wait()
     os.close(leader)
     return code, written.decode()
 

@@ -12,6 +12,7 @@ from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field import CrossField, relabelled
 from crossfield.models.instance import Instance
 from defusedxml import ElementTree
+from loops import for_each
 from PIL import Image
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
@@ -54,7 +55,7 @@ def place(found, picture):
     return x.mean() / (right - left), y.mean() / (bottom - top)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "kind, suffix",
     [(kind, ".png") for kind in KINDS if kind != "overview"]
     + [("overview", ".svg"), ("overview", ".pdf"), ("energy", ".svg")],

@@ -7,6 +7,7 @@ from crossfield.models.field import DEGENERATE, CrossField, best_jumps, relabell
 from crossfield.models.instance import HALF, QUARTER, Instance
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 SEEDS = st.integers(0, 2**32 - 1)
 MOVES = {
@@ -164,7 +165,7 @@ def test_image_puts_values_back():
     assert np.isnan(field.image(field.alpha)[0, 1])
 
 
-@pytest.mark.parametrize(
+@for_each(
     "alpha,beta,p,message",
     [
         ([0], [0, 0], [0], "alpha has shape (1,), but the grid of hand needs (2,)"),

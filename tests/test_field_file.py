@@ -15,6 +15,7 @@ from crossfield.models.instance import HALF, QUARTER, Instance
 from crossfield.models.instance_file import read_instance, write_instance
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from loops import for_each
 
 # The file is written anew in every example, so sharing the folder is harmless.
 settings.register_profile("files", suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -135,7 +136,7 @@ def pixel(number, column, value):
     return edit
 
 
-@pytest.mark.parametrize(
+@for_each(
     "edit,message",
     [
         (change("format", "crossfield-instance"), '"format" must be "crossfield-field"'),
@@ -172,7 +173,7 @@ def test_field_json_that_breaks_the_rules_is_named_with_its_place(field, tmp_pat
     refused(read_field, path, message)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "name,array,message",
     [
         ("alpha", np.zeros(3), "alpha has shape (3,), but the grid of sample needs (7,)"),

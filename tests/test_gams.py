@@ -21,6 +21,8 @@ from crossfield.models.field import CrossField, relabelled
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance import Instance
 from crossfield.models.problem import Problem, formulate
+from loops import for_each
+from oracles import require
 
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = {"scalar": gams.generate, "indexed": gams_indexed.generate}
@@ -102,10 +104,8 @@ def names_of(matrix: np.ndarray) -> list[str]:
 
 @pytest.fixture(scope="session")
 def gams_executable() -> str:
-    found = importlib.util.find_spec("gamspy_base")
-    if found is None or found.origin is None:
-        pytest.skip("gamspy_base, the free GAMS, is not installed")
-    return str(Path(found.origin).parent / "gams")
+    require("gams")
+    return str(Path(importlib.util.find_spec("gamspy_base").origin).parent / "gams")
 
 
 def run_gams(executable: str, folder: Path, text: bytes, *options: str) -> dict[str, float]:
@@ -185,61 +185,69 @@ def readings(
     }
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("case", CASES)
-class TestReading:
-    def test_energy(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
-        read = readings[case, layout]
-        expected = [read.problem.objective_value(point) for point in read.points]
-        assert read.values["f"] == pytest.approx(expected, rel=1e-9)
+@for_each("layout", LAYOUTS)
+@for_each("case", CASES)
+def test_read_energy(readings: dict[tuple[str, str], Reading], case: str, layout: str):
+    read = readings[case, layout]
+    expected = [read.problem.objective_value(point) for point in read.points]
+    assert read.values["f"] == pytest.approx(expected, rel=1e-9)
 
-    def test_rows(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
-        read = readings[case, layout]
-        names = [name for name in read.rows if name != "obj"]
-        assert sorted(names) == sorted(names_of(row_names(read.problem)))
-        row = dict(
-            zip(
-                names,
-                zip(np.transpose(read.values["g"]), read.values["g_lb"], read.values["g_ub"], strict=True),
-                strict=True,
-            )
+
+@for_each("layout", LAYOUTS)
+@for_each("case", CASES)
+def test_read_rows(readings: dict[tuple[str, str], Reading], case: str, layout: str):
+    read = readings[case, layout]
+    names = [name for name in read.rows if name != "obj"]
+    assert sorted(names) == sorted(names_of(row_names(read.problem)))
+    row = dict(
+        zip(
+            names,
+            zip(np.transpose(read.values["g"]), read.values["g_lb"], read.values["g_ub"], strict=True),
+            strict=True,
         )
-        expected = iter(names_of(row_names(read.problem)))
-        for family in read.problem.rows:
-            for values in np.transpose([family.values(point) for point in read.points]):
-                levels, low, high = row[next(expected)]
-                sense = "==" if low == high else ">=" if np.isfinite(low) else "<="
-                assert sense == family.family.sense
-                limit = low if np.isfinite(low) else high
-                assert levels - limit == pytest.approx(values, rel=1e-9, abs=1e-12)
+    )
+    expected = iter(names_of(row_names(read.problem)))
+    for family in read.problem.rows:
+        for values in np.transpose([family.values(point) for point in read.points]):
+            levels, low, high = row[next(expected)]
+            sense = "==" if low == high else ">=" if np.isfinite(low) else "<="
+            assert sense == family.family.sense
+            limit = low if np.isfinite(low) else high
+            assert levels - limit == pytest.approx(values, rel=1e-9, abs=1e-12)
 
-    def test_columns(self, readings: dict[tuple[str, str], Reading], case: str, layout: str):
-        read = readings[case, layout]
-        names = names_of(column_names(read.problem))
-        families = (*read.problem.objective, *read.problem.rows)
-        used = {
-            column
-            for family in families
-            for symbol in family.variables
-            for column in family.columns(symbol).tolist()
-        }
-        assert sorted(read.columns) == sorted(names[column] for column in used)
-        at = [names.index(name) for name in read.columns]
-        np.testing.assert_allclose(read.values["x_lb"], read.problem.lower[at], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(read.values["x_ub"], read.problem.upper[at], rtol=0, atol=1e-14)
-        assert read.values["discrete"] == read.problem.integer[at].tolist()
 
-    def test_start_comes_back_under_our_names(
-        self, readings: dict[tuple[str, str], Reading], case: str, layout: str
-    ):
-        """CONVERT solves nothing, so that the results are the start."""
-        read = readings[case, layout]
-        start = read.problem.point(make_field(read.problem.instance))
-        head, names = list(read.results)[:3], list(read.results)[3:]
-        assert head == ["model_status", "solver_status", "objective"]
-        assert names == names_of(column_names(read.problem))
-        assert read.results["objective"] == pytest.approx(read.problem.objective_value(start), rel=1e-14)
-        np.testing.assert_allclose([read.results[name] for name in names], start, rtol=1e-15, atol=0)
+@for_each("layout", LAYOUTS)
+@for_each("case", CASES)
+def test_read_columns(readings: dict[tuple[str, str], Reading], case: str, layout: str):
+    read = readings[case, layout]
+    names = names_of(column_names(read.problem))
+    families = (*read.problem.objective, *read.problem.rows)
+    used = {
+        column
+        for family in families
+        for symbol in family.variables
+        for column in family.columns(symbol).tolist()
+    }
+    assert sorted(read.columns) == sorted(names[column] for column in used)
+    at = [names.index(name) for name in read.columns]
+    np.testing.assert_allclose(read.values["x_lb"], read.problem.lower[at], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(read.values["x_ub"], read.problem.upper[at], rtol=0, atol=1e-14)
+    assert read.values["discrete"] == read.problem.integer[at].tolist()
+
+
+@for_each("layout", LAYOUTS)
+@for_each("case", CASES)
+def test_read_start_comes_back_under_our_names(
+    readings: dict[tuple[str, str], Reading], case: str, layout: str
+):
+    """CONVERT solves nothing, so that the results are the start."""
+    read = readings[case, layout]
+    start = read.problem.point(make_field(read.problem.instance))
+    head, names = list(read.results)[:3], list(read.results)[3:]
+    assert head == ["model_status", "solver_status", "objective"]
+    assert names == names_of(column_names(read.problem))
+    assert read.results["objective"] == pytest.approx(read.problem.objective_value(start), rel=1e-14)
+    np.testing.assert_allclose([read.results[name] for name in names], start, rtol=1e-15, atol=0)
 
 
 def solved(
@@ -299,8 +307,8 @@ def test_one_pixel(gams_executable: str, tmp_path: Path, layout: str):
         np.testing.assert_allclose(point[:2], expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("case", CASES)
+@for_each("layout", LAYOUTS)
+@for_each("case", CASES)
 def test_text_is_plain(case: str, layout: str):
     problem = problem_of(case)
     text = text_of(problem, layout, start=problem.point(make_field(problem.instance)))

@@ -14,6 +14,7 @@ from crossfield.models.power_field import power_field
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loops import for_each
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLVERS = pytest.mark.parametrize("solve", [greedy, first_field, power_field])
@@ -43,7 +44,7 @@ def some_curves(size=16, seed=3):
 
 
 @SOLVERS
-@pytest.mark.parametrize("degrees", [0, 20, 45, 90, 120, 135, 179])
+@for_each("degrees", [0, 20, 45, 90, 120, 135, 179])
 def test_parallel_strokes_give_a_constant_field(solve, degrees):
     theta = np.full((6, 7), np.nan)
     theta[[1, 4], 1:5] = np.radians(degrees)
@@ -53,9 +54,9 @@ def test_parallel_strokes_give_a_constant_field(solve, degrees):
     assert np.abs(field.beta).max() < 1e-3
 
 
-@pytest.mark.parametrize("w_beta", [0, 1e-9, 1e-6])
-@pytest.mark.parametrize("first", [0, 77, 130])
-@pytest.mark.parametrize("between", [15, 30, 44, 50, 60, 90, 100, 130, 155])
+@for_each("w_beta", [0, 1e-9, 1e-6])
+@for_each("first", [0, 77, 130])
+@for_each("between", [15, 30, 44, 50, 60, 90, 100, 130, 155])
 def test_two_families_give_a_constant_skewed_field(first, between, w_beta):
     theta = np.full((7, 7), np.nan)
     theta[2, :] = np.radians(first)
@@ -219,7 +220,7 @@ def test_answer_is_stationary_for_its_jumps():
     assert field.energy().total == pytest.approx(least, rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@for_each("seed", range(12))
 def test_never_below_the_optimum_over_all_jumps(seed):
     instance = random_instance(seed, shape=(2, 3), strokes=3)
     assert greedy(instance).energy().total >= exact(instance) - 1e-9

@@ -8,6 +8,7 @@ from crossfield.models.errors import InstanceError
 from crossfield.models.instance import HALF, Instance
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 GOOD = {
     "name": "small",
@@ -36,7 +37,7 @@ def instances(draw):
     )
 
 
-@pytest.mark.parametrize(
+@for_each(
     "change,message",
     [
         ({"name": "Upper"}, "the name 'Upper' is not allowed"),

@@ -12,6 +12,7 @@ from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance import Instance
 from crossfield.models.instance_file import arrays_of, read_instance, to_json, write_instance
+from loops import for_each
 
 MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
 
@@ -84,7 +85,7 @@ def without(key):
     return lambda document: {k: v for k, v in document.items() if k != key}
 
 
-@pytest.mark.parametrize(
+@for_each(
     "edit,message",
     [
         (change("format", "other"), '"format" must be "crossfield-instance"'),
@@ -141,7 +142,7 @@ def test_json_that_breaks_the_rules_is_named_with_its_place(instance, tmp_path, 
     refused(read_instance, path, message)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "data,message",
     [
         (b"", "is not valid JSON"),
@@ -211,7 +212,7 @@ def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
     refused(read_instance, path, "another length than its header says")
 
 
-@pytest.mark.parametrize(
+@for_each(
     "name,array,message",
     [
         ("theta", np.array(["a", "b", "c"]), "array 'theta' holds <U1, not numbers"),

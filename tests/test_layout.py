@@ -26,9 +26,7 @@ def wheel(tmp_path_factory):
     shutil.copytree(ROOT, tree, ignore=left_out)
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", "dist", "."]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    done = subprocess.run(
-        command, cwd=tree, capture_output=True, text=True, check=False, timeout=120, env=environment
-    )
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
     (built,) = (tree / "dist").glob("*.whl")
     with zipfile.ZipFile(built) as archive:

@@ -25,6 +25,7 @@ from crossfield.export.library.verify import verify_library
 from crossfield.models.errors import CrossfieldError, InputError, SolutionError
 from crossfield.models.field_file import read_field
 from crossfield.models.problem import with_integers_fixed
+from loops import for_each
 
 SOLUTIONS = Path(__file__).resolve().parent / "solutions"
 
@@ -81,8 +82,8 @@ def temporary(tmp_path, monkeypatch):
     return folder
 
 
-@pytest.mark.parametrize("kind", [*PACKERS, "zip"])
-@pytest.mark.parametrize("lead", ["lib/", "./lib/", "", "./"])
+@for_each("kind", [*PACKERS, "zip"])
+@for_each("lead", ["lib/", "./lib/", "", "./"])
 def test_an_archive_is_opened_as_the_folder_it_holds_and_gone_afterwards(kind, lead, tmp_path, temporary):
     members = [(name.replace("lib/", lead), content) for name, content in INSIDE.items()]
     data = zip_of(members) if kind == "zip" else PACKERS[kind](tar_of(members))
@@ -118,7 +119,7 @@ TRAPS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", TRAPS)
+@for_each("what", TRAPS)
 def test_a_bad_archive_is_refused_in_one_line_and_nothing_is_written(what, tmp_path, temporary):
     (tmp_path / "archive").write_bytes(TRAPS[what]())
     before = everything_below(tmp_path)
@@ -362,16 +363,18 @@ def told(folder, file, words):
     return found
 
 
-@pytest.mark.parametrize("what", PLAIN)
-def test_what_was_changed_is_found(what, lib):
+@for_each("what", PLAIN)
+def test_what_was_changed_is_found(what, built, tmp_path):
     spoil, file, words = PLAIN[what]
+    lib = shutil.copytree(built, tmp_path / "lib")
     spoil(lib)
     told(lib, file, words)
 
 
-@pytest.mark.parametrize("what", SEALED)
-def test_what_was_changed_is_found_when_all_checksums_fit_too(what, lib):
+@for_each("what", SEALED)
+def test_what_was_changed_is_found_when_all_checksums_fit_too(what, built, tmp_path):
     spoil, file, words = SEALED[what]
+    lib = shutil.copytree(built, tmp_path / "lib")
     spoil(lib)
     seal(lib)
     found = told(lib, file, words)

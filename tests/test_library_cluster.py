@@ -21,7 +21,7 @@ sizes = [3, 4]
 formats = ["nl", "mps"]
 
 [rungs.medium]
-sizes = [8]
+sizes = [6]
 formats = ["nl", "mps"]
 compress = true
 
@@ -30,9 +30,8 @@ name = "mouse"
 sample = "mouse"
 
 [[sketches]]
-name = "rand"
-random = "ragged"
-seeds = [1]
+name = "skew"
+sample = "skew"
 """
 
 BUILD = """import sys
@@ -48,13 +47,12 @@ def started(arguments, log, words):
         process = subprocess.Popen(
             [sys.executable, "-W", "ignore", "-m", *arguments], stdout=stream, stderr=subprocess.STDOUT
         )
-    for _ in range(600):
+    while True:
         found = re.search(words, log.read_text("utf-8", "replace"))
         if found:
             return process, found
         assert process.poll() is None, log.read_text("utf-8", "replace")
         time.sleep(0.05)
-    raise AssertionError(log.read_text("utf-8", "replace"))
 
 
 @pytest.fixture
@@ -85,13 +83,14 @@ def cluster(tmp_path):
     finally:
         for process in reversed(processes):
             process.kill()
-            process.wait(10)
+            process.wait()
 
 
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(tmp_path, cluster):
     address, (first, second) = cluster
     spec = tmp_path / "spec.toml"
@@ -103,8 +102,8 @@ def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(t
             lines.append(line.strip())
             if len(lines) == 20:
                 first.kill()
-        assert process.wait(60) == 0
-    assert first.wait(10) == -signal.SIGKILL
+        assert process.wait() == 0
+    assert first.wait() == -signal.SIGKILL
     assert second.poll() is None
 
     local = build(read_spec(spec), tmp_path / "local")

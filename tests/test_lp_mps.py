@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -19,18 +17,12 @@ from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance import Instance
 from crossfield.models.problem import Problem
+from loops import for_each
 from oracles import Model, by_gurobi, by_highs, by_scip, of_problem
 
 GOLDEN = Path(__file__).parent / "golden"
 READERS = {"highs": by_highs, "scip": by_scip, "gurobi": by_gurobi}
 GENERATE = {"lp": lp.generate, "mps": mps.generate}
-READINGS = [
-    pytest.param(label, reader, marks=[pytest.mark.oracles] if reader == "gurobi" else [])
-    for label in LOW_DEGREE
-    for reader in READERS
-    if (reader, label[:5]) != ("highs", "miqcp")
-]
-"""Cases and their readers; HiGHS reads no quadratic rows, and Gurobi is of the extra `oracles`."""
 both = pytest.mark.parametrize("suffix", GENERATE)
 
 
@@ -43,24 +35,21 @@ def text_of(problem: Problem, suffix: str) -> str:
     return b"".join(GENERATE[suffix](problem, header(problem))).decode("ascii")
 
 
-def read(reader: str, path: Path) -> Model:
-    if reader == "gurobi" and importlib.util.find_spec("gurobipy") is None:
-        pytest.skip("gurobipy is not installed")
-    return READERS[reader](path)
-
-
 def assert_same(model: Model, expected: Model) -> None:
     for name in vars(expected):
         np.testing.assert_array_equal(getattr(model, name), getattr(expected, name), err_msg=name)
 
 
 @both
-@pytest.mark.parametrize("label, reader", READINGS)
+@pytest.mark.parametrize("reader", [pytest.param(name, marks=pytest.mark.needs(name)) for name in READERS])
+@for_each("label", LOW_DEGREE)
 def test_readers_see_the_problem(label: str, reader: str, suffix: str, tmp_path: Path):
+    if (reader, label[:5]) == ("highs", "miqcp"):
+        return  # HiGHS reads no quadratic rows
     problem = held(label)
     path = tmp_path / f"model.{suffix}"
     assert write(problem_of(label), path).problem.sha256 == problem.sha256
-    model = read(reader, path)
+    model = READERS[reader](path)
     expected = of_problem(problem)
     if reader != "scip":  # SCIP sorts columns by type
         assert [name for name in model.columns if name != "ONE"] == names_of(column_names(problem))
@@ -93,9 +82,7 @@ def test_compressed_files_are_read(suffix: str, tmp_path: Path):
 
 
 @both
-@pytest.mark.parametrize(
-    "label", [label for label in CASES if label not in LOW_DEGREE and "pixel" not in label]
-)
+@for_each("label", [label for label in CASES if label not in LOW_DEGREE and "pixel" not in label])
 def test_parity_is_refused_before_a_byte(label: str, suffix: str, tmp_path: Path):
     with pytest.raises(UnsupportedByFormatError, match="minlp-quartic"):
         write(problem_of(label), tmp_path / f"model.{suffix}")
@@ -148,7 +135,7 @@ def test_an_angle_next_to_nothing_is_written(angle: float, suffix: str, tmp_path
 # names
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_names_suit_every_reader(label: str):
     problem = problem_of(label)
     problems = [problem, held(label)] if label in LOW_DEGREE else [problem]
@@ -161,7 +148,7 @@ def test_names_suit_every_reader(label: str):
         assert all(re.fullmatch(r"[a-df-hj-mo-z][a-z0-9_]{0,14}", name) for name in names)
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
+@for_each("name", FORMULATIONS)
 def test_names_on_the_largest_grid_are_15_long_at_most(name: str):
     mask = np.zeros((2, 9999), dtype=bool)
     mask[:, -2:] = True
@@ -191,7 +178,7 @@ def test_names_carry_row_column_and_side():
 
 
 @both
-@pytest.mark.parametrize("label", LOW_DEGREE)
+@for_each("label", LOW_DEGREE)
 def test_text_is_plain(label: str, suffix: str):
     text = text_of(held(label), suffix)
     lines = text.splitlines()
@@ -206,7 +193,7 @@ def test_text_is_plain(label: str, suffix: str):
     assert len([line for line in lines if line[0] in "\\*"]) == len(header(held(label)))
 
 
-@pytest.mark.parametrize("label", LOW_DEGREE)
+@for_each("label", LOW_DEGREE)
 def test_lp_keeps_to_the_common_subset(label: str):
     problem = held(label)
     text = text_of(problem, "lp")
@@ -243,7 +230,7 @@ def test_lp_keeps_to_the_common_subset(label: str):
     assert sorted(whole) == sorted(np.array(names_of(column_names(problem)))[problem.integer].tolist())
 
 
-@pytest.mark.parametrize("label", LOW_DEGREE)
+@for_each("label", LOW_DEGREE)
 def test_mps_keeps_to_the_common_subset(label: str):
     problem = held(label)
     text = text_of(problem, "mps")
@@ -311,10 +298,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return folder, objective
 
 
+@pytest.mark.needs("cbc")
 @both
 def test_cbc_finds_the_same_optimum(suffix: str, small: tuple[Path, float]):
-    if shutil.which("cbc") is None:
-        pytest.skip("cbc is not installed")
     folder, objective = small
     done = subprocess.run(
         ["cbc", f"model.{suffix}", "solve"], cwd=folder, check=True, capture_output=True, text=True
@@ -324,10 +310,9 @@ def test_cbc_finds_the_same_optimum(suffix: str, small: tuple[Path, float]):
     assert float(found[1]) == pytest.approx(objective, rel=1e-6)
 
 
+@pytest.mark.needs("glpk")
 @both
 def test_glpk_finds_the_same_optimum(suffix: str, small: tuple[Path, float]):
-    if shutil.which("glpsol") is None:
-        pytest.skip("glpsol is not installed")
     folder, objective = small
     option = {"lp": "--lp", "mps": "--freemps"}[suffix]
     subprocess.run(

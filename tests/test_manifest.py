@@ -26,6 +26,7 @@ from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance import Instance
 from crossfield.models.instance_file import read_instance, write_instance
 from crossfield.models.problem import formulate, lifted, with_integers_fixed
+from loops import for_each
 
 OPTIONS = [
     ("milp-mccormick", {"facet": "printed", "stroke_norm": 2, "relax": True}),
@@ -34,8 +35,8 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("name, options", OPTIONS)
-@pytest.mark.parametrize("gauge", ["strokes", "box"])
+@for_each("name, options", OPTIONS)
+@for_each("gauge", ["strokes", "box"])
 def test_round_trip(name, options, gauge, tmp_path):
     problem = make_problem(name, make_instance(gauge=gauge), **options)
     manifest = write_problem(problem, tmp_path)
@@ -214,7 +215,7 @@ def test_another_instance_beside_it(written):
         read_manifest(written).problem()
 
 
-@pytest.mark.parametrize(
+@for_each(
     "text",
     [
         b"",

@@ -15,12 +15,11 @@ from crossfield.export.pyomo_model import to_pyomo
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.instance import Instance
 from crossfield.models.problem import Problem
-from oracles import by_asl, by_casadi, has_asl, scip_columns
+from loops import for_each
+from oracles import by_asl, by_casadi, scip_columns
 from pyomo.repn.plugins.nl_writer import NLWriter
 
 GOLDEN = Path(__file__).parent / "golden"
-
-needs_asl = pytest.mark.skipif(not has_asl(), reason="gjh_asl_json (Debian: gjh-asl-json) is not installed")
 
 
 def save(problem: Problem, path: Path, *, binary: bool = False, start: np.ndarray | None = None) -> Path:
@@ -42,7 +41,7 @@ def limits_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     return np.array(lower), np.array(upper)
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
     order = nl.Layout(problem).order
@@ -60,8 +59,8 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
         np.testing.assert_allclose(rows, expected[1], rtol=1e-9, atol=1e-9)
 
 
-@needs_asl
-@pytest.mark.parametrize("label", CASES)
+@pytest.mark.needs("asl")
+@for_each("label", CASES)
 def test_the_solver_library_sees_the_problem(label: str, tmp_path: Path):
     """Values at random points, text and binary by turns, and once the derivatives; 15 digits come back."""
     problem = problem_of(label)
@@ -88,8 +87,8 @@ def difference(problem: Problem, point: np.ndarray, column: int) -> tuple[float,
     return (high - low) / 2e-5, (high_rows - low_rows) / 2e-5
 
 
-@pytest.mark.parametrize("binary", [False, True])
-@pytest.mark.parametrize("label", CASES)
+@for_each("binary", [False, True])
+@for_each("label", CASES)
 def test_scip_sees_the_columns(label: str, binary: bool, tmp_path: Path):
     """Names from .col, integrality and bounds; SCIP tightens bounds of integers to whole numbers, ours are whole."""
     problem = problem_of(label)
@@ -111,7 +110,7 @@ def pyomo_text(problem: Problem) -> list[str]:
     return stream.getvalue().splitlines()
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_header_agrees_with_the_writer_of_pyomo(label: str):
     """Pyomo counts on its own, from its own expressions; it leaves out alpha of a pixel without stroke and neighbour."""
     problem = problem_of(label)
@@ -143,7 +142,7 @@ def test_header_of_a_model_that_can_be_counted_by_hand():
     assert lines[6].split() == ["0", "4", "0", "4", "0"]
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_text_keeps_to_the_common_subset(label: str):
     problem = problem_of(label)
     text = b"".join(nl.generate(problem, start=points_of(problem)[0])).decode("ascii")

@@ -13,6 +13,7 @@ from crossfield.models.field import CrossField
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.instance import HALF, QUARTER, Instance
 from crossfield.models.problem import formulate, lifted, with_integers_fixed, with_rest_fixed
+from loops import for_each
 
 POLYNOMIAL = [label for label in CASES if not label.startswith("minlp-parity")]
 
@@ -25,7 +26,7 @@ def by_terms(terms, count, point):
     return total
 
 
-@pytest.mark.parametrize("label", POLYNOMIAL)
+@for_each("label", POLYNOMIAL)
 def test_terms_give_the_values_of_every_family(label):
     for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
         for point in points_of(problem):
@@ -39,7 +40,7 @@ def test_terms_give_the_values_of_every_family(label):
                 np.testing.assert_allclose(rest - family.limit, family.values(point), rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize("label", POLYNOMIAL)
+@for_each("label", POLYNOMIAL)
 def test_merged_objective_gives_its_value(label):
     for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
         merged = [problem.merged_objective(degree) for degree in range(problem.objective_degree + 1)]
@@ -63,7 +64,7 @@ def test_parity_is_no_polynomial():
 # columns
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_columns_and_rows_are_counted(label):
     problem = problem_of(label)
     instance = problem.instance
@@ -80,8 +81,8 @@ def test_columns_and_rows_are_counted(label):
         assert block.integer == (whole and (problem.pinned is None or problem.free is not None))
 
 
-@pytest.mark.parametrize("gauge", ["strokes", "box"])
-@pytest.mark.parametrize("shape", MASKS)
+@for_each("gauge", ["strokes", "box"])
+@for_each("shape", MASKS)
 def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
     problem = make_problem("minlp-cubic", make_instance(shape, gauge))
     instance = problem.instance
@@ -106,7 +107,7 @@ def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
 # points and fields
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_a_field_is_a_feasible_point_and_comes_back(label):
     problem = problem_of(label)
     field = make_field(problem.instance)  # also the one whose jumps are data or fixed
@@ -194,7 +195,7 @@ def test_fractional_jumps_of_an_answer_are_rounded():
 # fixed integers and data
 
 
-@pytest.mark.parametrize("name", [name for name in FORMULATIONS if name != "qp-fixed"])
+@for_each("name", [name for name in FORMULATIONS if name != "qp-fixed"])
 def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
     field = make_field(make_instance("parts"))
     problem = formulate(field.instance, name)
@@ -206,7 +207,7 @@ def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
     assert pinned.sha256 != problem.sha256
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
+@for_each("name", FORMULATIONS)
 def test_with_the_rest_fixed_only_what_lies_inside_is_free(name):
     field = make_field(make_instance("full"))
     grid = field.instance.grid

@@ -33,7 +33,7 @@ def loaded_after(code):
         "-c",
         f"import sys\n{code}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))",
     ]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     return set(done.stdout.split())
 
 
@@ -142,7 +142,7 @@ def test_the_models_import_nothing_of_export():
         f"import crossfield.{name}" for name in MODULES if name.startswith("models.")
     )
     command = [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules)"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert not [name for name in done.stdout.split() if name.startswith("crossfield.export")]
 
 

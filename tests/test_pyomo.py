@@ -18,6 +18,7 @@ from crossfield.export.pyomo_model import to_pyomo
 from crossfield.models.errors import InstanceError
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.problem import Problem
+from loops import for_each
 from oracles import by_casadi, by_highs, by_scip
 from pyomo.repn.plugins.lp_writer import LPWriter
 from pyomo.repn.plugins.nl_writer import NLWriter
@@ -37,7 +38,7 @@ def columns_of(model, problem: Problem) -> list:
     ]
 
 
-@pytest.mark.parametrize("label", [label for label in CASES if "far" not in label])
+@for_each("label", [label for label in CASES if "far" not in label])
 def test_model_is_the_problem(label: str):
     problem = problem_of(label)
     model = to_pyomo(problem)
@@ -97,7 +98,7 @@ def test_components_read_like_the_paper():
     assert model.name == "tiny miqcp-bilinear"
 
 
-@pytest.mark.parametrize("label", CASES)
+@for_each("label", CASES)
 def test_values_of_pyomos_nl_are_ours(label: str, tmp_path: Path):
     problem = problem_of(label)
     stream = io.StringIO()
@@ -124,9 +125,7 @@ def _wide(name: str, width: int) -> str:
     return "_".join(part.zfill(width) if part.isdigit() else part for part in name.split("_"))
 
 
-@pytest.mark.parametrize(
-    "label", [label for label in LOW_DEGREE if "far" not in label and "pixel" not in label]
-)
+@for_each("label", [label for label in LOW_DEGREE if "far" not in label and "pixel" not in label])
 def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
     """As LP holds them, with products lifted; SCIP reads the bilinear rows, HiGHS the rest."""
     problem = carried(problem_of(label), FORMATS["lp"])
@@ -161,7 +160,7 @@ def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
         assert excess == pytest.approx(problem.violation(point).rows, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
+@for_each("name", FORMULATIONS)
 def test_one_pixel_has_empty_components(name: str):
     problem = make_problem(name, make_instance("pixel"))
     model = to_pyomo(problem)

@@ -23,6 +23,7 @@ from crossfield.export.solution_text import (
 from crossfield.models.errors import InputError, OutputError, SolutionError
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loops import for_each
 
 HERE = Path(__file__).resolve().parent / "solutions"
 GOOD = sorted(HERE.glob("*.sol"))
@@ -68,7 +69,7 @@ def named(**values):
 # what real solvers write
 
 
-@pytest.mark.parametrize(
+@for_each(
     "file, reader, status, values, rows",
     [
         ("highs-1.15.1_optimal_style0", "highs", "optimal-global", OPTIMUM, 2),
@@ -161,9 +162,7 @@ def test_files_are_told_by_content_and_may_be_packed(tmp_path):
             np.testing.assert_array_equal(raw.values, plain.values)
 
 
-@pytest.mark.parametrize(
-    "path", [path for path in GOOD if "binary" not in path.name], ids=lambda path: path.stem
-)
+@for_each("path", [path for path in GOOD if "binary" not in path.name])
 def test_windows_line_ends_change_nothing(path):
     data = path.read_bytes()
     one, other = parse_raw(data), parse_raw(data.replace(b"\n", b"\r\n"))
@@ -208,7 +207,7 @@ def test_claims_of_highs(words, primal, status):
     assert (raw.status, raw.message, raw.values.tolist()) == (status, words, [1])
 
 
-@pytest.mark.parametrize(
+@for_each(
     "code, with_point, without_point",
     [
         (0, "optimal-local", None),
@@ -236,7 +235,7 @@ def test_solve_codes(code, with_point, without_point):
         assert (raw.status, raw.has_point) == (without_point, False)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "message, status",
     [
         ("optimal solution found", "optimal-global"),
@@ -266,13 +265,11 @@ def test_infeasible_or_unbounded_is_believed_from_its_words_alone():
 # layouts of AMPL files
 
 
-@pytest.mark.parametrize(
+@for_each(
     "tail", ["", "objno 0\n", "objno 0 403\n", "objno 0 403\nsuffix 0 1 4 0 0\nrc\n0 1\nkestrel_option x\n"]
 )
-@pytest.mark.parametrize("duals", [0, 2])
-@pytest.mark.parametrize(
-    "options, vbtol", [((1, 1, 0), ""), ((1, 3, 0), "1e-07"), ((), ""), ((1, 1, 0, 20020401), "")]
-)
+@for_each("duals", [0, 2])
+@for_each("options, vbtol", [((1, 1, 0), ""), ((1, 3, 0), "1e-07"), ((), ""), ((1, 1, 0, 20020401), "")])
 def test_layouts_of_ampl_text(options, vbtol, duals, tail):
     raw = parse_raw(ampl(options=options, vbtol=vbtol, duals=duals, tail=tail))
     assert (raw.values.tolist(), raw.rows) == ([1.5, -2], 2)
@@ -311,7 +308,7 @@ def test_values_in_order_belong_to_a_problem_of_the_same_size():
 # numbers
 
 
-@pytest.mark.parametrize(
+@for_each(
     "text, value",
     [
         ("0.9999999", 0.9999999),
@@ -341,7 +338,7 @@ def test_spellings_of_numbers(text, value):
     assert parse_raw(objective).objective == value
 
 
-@pytest.mark.parametrize(
+@for_each(
     "text", ["nan", "1_0", "0x10", "1,5", "--1", "1e", "1.5.3", "e5", "-", "1.#IND", "x" * 64, "1" * 64]
 )
 def test_what_is_not_a_number(text):
@@ -564,7 +561,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("path", sorted((HERE / "bad").iterdir()), ids=lambda path: path.stem)
+@for_each("path", sorted((HERE / "bad").iterdir()))
 def test_bad_files_are_refused_with_file_place_and_remedy(path):
     with pytest.raises(SolutionError, match=FAULTS[path.stem]) as caught:
         read_raw(path)
@@ -629,7 +626,7 @@ def test_files_that_cannot_be_read(tmp_path):
             read_raw(tmp_path / name)
 
 
-@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+@for_each("path", GOOD)
 def test_a_file_cut_anywhere_never_gives_another_point_or_a_stronger_claim(path):
     data = path.read_bytes()
     whole = parse_raw(data)
@@ -717,7 +714,7 @@ def test_damaged_files_are_refused_or_read(path, damages):
     attempt(data)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "part",
     [
         b"\n",
@@ -735,6 +732,6 @@ def test_damaged_files_are_refused_or_read(path, damages):
         b"1.#INF",
     ],
 )
-@pytest.mark.parametrize("head", [b"", b"Model status\n", b"\nOptions\n", b"m\n\n"])
+@for_each("head", [b"", b"Model status\n", b"\nOptions\n", b"m\n\n"])
 def test_long_repetitions_take_no_long_time(head, part):
     attempt(head + part * (300_000 // len(part)))

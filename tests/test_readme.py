@@ -20,10 +20,10 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_python_block_runs(tmp_path):
     (block,) = blocks("python")
-    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, check=True, timeout=200)
+    subprocess.run([sys.executable, "-c", block], cwd=tmp_path, check=True)
     assert {path.name for path in tmp_path.iterdir()} >= {"bottle.mps", "bottle.png"}
 
 
@@ -31,16 +31,16 @@ def run_line_by_line(block, folder):
     for line in block.splitlines():
         words = shlex.split(line)
         command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
-        subprocess.run(command, cwd=folder, check=True, timeout=200, stdout=subprocess.DEVNULL)
+        subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_tour_runs_line_by_line(tmp_path):
     run_line_by_line(blocks("sh")[2], tmp_path)
     assert (tmp_path / "field.png").stat().st_size > 10_000
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_files_are_verified_and_an_answer_read_back(tmp_path):
     verify, glpk = blocks("sh")[3:5]
     run_line_by_line(verify, tmp_path)
@@ -67,7 +67,7 @@ sample = "mouse"
 """
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_a_library_is_built_verified_and_shown(tmp_path):
     (block,) = blocks("sh")[5:]
     (tmp_path / "small.toml").write_text(SPEC)

@@ -30,6 +30,7 @@ from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.instance import Instance
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 NASTY = [
     0.0, -0.0, 1.0, -1.0, 3.0, 0.1, 0.1 + 0.2, 1 / 3, -2 / 3, math.pi, math.pi / 2, 1e-6, 1e-9, -1e-9, 5e-324, 2.2250738585072014e-308,
@@ -45,7 +46,7 @@ def text(parts, count, **options) -> bytes:
 # numbers
 
 
-@pytest.mark.parametrize("value", NASTY)
+@for_each("value", NASTY)
 def test_numbers_survive(value):
     assert float(number(value)) == value
     assert not number(value).startswith("-0") or value != 0
@@ -211,7 +212,7 @@ def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypat
 # blocks
 
 
-@pytest.mark.parametrize("count", [0, 1, 3, 4, 5, 7, 8, 9])
+@for_each("count", [0, 1, 3, 4, 5, 7, 8, 9])
 def test_a_block_leaves_no_seam(count, monkeypatch):
     monkeypatch.setattr(records, "BLOCK", 4)
     values = np.arange(count) ** 5
@@ -232,8 +233,8 @@ WRITERS = {
 }
 
 
-@pytest.mark.parametrize("writer", WRITERS)
-@pytest.mark.parametrize("name", ["miqcp-bilinear", "milp-mccormick", "qp-fixed"])
+@for_each("writer", WRITERS)
+@for_each("name", ["miqcp-bilinear", "milp-mccormick", "qp-fixed"])
 def test_blocks_leave_no_seam_in_any_format(name, writer, monkeypatch):
     """Lines of 3, 4, 5, 7, 8 and 9 pixels: families of k * 4 - 1, k * 4 and k * 4 + 1 records, and one pixel with no pairs."""
     for count in (1, 3, 4, 5, 7, 8, 9):
@@ -267,8 +268,8 @@ def test_ordinary_coefficients_pass():
     check_coefficients(np.zeros(0), "the objective")
 
 
-@pytest.mark.parametrize("suffix", ["lp", "mps"])
-@pytest.mark.parametrize(
+@for_each("suffix", ["lp", "mps"])
+@for_each(
     "name, weights",
     [
         ("milp-mccormick", {"w_beta": 5e-10}),

@@ -10,6 +10,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.field import CrossField
 from crossfield.models.samples import SAMPLES, sample, sample_svg, samples
 from crossfield.models.svg import read_svg
+from loops import for_each
 from scipy import ndimage
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
@@ -50,8 +51,8 @@ def test_there_are_drawings_in_one_and_in_two_colours():
     assert sum(mixed) <= len(mixed) - 2
 
 
-@pytest.mark.parametrize("name", list(SAMPLES))
-@pytest.mark.parametrize("size", [8, 16, 24, 48, 96])
+@for_each("name", list(SAMPLES))
+@for_each("size", [8, 16, 24, 48, 96])
 def test_every_sample_is_one_connected_region_with_enough_strokes(name, size):
     instance = sample(name, size)
     assert max(instance.mask.shape) == size

@@ -186,8 +186,9 @@ def test_search_ends_by_itself_when_nothing_is_found():
     assert found.field.energy().total < 1e-4
 
 
-def test_search_ends_in_time():
-    found = cf.search(cf.sample("mouse", 16), seconds=0.5, jobs=1)
+def test_a_search_whose_time_is_over_ends_with_what_it_has():
+    instance = cf.sample("mouse", 16)
+    found = cf.search(instance, seconds=1e-9, jobs=1)
     assert found.ended == "time"
     assert found.field.energy().total <= greedy(found.field.instance).energy().total + 1e-9
 

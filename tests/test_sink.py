@@ -18,6 +18,7 @@ from crossfield.export.manifest import write_all
 from crossfield.export.sink import gzipped, joined, save
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from oracles import by_highs, by_scip
 
 TEXT = b"".join(b"c14_%03d: + 1 s_%03d >= 0\n" % (number, number * 7 % 1000) for number in range(1000))
@@ -27,8 +28,8 @@ def cut(data: bytes, length: int) -> list[bytes]:
     return [data[start : start + length] for start in range(0, len(data), length)]
 
 
-@pytest.mark.parametrize("share", [1, 999, 1000, 1001, 1 << 20])
-@pytest.mark.parametrize("length", [1, 1000, 1 << 20])
+@for_each("share", [1, 999, 1000, 1001, 1 << 20])
+@for_each("length", [1, 1000, 1 << 20])
 def test_count_and_hash_are_those_of_the_file(length, share, tmp_path, monkeypatch):
     monkeypatch.setattr(sink, "SHARE", share)
     for name in ("a.lp", "a.lp.gz"):

@@ -11,6 +11,7 @@ from crossfield.export.solution_text import Status
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.problem import formulate, lifted
+from loops import for_each
 
 LIFTED = ("minlp-quartic", "minlp-cubic")
 
@@ -41,8 +42,8 @@ def by_position(path, problem, point, *, binary=False):
     return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.row_count, 0, binary=binary)
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
-@pytest.mark.parametrize("kind", ["names", "text", "binary"])
+@for_each("name", FORMULATIONS)
+@for_each("kind", ["names", "text", "binary"])
 def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
     problem = problem_of(field, name)
     point = problem.point(field)

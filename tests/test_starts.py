@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 from cases import make_field, make_instance
-from crossfield.export.consumers import CONSUMERS
 from crossfield.export.formats import write
 from crossfield.export.starts import STARTS, start_of, write_start, write_starts
 from crossfield.models.errors import InputError, UnsupportedBySolverError
 from crossfield.models.formulations import FORMULATIONS
 from crossfield.models.problem import Problem, formulate
+from loops import for_each
 
 pytestmark = pytest.mark.oracles
 
@@ -23,12 +23,6 @@ MIXED = [name for name in FORMULATIONS if name not in {"qp-fixed", "minlp-parity
 CONVEX = ["minlp-quartic", "miqp-mccormick", "milp-mccormick", "miqp-exact"]
 """Those whose LP and MPS files are convex: (8) is, with its products lifted."""
 BOTH = ("lp", "mps")
-
-
-def needs(consumer: str) -> None:
-    entry = CONSUMERS[consumer]
-    if not entry.present:
-        pytest.skip(f"{entry.title} is not installed: {entry.install}")
 
 
 def given(name: str, solver: str, folder: Path, suffix: str) -> tuple[Problem, Path, Path, float]:
@@ -42,10 +36,10 @@ def given(name: str, solver: str, folder: Path, suffix: str) -> tuple[Problem, P
     return problem, folder / f"model.{suffix}", path, objective
 
 
-@pytest.mark.parametrize("suffix", BOTH)
-@pytest.mark.parametrize("name", MIXED)
+@pytest.mark.needs("gurobi")
+@for_each("suffix", BOTH)
+@for_each("name", MIXED)
 def test_gurobi_takes_it(name: str, suffix: str, tmp_path: Path):
-    needs("gurobi")
     import gurobipy
 
     _, model, start, objective = given(name, "gurobi", tmp_path, suffix)
@@ -61,10 +55,10 @@ def test_gurobi_takes_it(name: str, suffix: str, tmp_path: Path):
     assert re.search(r"^Loaded user MIP start with objective", log.read_text(), re.MULTILINE)
 
 
-@pytest.mark.parametrize("suffix", BOTH)
-@pytest.mark.parametrize("name", CONVEX)
+@pytest.mark.needs("cplex")
+@for_each("suffix", BOTH)
+@for_each("name", CONVEX)
 def test_cplex_takes_it(name: str, suffix: str, tmp_path: Path):
-    needs("cplex")
     import cplex
 
     _, model, start, objective = given(name, "cplex", tmp_path, suffix)
@@ -85,9 +79,9 @@ def test_cplex_takes_it(name: str, suffix: str, tmp_path: Path):
     assert read.solution.get_objective_value() == pytest.approx(objective, rel=1e-9)
 
 
-@pytest.mark.parametrize("suffix", BOTH)
+@pytest.mark.needs("highs")
+@for_each("suffix", BOTH)
 def test_highs_takes_it(suffix: str, tmp_path: Path):
-    needs("highs")
     import highspy
 
     _, model, start, objective = given("milp-mccormick", "highs", tmp_path, suffix)
@@ -105,14 +99,14 @@ def test_highs_takes_it(suffix: str, tmp_path: Path):
     assert "WARNING" not in text
 
 
-@pytest.mark.parametrize("suffix", ["nl", *BOTH])
-@pytest.mark.parametrize("name", [*MIXED, "minlp-parity"])
+@pytest.mark.needs("scip")
+@for_each("suffix", ["nl", *BOTH])
+@for_each("name", [*MIXED, "minlp-parity"])
 def test_scip_takes_it(name: str, suffix: str, tmp_path: Path):
-    needs("scip")
     import pyscipopt
 
     if (name, suffix) in {("minlp-parity", "lp"), ("minlp-parity", "mps")}:
-        pytest.skip("LP and MPS hold no cosine")
+        return  # they hold no cosine
     _, model, start, objective = given(name, "scip", tmp_path, suffix)
     scip = pyscipopt.Model()
     scip.hideOutput()
@@ -123,10 +117,10 @@ def test_scip_takes_it(name: str, suffix: str, tmp_path: Path):
     assert scip.addSol(solution)
 
 
-@pytest.mark.parametrize("suffix", BOTH)
-@pytest.mark.parametrize("name", CONVEX)
+@pytest.mark.needs("xpress")
+@for_each("suffix", BOTH)
+@for_each("name", CONVEX)
 def test_xpress_takes_it(name: str, suffix: str, tmp_path: Path):
-    needs("xpress")
     with warnings.catch_warnings(action="ignore"):
         import xpress
 

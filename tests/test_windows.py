@@ -1,13 +1,12 @@
 """Windows that exact solvers solve: pieces of a field, the search over them, and what it promises."""
 
 import json
-import subprocess
-import sys
 
 import crossfield as cf
 import numpy as np
 import pytest
 from children import interrupted
+from crossfield.export.cli import invoke
 from crossfield.export.windows import WINDOW_SOLVERS, search_windows
 from crossfield.models.excerpt import excerpt
 from crossfield.models.field import CrossField
@@ -59,12 +58,11 @@ def test_a_piece_without_strokes_takes_the_nearest_one_along():
     assert np.nonzero(piece.pairs)[0].tolist() == [3, 4]
 
 
-@pytest.mark.solver
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_windows_as_large_as_the_grid_reach_the_optimum_over_all_jumps(seed):
-    instance = random_instance(seed, shape=(2, 3), strokes=6)
+    instance = random_instance(seed, shape=(2, 2), strokes=4)
     start = instance_start(instance, seed)
-    found = search_windows(start, seconds=60, jobs=1)
+    found = search_windows(start, seconds=1000, jobs=1)
     least = exact(instance)
     assert found.ended == "windows"
     assert found.closed == found.windows
@@ -82,12 +80,14 @@ def instance_start(instance, seed):
     return CrossField(instance, alpha, np.zeros(instance.grid.size), p)
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", WINDOW_SOLVERS)
 def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     start = first_field(cf.sample("mouse", 10))
     told = []
-    found = search_windows(start, seconds=4, solver=solver, jobs=2, progress=lambda *line: told.append(line))
+    found = search_windows(
+        start, seconds=0.5, solver=solver, jobs=2, progress=lambda *line: told.append(line)
+    )
     field = found.field
     assert field.energy().total <= start.energy().total
     assert found.lower == 0 or field.energy().total < start.energy().total
@@ -107,18 +107,21 @@ def test_limits_and_solvers_that_cannot_be_are_refused(given):
         search_windows(first_field(cf.sample("skew", 6)), **given)
 
 
-@pytest.mark.solver
-def test_from_the_command_line_with_highs(tmp_path):
-    command = [sys.executable, "-m", "crossfield", "solve", "skew", "--size", "5", "--method", "windows"]
-    command += ["--solver", "highs", "--time-limit", "60", "--json", "-o", str(tmp_path)]
-    facts = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    assert facts["windows"] >= max(1, facts["windows_closed"])
+def test_from_the_command_line_with_highs(tmp_path, capsys):
+    """On a grid as small as a window all windows are solved to the end, long before the limit."""
+    instance = random_instance(1, shape=(2, 2), strokes=4)
+    path = cf.write_instance(instance, tmp_path / "small.json")
+    command = ["solve", str(path), "--method", "windows", "--solver", "highs", "--time-limit", "1000"]
+    assert invoke([*command, "--json", "-o", str(tmp_path)]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["windows"] == facts["windows_closed"] > 0
     assert facts["windows_lower"] >= 0
-    assert facts["energy_2_norm"] <= first_field(cf.sample("skew", 5)).energy().total
+    assert facts["energy_2_norm"] <= first_field(instance).energy().total
 
 
 CHILD = """
 import crossfield as cf
+from crossfield.export.cli import invoke
 from crossfield.export.windows import search_windows
 from crossfield.models.improvement import first_field
 if True:
@@ -128,7 +131,7 @@ if True:
 """
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_ctrl_c_gives_the_best_field_so_far():
     ended, energy = interrupted(CHILD)
     assert ended == "interrupted"
