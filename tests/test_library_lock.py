@@ -36,7 +36,7 @@ seeds = [1, 2]
 """
 
 
-def write_spec(folder, size=3, more=""):
+def write_spec(folder, size=4, more=""):
     (folder / "spec.toml").write_text(SPEC.format(size=size) + more)
     return read_spec(folder / "spec.toml")
 
