@@ -531,7 +531,12 @@ DISK = {
 }
 
 
-@pytest.mark.parametrize("case", DISK)
+SLOW = ("solve", "run", "draw pdf")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in DISK]
+)
 def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
     arguments, output, limit = DISK[case]
     monkeypatch.chdir(tmp_path)

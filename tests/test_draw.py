@@ -61,7 +61,7 @@ def place(found, picture):
     + [("overview", ".svg"), ("overview", ".pdf"), ("energy", ".svg")],
 )
 def test_every_kind_is_written_the_same_twice(tmp_path, kind, suffix):
-    field = singular(8)
+    field = singular(5)
     first = draw(field, tmp_path / f"first{suffix}", kind=kind, title="A sketch")
     assert first == tmp_path / f"first{suffix}"
     data = first.read_bytes()

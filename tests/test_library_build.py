@@ -470,6 +470,7 @@ def test_random_instances_follow_size_and_seed_alone():
 # The same bytes, however it is made
 
 
+@pytest.mark.slow
 def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(built, spec, tmp_path):
     command = build_command(spec, tmp_path / "again")
     environment = os.environ | {"PYTHONHASHSEED": "7"}
@@ -596,6 +597,7 @@ def better_field(library, name):
     return document, problem, field_of(found.problem, found.point)
 
 
+@pytest.mark.slow
 def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_elsewhere(
     built, spec, copy, tmp_path
 ):

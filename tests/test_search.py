@@ -277,7 +277,7 @@ if True:
 """
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_ctrl_c_gives_the_best_field_so_far():
     ended, energy = interrupted(CHILD)
     assert ended == "interrupted"
