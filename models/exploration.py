@@ -34,7 +34,7 @@ class Task:
 
     x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the window, shape (n,);
     curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to try; seed: of their choice;
-    seconds: after which to end.
+    deadline: when to end.
     """
 
     instance: Instance
@@ -44,7 +44,7 @@ class Task:
     curve: Ints
     kicks: int
     seed: tuple[int, ...]
-    seconds: float = np.inf
+    deadline: Deadline
 
 
 class Explored(NamedTuple):
@@ -60,11 +60,10 @@ class Explored(NamedTuple):
 def explore(task: Task) -> Explored:
     """What was found in a window; energies are those of the definition, within all bounds of the angles.
 
-    The same task gives the same field unless its seconds run out: on one thread, for the sums of several threads end in other digits.
+    The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several threads end in other digits.
     """
-    deadline = Deadline.after(task.seconds)
     with threadpool_limits(1, user_api="blas"), suppress(np.linalg.LinAlgError):
-        return _explore(task, deadline.passed)
+        return _explore(task, lambda: task.deadline.passed)
     return Explored(None, whole=True)
 
 

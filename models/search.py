@@ -8,8 +8,8 @@ grids of lower resolution and the last round are cut off. What a round that was 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -33,7 +33,7 @@ from .side_by_side import side_by_side
 Progress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
 
-Explorers = Callable[[Iterable[Task]], list[Explored]]
+Explorers = Callable[[list[Task]], list[Explored]]
 """Explores windows side by side and gives what was found in the order of the tasks."""
 
 _WINDOW: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
@@ -83,9 +83,11 @@ def search(
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     with interruptible() as interrupted:
-        limits = _Limits(Deadline() if seconds is None else Deadline.after(seconds), rounds, interrupted)
+        limits = _Limits(
+            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
+        )
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
-        alone = instance.grid.size <= _ALONE or limits.deadline.left < _HURRY
+        alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
             with side_by_side(explore, 1 if alone else jobs) as explorers:
                 if hunt.large:
@@ -100,7 +102,10 @@ def search(
 def _closing(seconds: float | None) -> Over:
     """When the last solve has to end."""
     share, more = _CLOSING
-    return never if seconds is None else Deadline.after(share * seconds + more).passed
+    if seconds is None:
+        return never
+    deadline = Deadline.after(share * seconds + more)
+    return lambda: deadline.passed
 
 
 @dataclass(frozen=True)
@@ -117,18 +122,16 @@ class _Limits:
             return "interrupted"
         if rounds == self.rounds:
             return "rounds"
-        return "time" if self.deadline.passed() else ""
+        return "time" if self.deadline.passed else ""
 
     def over(self) -> bool:
         """Whether work has to end now, in the midst of a round too."""
-        return self.interrupted() or self.deadline.passed()
+        return self.interrupted() or self.deadline.passed
 
     def coarse(self) -> _Limits:
         """The limits of the search on the grid of half the resolution."""
-        left = self.deadline.left
-        deadline = self.deadline if left == np.inf else Deadline.after((1 - _FINE) * left)
         many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
-        return _Limits(deadline, many, self.interrupted)
+        return _Limits(self.deadline.share(1 - _FINE), many, self.interrupted)
 
 
 def _from_coarse(
@@ -209,20 +212,20 @@ class _Hunt:
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
-            tasks = self.tasks()
-            found = explorers(replace(task, seconds=limits.deadline.left) for task in tasks)
+            tasks = self.tasks(limits.deadline)
+            found = explorers(tasks)
             self._take(tasks, [each.better for each in found], limits.over)
             if all(each.whole for each in found) and not limits.over():
                 self.round += 1
             progress(self.round, self.energies[-1][1])
         return ended
 
-    def tasks(self) -> list[Task]:
-        """What to explore in this round."""
+    def tasks(self, deadline: Deadline) -> list[Task]:
+        """What to explore in this round, until when."""
         rng = np.random.default_rng((self._seed, self.round))
         x, p = self._state.x, self._state.p
         return [
-            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number))
+            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number), deadline)
             for number, free in enumerate(self._windows(rng))
         ]
 
