@@ -21,6 +21,7 @@ from xml.etree.ElementTree import Element, ParseError
 import numpy as np
 
 from .curves import Curves, lines_as_cubics
+from .elementary import turned
 from .errors import InputError
 from .grid import Floats
 from .ink import is_paper, is_red
@@ -234,9 +235,8 @@ def _cubics(place: _Place, canvas: tuple[float, float, float, float] | None) -> 
     m = place.matrix
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.concatenate([lines_as_cubics(straight[:, 0], straight[:, 1]), curved])
-        placed: Floats = points @ np.array([[m.a, m.b], [m.c, m.d]], dtype=float) + np.array(
-            [m.e, m.f], dtype=float
-        )
+        turn, shift = np.array([[m.a, m.c], [m.b, m.d]], dtype=float), np.array([m.e, m.f], dtype=float)
+        placed: Floats = turned(points, turn) + shift
     if not (np.abs(placed) <= _GREATEST).all():
         raise InputError(f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}")
     drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
