@@ -36,7 +36,8 @@ def build(
     """The library of a specification, now in the folder.
 
     jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead. progress: called with a line for each entry that
-    is made. Same specification and ledger, same bytes, wherever they are made. Raises InputError, OutputError, BuildError.
+    is made. Same specification and ledger, same bytes, with any number of processes; on another kind of processor, points may end in other
+    digits. Raises InputError, OutputError, BuildError.
     """
     plans = plan(spec)
     folder = make_folder(folder)
@@ -58,6 +59,14 @@ def build(
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
     """A library brought up to date after its ledger changed; only what the change touches is made again."""
     return build(read_library(folder).spec, folder, jobs=jobs, progress=progress)
+
+
+def unmatched(library: Library) -> list[Record]:
+    """The records of a library's ledger that count for nothing: the problem of their entry has changed since."""
+    records = read_ledger(library.folder).records
+    names = {record.entry for record in records} & set(library.document["entries"])
+    problems = {name: library.entry(name)["problem_sha256"] for name in names}
+    return [each for each in records if problems.get(each.entry, each.problem_sha256) != each.problem_sha256]
 
 
 def _sweep(folder: Path) -> None:
