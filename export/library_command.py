@@ -39,7 +39,7 @@ def build_command(
 
     What is whole in the folder is kept, so that a build that was stopped continues.
     """
-    from .library.build import build
+    from .library.build import build, unmatched
     from .library.spec import default_spec, read_spec
 
     with progress(quiet=quiet) as show:
@@ -50,6 +50,11 @@ def build_command(
         say_json(built.document)
     elif not quiet:
         say(f"{output}: {len(built.document['entries'])} entries")
+    if stale := sorted({record.entry for record in unmatched(built)}):
+        complain(
+            f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have changed since:"
+            f" {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with `crossfield library solve`"
+        )
 
 
 @library.command("solve")

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from .angles import wrap
+from .elementary import arctangent, cosine, length, sine, turned
 from .errors import InputError
 from .grid import Bools, Floats
 from .instance import Gauge, Instance
@@ -47,11 +48,11 @@ class Surface:
 
     def point(self, s: Floats, t: Floats) -> Floats:
         """Points of the turned surface, shape (..., 3)."""
-        return self.position(s, t) @ self.turn.T
+        return turned(self.position(s, t), self.turn)
 
     def tangents(self, s: Floats, t: Floats) -> tuple[Floats, Floats]:
         """Derivatives of the turned surface by s and by t, shape (..., 3) each."""
-        return self.along_s(s, t) @ self.turn.T, self.along_t(s, t) @ self.turn.T
+        return turned(self.along_s(s, t), self.turn), turned(self.along_t(s, t), self.turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +70,9 @@ class AnalyticInstance:
 def _turn(tilt: float, spin: float) -> Floats:
     """The rotation that tips the top away from the viewer by `tilt` about x and then spins the picture by `spin` about z (degrees)."""
     a, b = np.radians([-tilt, spin])
-    about_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
-    about_z = np.array([[np.cos(b), -np.sin(b), 0], [np.sin(b), np.cos(b), 0], [0, 0, 1]])
-    turn: Floats = about_z @ about_x
-    return turn
+    about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
+    about_z = np.array([[cosine(b), -sine(b), 0], [sine(b), cosine(b), 0], [0, 0, 1]])
+    return turned(about_x.T, about_z).T
 
 
 def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
@@ -84,8 +84,8 @@ _WAVE: Final = 0.6  # height of the wave
 
 SURFACES: Final[dict[str, Surface]] = {
     "tilted_cylinder": Surface(
-        position=lambda s, t: _vectors(np.cos(s), t, np.sin(s)),
-        along_s=lambda s, t: _vectors(-np.sin(s), 0 * t, np.cos(s)),
+        position=lambda s, t: _vectors(cosine(s), t, sine(s)),
+        along_s=lambda s, t: _vectors(-sine(s), 0 * t, cosine(s)),
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
         s_range=(0.45, np.pi - 0.45),
         t_range=(-1.3, 1.3),
@@ -94,13 +94,13 @@ SURFACES: Final[dict[str, Surface]] = {
     ),
     "torus_patch": Surface(
         position=lambda s, t: _vectors(
-            (1 + _TUBE * np.cos(t)) * np.cos(s), (1 + _TUBE * np.cos(t)) * np.sin(s), _TUBE * np.sin(t)
+            (1 + _TUBE * cosine(t)) * cosine(s), (1 + _TUBE * cosine(t)) * sine(s), _TUBE * sine(t)
         ),
         along_s=lambda s, t: _vectors(
-            -(1 + _TUBE * np.cos(t)) * np.sin(s), (1 + _TUBE * np.cos(t)) * np.cos(s), 0 * s
+            -(1 + _TUBE * cosine(t)) * sine(s), (1 + _TUBE * cosine(t)) * cosine(s), 0 * s
         ),
         along_t=lambda s, t: _vectors(
-            -_TUBE * np.sin(t) * np.cos(s), -_TUBE * np.sin(t) * np.sin(s), _TUBE * np.cos(t)
+            -_TUBE * sine(t) * cosine(s), -_TUBE * sine(t) * sine(s), _TUBE * cosine(t)
         ),
         s_range=(0.5, np.pi - 0.4),
         t_range=(0.7, np.pi - 0.3),
@@ -108,8 +108,8 @@ SURFACES: Final[dict[str, Surface]] = {
         share=0.2,
     ),
     "wave_sheet": Surface(
-        position=lambda s, t: _vectors(s, t, _WAVE * np.sin(s)),
-        along_s=lambda s, t: _vectors(1 + 0 * s, 0 * t, _WAVE * np.cos(s)),
+        position=lambda s, t: _vectors(s, t, _WAVE * sine(s)),
+        along_s=lambda s, t: _vectors(1 + 0 * s, 0 * t, _WAVE * cosine(s)),
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
         s_range=(-1.5 * np.pi, 1.5 * np.pi),
         t_range=(-4.0, 4.0),
@@ -133,7 +133,7 @@ def analytic(name: str, size: int = 24, gauge: Gauge = "strokes") -> AnalyticIns
     surface = SURFACES[name]
     frame = _frame(surface, size)
     s, t, mask = _parameters(surface, frame)
-    u_angle, v_angle = (wrap(np.arctan2(d[:, 1], d[:, 0]), 0.0, np.pi) for d in surface.tangents(s, t))
+    u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in surface.tangents(s, t))
     weight, on_u = _strokes(surface, frame, mask)
     stroke = weight >= LEAST_WEIGHT
     instance = Instance(
@@ -161,7 +161,7 @@ def _parameters(surface: Surface, frame: Frame) -> tuple[Floats, Floats, Bools]:
     row, column = np.indices(frame.shape).reshape(2, -1)
     wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
     s, t = _invert(surface, wanted)
-    miss = np.linalg.norm(surface.point(s, t)[:, :2] - wanted, axis=-1)
+    miss = length(*(surface.point(s, t)[:, :2] - wanted).T)
     on_patch = (miss < 1e-9) & _within(s, surface.s_range) & _within(t, surface.t_range)
     if not on_patch.any():
         raise InputError("no pixel centre lies on the surface; choose a larger size")
@@ -212,13 +212,13 @@ def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
 def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
     """Weight [height, width] of the drawn lines, 0 outside the mask, and which pixels (n,) carry a line of family u.
 
-    The spacing of the lines is bisected; the best share seen wins.
+    The spacing of the lines is bisected by ratio; the best share seen wins.
     """
-    near, far = np.log(1.0), np.log(float(max(frame.shape)))
+    near, far = 1.0, float(max(frame.shape))
     best: tuple[float, Floats, Bools] | None = None
     for _ in range(_BISECTIONS):
-        middle = (near + far) / 2
-        weight, on_u = _drawn(surface, frame, mask, spacing=float(np.exp(middle)))
+        middle = float(np.sqrt(near * far))
+        weight, on_u = _drawn(surface, frame, mask, spacing=middle)
         share = float((weight >= LEAST_WEIGHT).sum() / mask.sum())
         near, far = (middle, far) if share > surface.share else (near, middle)
         if best is None or abs(share - surface.share) < best[0]:
@@ -260,7 +260,7 @@ def _spread(ends: tuple[float, float], count: float) -> Floats:
 
 
 def _length(surface: Surface, s: Floats, t: Floats) -> float:
-    return float(np.hypot(*np.diff(surface.point(s, t)[:, :2], axis=0).T).sum())
+    return float(length(*np.diff(surface.point(s, t)[:, :2], axis=0).T).sum())
 
 
 def _polylines(surface: Surface, s: Floats, t: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .elementary import arctangent, cosine, sine
 from .grid import Floats
 
 
@@ -22,9 +23,9 @@ def line_difference(first: Floats, second: Floats) -> Floats:
 
 def double_angle(angle: Floats) -> Floats:
     """Unit vectors (cos 2a, sin 2a) that are equal for equal lines; a last axis of length 2 is added."""
-    return np.stack([np.cos(2 * angle), np.sin(2 * angle)], axis=-1)
+    return np.stack([cosine(2 * angle), sine(2 * angle)], axis=-1)
 
 
 def line_of(vector: Floats) -> Floats:
     """The line direction in [0, pi) of double-angle vectors (last axis of length 2)."""
-    return wrap(np.arctan2(vector[..., 1], vector[..., 0]) / 2, 0.0, np.pi)
+    return wrap(arctangent(vector[..., 1], vector[..., 0]) / 2, 0.0, np.pi)

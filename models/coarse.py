@@ -1,7 +1,7 @@
 """The same sketch on a grid of half the resolution, and a field brought from there to the fine grid.
 
 The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a quarter of the pairs. So the
-weights of strokes and of beta, which are sums over pixels, are made four times as large.
+weights of strokes and of beta, which are sums over pixels, are made four times as large, up to the greatest that an instance may have.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .field import CrossField
 from .free_field import FreeField, parity_sign
 from .grid import Floats, Ints
 from .improvement import improved, settle
-from .instance import HALF, Instance
+from .instance import HALF, MOST_WEIGHT, Instance
 from .quadratic import Solver
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
@@ -42,8 +42,8 @@ def halved(instance: Instance) -> Instance | None:
         stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
         theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
         w=weight[kept] / 4,
-        w_strokes=4 * instance.w_strokes,
-        w_beta=4 * instance.w_beta,
+        w_strokes=min(4 * instance.w_strokes, MOST_WEIGHT),
+        w_beta=min(4 * instance.w_beta, MOST_WEIGHT),
         pixel_size=2 * instance.pixel_size,
     )
 

@@ -66,5 +66,7 @@ def _at(points: Floats, t: Floats) -> Floats:
     t = t[:, None]
     back = 1 - t
     start, first, second, end = points.swapaxes(0, 1)
-    at: Floats = back**3 * start + 3 * back**2 * t * first + 3 * back * t**2 * second + t**3 * end
+    at: Floats = (
+        back * back * back * start + 3 * back * back * t * first + 3 * back * t * t * second + t * t * t * end
+    )
     return at

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 Clock = Callable[[], float]
 
 Over = Callable[[], bool]
-"""Says whether work has to end now."""
+"""Says whether work has to end now: it is asked at every good place, and the work then gives what it has."""
 
 
 def never() -> bool:
@@ -23,7 +23,10 @@ def never() -> bool:
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment of a clock in seconds, `inf` for none; that of `time.monotonic` is the same in all processes of a machine."""
+    """A moment of a clock in seconds, `inf` for none; that of `time.monotonic` is the same in all processes of a machine.
+
+    That holds on Linux and is promised nowhere. So a pickled deadline says how much is left when it is sent, and counts from its arrival.
+    """
 
     at: float = math.inf
     clock: Clock = time.monotonic
@@ -32,6 +35,9 @@ class Deadline:
     def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
         """The moment so many seconds from now."""
         return cls(clock() + seconds, clock)
+
+    def __reduce__(self) -> tuple[Callable[[float], Deadline], tuple[float]]:
+        return Deadline.after, (self.left(),)
 
     def left(self) -> float:
         """Seconds until then; 0.0 once it has passed."""

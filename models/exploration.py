@@ -7,7 +7,7 @@ none of a jump that has just changed, unless that is the lowest point so far.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -44,7 +44,7 @@ class Task:
     curve: Ints
     kicks: int
     seed: tuple[int, ...]
-    deadline: Deadline = field(default_factory=Deadline)
+    deadline: Deadline
 
 
 class Explored(NamedTuple):

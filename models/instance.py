@@ -20,7 +20,14 @@ GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 QUARTER: Final = np.pi / 4
 HALF: Final = np.pi / 2
 _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
-_SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
+_DECIMALS = 12  # of theta and w
+_FINE = 1e-3  # reliabilities up to here would lose digits that count
+_FARTHEST = 1e100  # coordinates whose squares are finite numbers
+_MOST_ANGLE = 1e6  # radians that leave enough digits modulo pi
+_SLACK = 1e-9  # floor and ceil of jump bounds, and the ends of ranges, forgive this much rounding
+
+MOST_WEIGHT: Final = 1e6
+"""Greatest weight of a term of the energy."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
 """Instance names: lower case, digits and underscores, at most 32 characters, as instance libraries ask for."""
@@ -43,6 +50,11 @@ def whole_numbers(values: Any, name: str) -> Ints:
     return given.astype(np.int32)
 
 
+def _in_digits(value: float) -> float:
+    """The number rounded to 12 significant decimal digits."""
+    return float(f"{value:.12g}") + 0.0  # no -0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Instance:
     """A mask with stroke directions on some of its pixels, and the weights of the energy.
@@ -50,14 +62,17 @@ class Instance:
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
     mask: bool [height, width], row 0 at the top; True = solve for this pixel.
     stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
-    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi, and as 0 below
-    1e-8: a cost that small would be dropped by readers of the files.
-    w: float (s,), reliability of each direction in (0, 1].
-    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6).
+    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi, rounded to 12 decimals, and as 0
+    within 1e-8 of the horizontal: a cost that small would be dropped by readers of the files.
+    w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
+    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6), at most 1e6: beyond, an energy that rounding leaves in the one term
+    hides the others.
     gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
     source: where the sketch came from, one line of text.
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
-    corner of pixel [0, 0], with y downwards as sketches have it.
+    corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is in [1e-100, 1e100], origin up to that.
+
+    Rounding makes instances, and so their hashes, the same where the last digit differs between processors. It changes nothing twice.
 
     Raises InstanceError when a rule is broken. Section 1 and 2 of the formulation notes.
     """
@@ -80,13 +95,15 @@ class Instance:
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         self._freeze("theta", np.asarray(self.theta, dtype=np.float64))
         self._freeze("w", np.asarray(self.w, dtype=np.float64))
-        object.__setattr__(self, "origin", (float(self.origin[0]), float(self.origin[1])))
-        for name in ("w_strokes", "w_beta", "pixel_size"):
+        object.__setattr__(self, "origin", (_in_digits(self.origin[0]), _in_digits(self.origin[1])))
+        for name in ("w_strokes", "w_beta"):
             object.__setattr__(self, name, float(getattr(self, name)))
+        object.__setattr__(self, "pixel_size", _in_digits(self.pixel_size))
         self._check_scalars()
         self._check_strokes()
-        theta = wrap(self.theta, 0.0, np.pi)
-        self._freeze("theta", np.where(theta < _FLAT, 0.0, theta))
+        theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
+        self._freeze("theta", np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta))
+        self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
 
     def _freeze(self, name: str, value: Any) -> None:
         value = value.copy()
@@ -102,12 +119,18 @@ class Instance:
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
         for name in ("w_strokes", "w_beta"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise InstanceError(f"{name} is {value}; it must be a finite number, not negative")
-        if not (np.isfinite(self.pixel_size) and self.pixel_size > 0):
-            raise InstanceError(f"pixel_size is {self.pixel_size}; it must be a positive number")
-        if not np.isfinite(self.origin).all():
-            raise InstanceError(f"origin is {self.origin}; it must be two finite numbers")
+            if not 0 <= value <= MOST_WEIGHT:
+                raise InstanceError(
+                    f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, beyond which rounding hides the other terms"
+                )
+        if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
+            raise InstanceError(
+                f"pixel_size is {self.pixel_size}; it must be between {1 / _FARTHEST:g} and {_FARTHEST:g}"
+            )
+        if not all(abs(value) <= _FARTHEST for value in self.origin):
+            raise InstanceError(
+                f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
+            )
         if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
             raise InstanceError("source holds a line break or what is no text; give one line of text")
 
@@ -131,6 +154,7 @@ class Instance:
             )
         for label, wrong in (
             ("theta is not a finite number", ~np.isfinite(self.theta)),
+            (f"theta is beyond {_MOST_ANGLE:g} radians", ~(np.abs(self.theta) <= _MOST_ANGLE)),
             ("w is not in (0, 1]", ~((self.w > 0) & (self.w <= 1))),
             ("is outside the mask", ~self._inside()),
         ):
@@ -166,7 +190,11 @@ class Instance:
     @cached_property
     def target(self) -> Floats:
         """Theta in the gauge's own range: [-pi/4, 3 pi/4) for `box`, [0, pi) for `strokes`; shape (s,)."""
-        return wrap(self.theta, -QUARTER, np.pi) if self.gauge == "box" else self.theta
+        if self.gauge == "strokes":
+            return self.theta
+        # 3 pi/4 has lost some digits.
+        beyond = self.theta >= 3 * QUARTER - _SLACK
+        return np.where(beyond, np.maximum(self.theta - np.pi, -QUARTER), self.theta)
 
     @cached_property
     def alpha_lower(self) -> Floats:

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from .elementary import length as vector_length
 from .errors import InputError
 from .grid import Floats
 from .input_limits import MAX_PIECES
@@ -65,7 +66,7 @@ class Cover:
     @property
     def weight(self) -> Floats:
         """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height, width] (domain notes, 3.4)."""
-        single = np.minimum(1.0, np.hypot(*np.moveaxis(self.direction, -1, 0)))
+        single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
         return weight
 
@@ -95,7 +96,7 @@ def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
     """
     segments = _clipped((segments - (frame.x, frame.y)) / frame.pixel, frame)
     step = segments[:, 1] - segments[:, 0]
-    length = np.hypot(*step.T)
+    length = vector_length(*step.T)
     segments, step, length = segments[length > 0], step[length > 0], length[length > 0]
     owner, start, end = _pieces(segments, step)
     middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]

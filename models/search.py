@@ -9,7 +9,7 @@ grids of lower resolution and the last round are cut off. What a round that was 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -83,7 +83,9 @@ def search(
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     with interruptible() as interrupted:
-        limits = _Limits(Deadline() if seconds is None else Deadline.after(seconds), rounds, interrupted)
+        limits = _Limits(
+            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
+        )
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
@@ -125,9 +127,8 @@ class _Limits:
 
     def coarse(self) -> _Limits:
         """The limits of the search on the grid of half the resolution."""
-        deadline = self.deadline.share(1 - _FINE)
         many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
-        return _Limits(deadline, many, self.interrupted)
+        return _Limits(self.deadline.share(1 - _FINE), many, self.interrupted)
 
 
 def _from_coarse(
@@ -208,20 +209,20 @@ class _Hunt:
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
-            tasks = self.tasks()
-            found = explorers([replace(task, deadline=limits.deadline) for task in tasks])
+            tasks = self.tasks(limits.deadline)
+            found = explorers(tasks)
             self._take(tasks, [each.better for each in found], limits.over)
             if all(each.whole for each in found) and not limits.over():
                 self.round += 1
             progress(self.round, self.energies[-1][1])
         return ended
 
-    def tasks(self) -> list[Task]:
-        """What to explore in this round."""
+    def tasks(self, deadline: Deadline) -> list[Task]:
+        """What to explore in this round, until when."""
         rng = np.random.default_rng((self._seed, self.round))
         x, p = self._state.x, self._state.p
         return [
-            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number))
+            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number), deadline)
             for number, free in enumerate(self._windows(rng))
         ]
 

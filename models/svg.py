@@ -21,6 +21,7 @@ from xml.etree.ElementTree import Element, ParseError
 import numpy as np
 
 from .curves import Curves
+from .elementary import turned
 from .errors import InputError
 from .grid import Floats
 from .ink import is_paper, is_red
@@ -192,9 +193,8 @@ class _Walk:
         if self.curves > MAX_CURVES:
             raise too_many_curves()
         with np.errstate(over="ignore", invalid="ignore"):
-            placed: Floats = points @ np.array([[m.a, m.b], [m.c, m.d]], dtype=float) + np.array(
-                [m.e, m.f], dtype=float
-            )
+            turn, shift = np.array([[m.a, m.c], [m.b, m.d]], dtype=float), np.array([m.e, m.f], dtype=float)
+            placed: Floats = turned(points, turn) + shift
         if not (np.abs(placed) <= _GREATEST).all():
             raise InputError(
                 f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"

@@ -11,6 +11,8 @@ from crossfield.models.greedy import greedy
 from crossfield.models.improvement import first_field
 from crossfield.models.instance import HALF, QUARTER, Instance
 from crossfield.models.power_field import power_field
+from crossfield.models.samples import sample
+from crossfield.models.search import search
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -285,3 +287,12 @@ def test_dense_least_squares_agree_with_the_energy_of_a_field():
     rng = np.random.default_rng(0)
     fields = [CrossField(instance, *rng.normal(0.5, 0.5, (2, 4)), np.zeros(4, int)) for _ in range(200)]
     assert least <= min(field.energy().total for field in fields)
+
+
+@pytest.mark.parametrize("w_beta", [0.0, 1e-6, 1e6])
+def test_the_greatest_weights_are_solved(w_beta):
+    for instance in (sample("mouse", 8), Instance("one", [[True]], [[0, 0]], [2.0], [1.0])):
+        heavy = replace(instance, w_strokes=1e6, w_beta=w_beta)
+        for field in (greedy(heavy), power_field(heavy), search(heavy, rounds=1).field):
+            assert np.isfinite(field.energy().total)
+        assert np.abs(greedy(heavy).residual_r).max() < 1e-3

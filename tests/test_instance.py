@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance import HALF, Instance
-from hypothesis import given
+from crossfield.models.instance import GAUGES, HALF, Instance
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 
@@ -46,13 +46,18 @@ def instances(draw):
         ({"name": "a" * 33}, "at most 31"),
         ({"name": "line\n"}, "is not allowed"),
         ({"gauge": "free"}, "no gauge 'free'; choose one of strokes, box"),
-        ({"w_strokes": -1}, "w_strokes is -1.0; it must be a finite number, not negative"),
+        ({"w_strokes": -1}, "w_strokes is -1.0; it must be between 0 and 1e+06"),
         ({"w_strokes": np.inf}, "w_strokes is inf"),
+        ({"w_strokes": 1e308}, "w_strokes is 1e+308; it must be between 0 and 1e+06"),
+        ({"w_beta": 1e7}, "w_beta is 10000000.0; it must be between 0 and 1e+06"),
+        ({"pixel_size": 1e-320}, "it must be between 1e-100 and 1e+100"),
+        ({"origin": (1e308, 0)}, "origin is (1e+308, 0.0); it must be two numbers between"),
+        ({"theta": [0.5, 1e308]}, "stroke pixel [1, 0]: theta is beyond 1e+06 radians"),
         ({"w_beta": np.nan}, "w_beta is nan"),
         ({"w_beta": -1e-9}, "w_beta is -1e-09"),
-        ({"pixel_size": 0}, "pixel_size is 0.0; it must be a positive number"),
+        ({"pixel_size": 0}, "pixel_size is 0.0; it must be between 1e-100 and 1e+100"),
         ({"pixel_size": np.nan}, "pixel_size is nan"),
-        ({"origin": (0, np.inf)}, "origin is (0.0, inf); it must be two finite numbers"),
+        ({"origin": (0, np.inf)}, "origin is (0.0, inf); it must be two numbers between -1e+100 and 1e+100"),
         ({"source": "two\nlines"}, "source holds a line break"),
         ({"source": "\ud800"}, "source holds a line break or what is no text"),
         ({"mask": np.zeros((2, 3), bool)}, "the mask has no pixel"),
@@ -199,7 +204,7 @@ def test_sha256_tells_contents_apart():
         {"w_beta": 0.0},
         {"pixel_size": 2.0},
         {"origin": (1.0, 0.0)},
-        {"theta": np.array([0.5, 3.0 + 1e-15])},
+        {"theta": np.array([0.5, 3.0 + 1e-12])},
         {"w": np.array([1.0, 0.5])},
         {"mask": np.ones((2, 3), bool)},
         {"stroke_pixels": np.array([[0, 0], [1, 0]])},
@@ -207,3 +212,37 @@ def test_sha256_tells_contents_apart():
     digests = {replace(instance, **change).sha256 for change in changes}
     assert len(digests | {instance.sha256}) == len(changes) + 1
     assert Instance(**GOOD).sha256 == instance.sha256
+
+
+def test_numbers_are_rounded_once():
+    theta = [1 / 3, np.pi - 1e-12]
+    instance = Instance(
+        **(GOOD | {"theta": theta, "w": [1 / 3, 1e-9 / 3], "pixel_size": 1 / 3, "origin": (1e5 / 3, -0.0)})
+    )
+    assert instance.theta.tolist() == [0.333333333333, 0.0]
+    assert instance.w.tolist() == [0.333333333333, 1e-9 / 3]
+    assert (instance.pixel_size, instance.origin) == (0.333333333333, (33333.3333333, 0.0))
+    assert replace(instance).sha256 == instance.sha256
+    last = Instance(**(GOOD | {"theta": np.nextafter(theta, 9), "w": [1 / 3 + 1e-16, 1e-9 / 3]}))
+    assert (last.theta == instance.theta).all()
+    assert (last.w == instance.w).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=50)
+def test_rounding_changes_nothing_twice(seed):
+    rng = np.random.default_rng(seed)
+    theta = rng.choice([1.0, 1e-9, 1e5, np.pi / 4, np.pi]) * rng.integers(-9, 10, 2) + rng.choice(
+        [0, 1e-12], 2
+    ) * rng.random(2)
+    given = GOOD | {
+        "theta": theta,
+        "w": 10 ** rng.uniform(-15, 0, 2),
+        "origin": tuple(rng.normal(size=2) * 1e9),
+    }
+    for gauge in GAUGES:
+        once = Instance(**given, gauge=gauge)
+        assert replace(once).sha256 == once.sha256
+        assert ((once.theta == 0) | ((once.theta >= 1e-8) & (once.theta <= np.pi - 1e-8))).all()
+        assert ((once.target == 0) | (np.abs(once.target) >= 1e-8)).all()
+        assert (np.abs(once.target - np.pi / 4) <= np.pi / 2 + (gauge == "strokes") * np.pi / 4).all()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from crossfield.models.deadline import Deadline
 from crossfield.models.exploration import explore
 from crossfield.models.field import CrossField
 from crossfield.models.free_field import free_bounds
@@ -84,7 +85,7 @@ def walked(instance, seed, kicks, steps):
 
 def explored(instance, seed, kicks):
     """What the windows of a round find, checked, and a round of the search."""
-    tasks = _Hunt(instance, seed, first_field(instance)).tasks()
+    tasks = _Hunt(instance, seed, first_field(instance)).tasks(Deadline(np.inf))
     lower, upper = free_bounds(instance)
     for task in tasks:
         better, whole = explore(replace(task, kicks=kicks))

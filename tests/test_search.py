@@ -1,5 +1,7 @@
 """The search: its formulas against dense least squares, its answers against all jumps, and what it promises."""
 
+import pickle
+
 import crossfield as cf
 import numpy as np
 import pytest
@@ -13,7 +15,6 @@ from crossfield.models.improvement import first_field, improved, stroke_curves
 from crossfield.models.instance import HALF, QUARTER
 from crossfield.models.kicks import Kicks
 from crossfield.models.landscape import STEPS, Landscape, Window
-from crossfield.models.side_by_side import side_by_side
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -256,11 +257,11 @@ def test_a_window_without_time_is_not_whole_and_its_walk_stops():
     assert explore(task) == (None, False)
 
 
-def test_tasks_are_drawn_when_there_is_a_process_for_them():
-    order = []
-    with side_by_side(order.append, 1) as work:
-        work(order.append(-task) or task for task in range(1, 4))
-    assert order == [-1, 1, -2, 2, -3, 3]
+def test_a_deadline_in_another_process_says_what_was_left_when_it_was_sent():
+    clock = iter([10.0, 13.0]).__next__
+    arrived = pickle.loads(pickle.dumps(Deadline.after(5.0, clock)))
+    assert 1.0 < arrived.left() <= 2.0
+    assert pickle.loads(pickle.dumps(Deadline(np.inf))).left() == np.inf
 
 
 @pytest.mark.parametrize("given", [{"seconds": 0}, {"seconds": np.nan}, {"rounds": -1}, {"jobs": 0}])

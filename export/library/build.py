@@ -38,7 +38,8 @@ def build(
     """The library of a specification, now in the folder.
 
     jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead. progress: called with a line for each entry that
-    is made. Same specification and ledger, same bytes, wherever they are made. Raises InputError, OutputError, BuildError.
+    is made. Same specification and ledger, same bytes, with any number of processes; on another kind of processor, points may end in other
+    digits. Raises InputError, OutputError, BuildError.
     """
     plans = plan(spec)
     folder, is_new = Path(folder), not Path(folder).exists()
@@ -90,6 +91,14 @@ def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = lambda _: None)
     """As `rebuild`, for a caller who holds the lock of the library."""
     spec = read_library(folder).spec
     return _built(spec, plan(spec), folder, jobs=jobs, scheduler=None, progress=progress)
+
+
+def unmatched(library: Library) -> list[Record]:
+    """The records of a library's ledger that count for nothing: the problem of their entry has changed since."""
+    records = read_ledger(library.folder).records
+    names = {record.entry for record in records} & set(library.document["entries"])
+    problems = {name: library.entry(name)["problem_sha256"] for name in names}
+    return [each for each in records if problems.get(each.entry, each.problem_sha256) != each.problem_sha256]
 
 
 def _sweep(folder: Path) -> None:
