@@ -16,7 +16,7 @@ from ...models.storage import make_folder, write_bytes
 from .entry import Entry, make_entry
 from .index import write_index
 from .inputs import Inputs
-from .ledger import Ledger, keep, merged, read_ledger
+from .ledger import Ledger, Record, keep, merged, read_ledger
 from .lock import changing
 from .preparing import Files, about_file, prepare
 from .recipe import InstancePlan, plan
