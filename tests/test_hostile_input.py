@@ -130,6 +130,7 @@ def read_by_child(*paths):
     return {Path(path).name: (said, memory) for path, said, memory in found}
 
 
+@pytest.mark.slow
 def test_drawings_that_ask_for_much_work_do_not_get_it(tmp_path):
     """Before, most of them took minutes, 200,000 blanks in a style sheet 207 s."""
     paths = []
