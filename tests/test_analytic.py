@@ -11,6 +11,8 @@ from scipy import ndimage
 from scipy.sparse import coo_matrix, vstack
 from scipy.sparse.linalg import spsolve
 
+pytestmark = pytest.mark.numeric
+
 NAMES = sorted(SURFACES)
 
 

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from loops import for_each
 from scipy.optimize import lsq_linear
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -57,8 +57,7 @@ def place(found, picture):
 
 @for_each(
     "kind, suffix",
-    [(kind, ".png") for kind in KINDS if kind != "overview"]
-    + [("overview", ".svg"), ("overview", ".pdf"), ("energy", ".svg")],
+    [(kind, ".png") for kind in KINDS if kind != "overview"] + [("overview", ".svg"), ("energy", ".pdf")],
 )
 def test_every_kind_is_written_the_same_twice(tmp_path, kind, suffix):
     field = singular(5)

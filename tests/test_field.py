@@ -9,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from loops import for_each
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 MOVES = {
     "turned": (np.rot90, lambda alpha, beta: (alpha + HALF, beta), 1),

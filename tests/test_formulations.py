@@ -19,6 +19,8 @@ from crossfield.models.problem import formulate, with_integers_fixed
 from loops import for_each
 from scipy.optimize import linprog, lsq_linear
 
+pytestmark = pytest.mark.numeric
+
 SQUARES = ["minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed"]
 MIXED = ["miqcp-bilinear", "miqp-mccormick"]
 ABSOLUTE = ["miqcp-bilinear-l1", "milp-mccormick"]

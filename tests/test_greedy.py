@@ -18,6 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 SOLVERS = pytest.mark.parametrize("solve", [greedy, first_field, power_field])
 

@@ -25,6 +25,7 @@ from crossfield.export.library.counts import tangent_bound
 from crossfield.export.library.ledger import Record, add_record, read_ledger
 from crossfield.export.library.points import complete_point, field_of
 from crossfield.export.library.recipe import plan
+from crossfield.export.library.search_1norm import better_in_1norm
 from crossfield.export.library.sidecar import problem_of, read_library
 from crossfield.export.library.solve import solve_library
 from crossfield.export.library.sources import instance_from
@@ -35,9 +36,10 @@ from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field import CrossField
 from crossfield.models.field_file import read_field
 from crossfield.models.formulations import FORMULATIONS
+from crossfield.models.greedy import greedy
 from crossfield.models.instance_file import read_instance
 from crossfield.models.problem import formulate, with_integers_fixed
-from crossfield.models.samples import sample_svg
+from crossfield.models.samples import sample, sample_svg
 from loops import for_each
 from scipy import ndimage
 
@@ -477,6 +479,22 @@ def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_byte
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
     assert content(tmp_path / "again") == content(built.folder)
+
+
+def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
+    """Its threads stay in the process, and their number used to make the next run fail in silence."""
+    instance = sample("mouse", 4, "box")
+    found = []
+    for threads in (1, 2):
+        highs = highspy.Highs()
+        highs.setOptionValue("output_flag", False)
+        highspy.Highs.resetGlobalScheduler(True)
+        highs.setOptionValue("threads", threads)
+        highs.addConstr(highs.addVariable(ub=5, obj=-1, type=highspy.HighsVarType.kInteger) <= 2.5)
+        assert highs.run() == highspy.HighsStatus.kOk
+        found.append([each.field.energy(1).total for each in better_in_1norm(greedy(instance), "tiny")])
+    assert len(found[0]) == 2
+    assert found[0] == found[1]
 
 
 def test_nothing_whole_is_made_again(built, spec, copy):

@@ -19,6 +19,8 @@ from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -10,6 +10,8 @@ from crossfield.models.instance import Instance
 from crossfield.models.streamlines import CLOSEST, STEP, streamlines, trace
 from scipy.spatial import cKDTree
 
+pytestmark = pytest.mark.numeric
+
 
 def field_of(mask, line, skew, stroke=0):
     """The field with line u at angle line(x, y) and beta = skew(x, y); x, y from the middle of the grid, y up, in pixels."""

@@ -6,6 +6,8 @@ import crossfield as cf
 import pytest
 from crossfield.models.samples import SAMPLES
 
+pytestmark = pytest.mark.numeric
+
 
 def smallest(name):
     """The sample on the coarsest grid that still shows three stroke pixels: small enough to be solved to optimality."""

@@ -16,6 +16,8 @@ from exhaustive import exact, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -52,6 +52,8 @@ def _solved(problem: Problem, nodes: int, start: CrossField | None) -> CrossFiel
 def _run(model: Path, first: Path, answer: Path, nodes: int) -> None:
     import highspy
 
+    # The threads of an earlier run in this process stay, and HiGHS refuses another number of them.
+    highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - as the function has it
     highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
     highs.setOptionValue("output_flag", "false")
     for option, value in (("threads", 1), ("parallel", "off"), ("mip_rel_gap", 1e-6), ("mip_abs_gap", 1e-9)):
@@ -62,5 +64,6 @@ def _run(model: Path, first: Path, answer: Path, nodes: int) -> None:
         raise SolverError("HiGHS cannot read it", file=model)
     if first.exists():
         highs.readSolution(str(first), 0)
-    highs.run()
+    if highs.run() == highspy.HighsStatus.kError:
+        raise SolverError("HiGHS cannot solve it", file=model)
     highs.writeSolution(str(answer), 0)
