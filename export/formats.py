@@ -158,7 +158,7 @@ def carried(problem: Problem, entry: Format) -> Problem:
         other = lifted(problem)
         if _degree(other) <= entry.degree:
             return other
-    instead = problem.formulation.equivalent
+    instead = problem.formulation.declaration.equivalent
     remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
     limit = "quadratic" if entry.degree == 2 else f"polynomials of degree {entry.degree}"
     raise UnsupportedByFormatError(

@@ -91,7 +91,7 @@ def _carriage(problem: Problem, name: str) -> str:
     try:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError:
-        return f"refused: write {problem.formulation.equivalent}"
+        return f"refused: write {problem.formulation.declaration.equivalent}"
     return "lifted, exact" if held.formulation.lifted else "yes"
 
 

@@ -31,8 +31,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from ...models.declaration import FACETS, FORMULATIONS
 from ...models.errors import InputError
-from ...models.formulations import FACETS, FORMULATIONS
 from ...models.instance import GAUGES
 from ...models.samples import SAMPLES, sample_svg
 from ...models.storage import read_bytes
