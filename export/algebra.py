@@ -44,6 +44,11 @@ class Language(ABC):
         terms = self._terms(expression)
         return [piece for place, term in enumerate(terms) for piece in self._term(term, signed=place > 0)]
 
+    def alone(self, expression: sp.Expr) -> list[Piece]:
+        """An expression that is no part of another: a negative number needs no brackets."""
+        negative = not expression.free_symbols and expression.is_negative
+        return [b"-", *self.expression(-expression)] if negative else self.expression(expression)
+
     def summands(self, expression: sp.Expr) -> list[list[Piece]]:
         """The terms of an expression, each with its sign."""
         return [self._term(term, signed=True) for term in self._terms(expression)]
@@ -61,6 +66,9 @@ class Language(ABC):
         if self.is_data(term):
             constant = self.constant(term, signed=signed)
             return [b" ", constant] if signed else [constant]
+        number, symbol = term.as_coeff_Mul()
+        if symbol.is_Symbol and number.is_Rational and number.p == 1 < number.q:
+            return [*self._term(symbol, signed=signed), f"/{number.q}".encode()]
         factors = sorted(term.as_ordered_factors(), key=_rank)
         coefficient = sp.Mul(*(factor for factor in factors if self.is_data(factor)))
         rest = [self._factor(factor) for factor in factors if not self.is_data(factor)]
@@ -82,8 +90,8 @@ class Language(ABC):
             return [b"(", *self.expression(factor), b")"]
         if factor.is_Pow and factor.exp.is_Integer and factor.exp >= 2:
             return self.power(self.expression(factor.base), int(factor.exp))
-        if isinstance(factor, sp.cos):
-            return [b"cos(", *self.expression(factor.args[0]), b")"]
+        if isinstance(factor, sp.cos | sp.floor):
+            return [f"{factor.func.__name__}(".encode(), *self.expression(factor.args[0]), b")"]
         raise AssertionError(f"no declaration holds {factor.func}")
 
 

@@ -13,8 +13,8 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from ..models.declaration import Formulation
 from ..models.errors import UnsupportedByFormatError
-from ..models.formulations import Formulation
 from ..models.instance import Instance
 from ..models.problem import Problem
 from .formats import FORMATS, carried

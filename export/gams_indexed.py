@@ -23,28 +23,20 @@ import sympy as sp
 
 from ..models.errors import UnsupportedByFormatError
 from ..models.grid import Floats
-from ..models.instance import QUARTER, Instance
+from ..models.instance import Instance
 from ..models.notation import SCALARS, SLOTS, VARIABLES, IndexSet
 from ..models.problem import Block, Bound, Problem
 from ..templates import stream
 from .algebra import Language, wrapped
 from .gams import MODEL_TYPES, SENSES, power
 from .names import element_names
-from .records import Bytes, Piece, Words, bounds, check_coefficients, number, render, words
+from .records import Bytes, Piece, Words, check_coefficients, number, render, words
 
 SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,side"}
 SECOND: Final = "r-north(side),c+east(side)"
 """The pixel j of the pair (r,c,side)."""
 
-BOUNDS: Final = {
-    "alpha": ("alpha_lo(I)", "alpha_up(I)"),
-    "p": ("p_min(E)", "p_max(E)"),
-    "p2": ("floor(p_min(E)/2)", "floor(p_max(E)/2)"),
-}
-"""Bounds that differ from element to element; those of other variables are numbers."""
-
-ANGLES: Final = {QUARTER: "pi/4", -QUARTER: "-pi/4"}
 WIDTH: Final = 110
 
 
@@ -160,22 +152,23 @@ def _results(problem: Problem) -> Iterator[bytes]:
 
 
 def _variable(block: Block) -> dict[str, str]:
-    lower, upper = BOUNDS.get(block.name) or (_number_bound(block.lower), _number_bound(block.upper))
+    variable = VARIABLES[block.name]
     return {
         "keyword": "Integer Variable" if block.integer else "Variable",
         "name": block.name,
         "domain": DOMAINS[block.over],
-        "meaning": VARIABLES[block.name].meaning,
+        "meaning": variable.meaning,
         "set": SETS[block.over],
-        "lower": lower,
-        "upper": upper,
+        "lower": _bound(variable.lower, block.over),
+        "upper": _bound(variable.upper, block.over),
     }
 
 
-def _number_bound(values: Floats) -> str:
-    value = float(values[0])
-    assert (values == value).all()  # else it belongs into BOUNDS
-    return ANGLES.get(value) or bytes(bounds(values[:1])[0]).decode()
+def _bound(expression: sp.Expr, over: IndexSet) -> str:
+    """A bound of a variable for all elements of its set."""
+    if expression.is_infinite:
+        return "-inf" if expression.is_extended_negative else "+inf"
+    return _text(_Indexed(over, SETS[over]).alone(expression))
 
 
 def _described(family: Bound) -> dict[str, str]:
@@ -191,14 +184,16 @@ def _described(family: Bound) -> dict[str, str]:
 class _Indexed(Language):
     """The language over an index set: symbols by their name and index, constants as mathematics writes them."""
 
-    def __init__(self, over: IndexSet) -> None:
+    def __init__(self, over: IndexSet, own: str = "") -> None:
+        """own: index of the elements themselves, by default each by its labels."""
         self._over = over
+        self._own = own or DOMAINS[over]
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
         if symbol in SCALARS:
             return SCALARS[symbol].encode()
         name, kind = SLOTS[self._over][symbol]
-        return f"{name}({SECOND if kind == 'second' else 'r,c' if kind == 'first' else DOMAINS[self._over]})".encode()
+        return f"{name}({SECOND if kind == 'second' else 'r,c' if kind == 'first' else self._own})".encode()
 
     def is_data(self, expression: sp.Expr) -> bool:
         return not expression.free_symbols

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -66,7 +67,7 @@ def start_field(path: Path, instance: Instance) -> CrossField:
     return field
 
 
-def known(names: list[str] | None, table: dict[str, Any], kind: str) -> list[str]:
+def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:
     """The names, each of which is in the table; all of the table when there are none."""
     for name in names or ():
         if name not in table:

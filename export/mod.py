@@ -25,8 +25,8 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from ..models.errors import UnsupportedByFormatError
-from ..models.grid import Floats, Ints
-from ..models.instance import QUARTER, Instance
+from ..models.grid import Ints
+from ..models.instance import Instance
 from ..models.notation import SCALARS, SLOTS, VARIABLES, IndexSet, pixel_of
 from ..models.problem import Block, Bound, Problem
 from ..templates import stream
@@ -44,14 +44,6 @@ DOMAINS: Final[dict[IndexSet, str]] = {
 }
 _INDEX: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h"}
 
-BOUNDS: Final = {
-    "alpha": ("alpha_lo[r,c]", "alpha_up[r,c]"),
-    "p": ("p_min[r,c,h]", "p_max[r,c,h]"),
-    "p2": ("floor(p_min[r,c,h]/2)", "floor(p_max[r,c,h]/2)"),
-}
-"""Bounds that differ from element to element; those of other variables are numbers."""
-
-ANGLES: Final = {QUARTER: "pi/4", -QUARTER: "-pi/4"}
 SENSES: Final = {">=": " >= ", "<=": " <= ", "==": " = "}
 WIDTH: Final = 110
 
@@ -126,14 +118,18 @@ def _listed(
 
 
 def _variable(block: Block) -> dict[str, str]:
-    lower, upper = BOUNDS.get(block.name) or (_number(block.lower), _number(block.upper))
+    variable, language = VARIABLES[block.name], _Ampl(block.over)
     attributes = ["integer"] * block.integer
-    attributes += [f"{sign} {end}" for sign, end in ((">=", lower), ("<=", upper)) if end]
+    attributes += [
+        f"{sign} {_text(language.alone(end))}"
+        for sign, end in ((">=", variable.lower), ("<=", variable.upper))
+        if not end.is_infinite
+    ]
     return {
         "name": block.name,
         "domain": DOMAINS[block.over],
         "attributes": " " * bool(attributes) + ", ".join(attributes),
-        "meaning": VARIABLES[block.name].meaning,
+        "meaning": variable.meaning,
     }
 
 
@@ -141,13 +137,6 @@ def _label(instance: Instance, block: Block) -> str:
     """How the names of a block are printed: `alpha_%02d_%02d`."""
     digits = name_length(instance, "", "pixels") // 2 - 1
     return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
-
-
-def _number(values: Floats) -> str:
-    """The one bound of all variables of a block; empty when there is none."""
-    value = float(values[0])
-    assert (values == value).all()  # else it belongs into BOUNDS
-    return ANGLES.get(value) or (number(value) if np.isfinite(value) else "")
 
 
 def _described(family: Bound) -> dict[str, str]:

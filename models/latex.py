@@ -6,8 +6,8 @@ from typing import Final
 
 import sympy as sp
 
-from .formulations import Family, Formulation
-from .notation import LATEX, VARIABLES, IndexSet, w, w_beta, w_strokes
+from .declaration import Family, Formulation
+from .notation import LATEX, SLOTS, VARIABLES, IndexSet, Variable, w, w_beta, w_strokes
 
 _SUM: Final[dict[IndexSet, str]] = {
     "pixels": r"\sum_{i \in I}",
@@ -17,20 +17,6 @@ _SUM: Final[dict[IndexSet, str]] = {
 _FOR: Final[dict[IndexSet, str]] = {"pixels": r"i \in I", "strokes": r"i \in S_c", "pairs": r"(i,j) \in E"}
 _WEIGHTS: Final = (w_strokes, w_beta, w)
 _SENSE: Final = {">=": r"\ge", "<=": r"\le", "==": "="}
-_DOMAIN: Final = {
-    "alpha": r"\underline\alpha_i \le \alpha_i \le \underline\alpha_i + \tfrac{\pi}{2}",
-    "beta": r"-\tfrac{\pi}{4} \le \beta_i \le \tfrac{\pi}{4}",
-    "p": r"p_{ij} \in \{p^{\min}_{ij}, \ldots, p^{\max}_{ij}\}",
-    "p1": r"p_{ij,1} \in \{0, 1\}",
-    "p2": r"p_{ij,2} \in \{\lfloor p^{\min}_{ij}/2 \rfloor, \ldots, \lfloor p^{\max}_{ij}/2 \rfloor\}",
-    "s": r"s_{ij} \ge 0",
-    "t": r"t_{ij} \ge 0",
-    "z": r"-\tfrac{\pi}{4} \le z_{ij} \le \tfrac{\pi}{4}",
-    "d": r"d_{ij} \in \mathbb{R}",
-    "u": r"u_{ij} \in \mathbb{R}",
-    "gamma": r"\gamma_i \ge 0",
-    "psi": r"\psi_i \ge 0",
-}
 
 
 def expression(value: sp.Expr) -> str:
@@ -46,8 +32,28 @@ def latex(formulation: Formulation) -> str:
     ]
     lines = [r"\min\ " + terms[0], *(rf"\quad {term}" for term in terms[1:])]
     lines += [_row(family) for family in formulation.rows]
-    lines += [rf"& {_DOMAIN[name]} && {_FOR[VARIABLES[name].over]}" for name in formulation.variables]
+    lines += [_domain(VARIABLES[name], formulation) for name in formulation.variables]
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+
+def _domain(variable: Variable, formulation: Formulation) -> str:
+    """A line that says where a variable lies."""
+    name, lower, upper = (expression(e) for e in (_own(variable), variable.lower, variable.upper))
+    if variable.integer and not formulation.options.relax:
+        between = [] if variable.upper - variable.lower == 1 else [r"\ldots"]
+        domain = rf"{name} \in \{{{', '.join([lower, *between, upper])}\}}"
+    elif variable.lower == -sp.oo:
+        domain = rf"{name} \in \mathbb{{R}}"
+    elif variable.upper == sp.oo:
+        domain = rf"{name} \ge {lower}"
+    else:
+        domain = rf"{lower} \le {name} \le {upper}"
+    return rf"& {domain} && {_FOR[variable.over]}"
+
+
+def _own(variable: Variable) -> sp.Symbol:
+    """The symbol that means the variable itself."""
+    return next(symbol for symbol, slot in SLOTS[variable.over].items() if slot == (variable.name, "itself"))
 
 
 def _summand(family: Family) -> str:
@@ -57,7 +63,8 @@ def _summand(family: Family) -> str:
         return rf"\Bigl[ {expression(value)} \Bigr]"
     weights, rest = value.as_independent(*(value.free_symbols - set(_WEIGHTS)))
     first = [LATEX[symbol] for symbol in _WEIGHTS if symbol in weights.free_symbols]
-    return r" \, ".join([*first, expression(rest)])
+    number, _ = weights.as_coeff_Mul()
+    return r" \, ".join([*first, expression(number * rest)])
 
 
 def _row(family: Family) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from .formulations import Family
+from .declaration import Family
 from .grid import Bools, Floats, Ints
 
 Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]

@@ -16,8 +16,8 @@ from typing import Any, Final, Literal
 import numpy as np
 import sympy as sp
 
-from .grid import Floats, Ints
-from .instance import HALF, QUARTER, Instance
+from .grid import Ints
+from .instance import HALF, Instance
 
 IndexSet = Literal["pixels", "strokes", "pairs"]
 Way = Literal["itself", "first", "second", "stroke"]
@@ -31,6 +31,7 @@ alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", 
 alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
 p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
 p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
+alpha_lo, alpha_up = (_symbol(name) for name in ("alpha_lo", "alpha_up"))
 w_strokes, w_beta = (_symbol(name) for name in ("w_strokes", "w_beta"))
 pi: Final = sp.pi
 
@@ -48,42 +49,44 @@ R: Final = alpha + beta - theta
 class Variable:
     """A block of columns: one variable per element of an index set.
 
-    lower, upper: bounds as arrays or numbers of an instance; value: the variable at a given field, as an expression
-    over its index set; meaning: one line for the docs.
+    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format, NumPy and the formulas of the
+    docs read them; value: the variable at a given field, as an expression over its index set; meaning: one line for the docs.
     """
 
     name: str
     over: IndexSet
-    lower: Callable[[Instance], Floats | Ints | float]
-    upper: Callable[[Instance], Floats | Ints | float]
+    lower: sp.Expr
+    upper: sp.Expr
     value: sp.Expr
     meaning: str
     integer: bool = field(default=False, kw_only=True)
 
 
-_FREE: Final = float("inf")
+_FREE: Final = sp.oo
+_QUARTER: Final = pi / 4
+_ZERO: Final = sp.Integer(0)
 
 VARIABLES: Final = {
     variable.name: variable
     for variable in (
-        Variable("alpha", "pixels", lambda i: i.alpha_lower, lambda i: i.alpha_upper, alpha, "direction of the cross"),
-        Variable("beta", "pixels", lambda _: -QUARTER, lambda _: QUARTER, beta, "skew of the cross"),
-        Variable("p", "pairs", lambda i: i.p_min, lambda i: i.p_max, p, "jump between the labels of two neighbours", integer=True),
-        Variable("p1", "pairs", lambda _: 0.0, lambda _: 1.0, sp.Mod(p, 2), "1 when the jump is odd", integer=True),
-        Variable("p2", "pairs", lambda i: i.p_min // 2, lambda i: i.p_max // 2, sp.floor(p / 2), "half of the even part of the jump", integer=True),
-        Variable("s", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(A), "absolute change of direction"),
-        Variable("t", "pairs", lambda _: 0.0, lambda _: _FREE, sp.Abs(B), "absolute change of skew"),
-        Variable("z", "pairs", lambda _: -QUARTER, lambda _: QUARTER, p1 * beta_i, "the product of p1 and beta of the first pixel"),
-        Variable("d", "pairs", lambda _: -_FREE, lambda _: _FREE, A, "change of direction"),
-        Variable("u", "pairs", lambda _: -_FREE, lambda _: _FREE, B, "change of skew"),
-        Variable("gamma", "strokes", lambda _: 0.0, lambda _: _FREE, sp.Abs(R), "absolute deviation from a stroke"),
-        Variable("psi", "pixels", lambda _: 0.0, lambda _: _FREE, sp.Abs(beta), "absolute skew"),
+        Variable("alpha", "pixels", alpha_lo, alpha_up, alpha, "direction of the cross"),
+        Variable("beta", "pixels", -_QUARTER, _QUARTER, beta, "skew of the cross"),
+        Variable("p", "pairs", p_min, p_max, p, "jump between the labels of two neighbours", integer=True),
+        Variable("p1", "pairs", _ZERO, sp.Integer(1), sp.Mod(p, 2), "1 when the jump is odd", integer=True),
+        Variable("p2", "pairs", sp.floor(p_min / 2), sp.floor(p_max / 2), sp.floor(p / 2), "half of the even part of the jump", integer=True),
+        Variable("s", "pairs", _ZERO, _FREE, sp.Abs(A), "absolute change of direction"),
+        Variable("t", "pairs", _ZERO, _FREE, sp.Abs(B), "absolute change of skew"),
+        Variable("z", "pairs", -_QUARTER, _QUARTER, p1 * beta_i, "the product of p1 and beta of the first pixel"),
+        Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
+        Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
+        Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
+        Variable("psi", "pixels", _ZERO, _FREE, sp.Abs(beta), "absolute skew"),
     )
 }  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
 
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
-    "pixels": {alpha: ("alpha", "itself"), beta: ("beta", "itself"), psi: ("psi", "itself")},
+    "pixels": {symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up)},
     "strokes": {
         alpha: ("alpha", "stroke"),
         beta: ("beta", "stroke"),
@@ -118,6 +121,8 @@ LATEX: Final = {
     p2: r"p_{ij,2}",
     p_min: r"p^{\min}_{ij}",
     p_max: r"p^{\max}_{ij}",
+    alpha_lo: r"\underline{\alpha}_i",
+    alpha_up: r"\overline{\alpha}_i",
     theta: r"\theta_i",
     w: r"w_i",
     w_strokes: r"w_{\mathrm{strokes}}",

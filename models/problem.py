@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from .declaration import FORMULATIONS, Family, Formulation
 from .errors import FormulationError, InstanceError
 from .field import CrossField
-from .formulations import FORMULATIONS, Family, Formulation, declare, lift_products
+from .formulations import declare
 from .grid import Bools, Floats, Ints
 from .instance import Instance, whole_numbers
+from .lifting import lift_products
 from .monomials import beyond_noise, merged, monomials, ordered
 from .notation import SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
 
@@ -236,6 +238,8 @@ class Problem:
         data: dict[str, Any] = {
             "theta": self.instance.target,
             "w": self.instance.w,
+            "alpha_lo": self.instance.alpha_lower,
+            "alpha_up": self.instance.alpha_upper,
             "p_min": self.instance.p_min,
             "p_max": self.instance.p_max,
         }
@@ -252,8 +256,7 @@ class Problem:
             variable = VARIABLES[name]
             shape = (elements(self.instance, variable.over),)
             lower, upper = (
-                np.broadcast_to(np.asarray(bound(self.instance), dtype=np.float64), shape)
-                for bound in (variable.lower, variable.upper)
+                np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
             )
             integer = variable.integer and not self.formulation.options.relax
             fixed = self._fixed(variable)
@@ -264,6 +267,11 @@ class Problem:
             blocks[name] = Block(name, variable.over, offset, lower, upper, integer)
             offset += shape[0]
         return blocks
+
+    def _value(self, bound: sp.Expr) -> Floats:
+        """Values of a bound: one for each element, or one for all."""
+        symbols = sorted(bound.free_symbols, key=_name)
+        return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
 
     def _fixed(self, variable: Variable) -> Bools | None:
         """True for the columns of a variable that are fixed at the pinned field, if there is one; None when none of them can be."""

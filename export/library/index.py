@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from ...models.formulations import FORMULATIONS
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ...templates import ENVIRONMENT
 from ..formats import FORMATS, generator
@@ -16,7 +17,7 @@ from ..records import number
 from .ledger import FILE as LEDGER
 from .ledger import read_ledger
 from .preparing import about_file
-from .recipe import TOKENS, InstancePlan
+from .recipe import InstancePlan
 from .sidecar import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
 from .spec import RUNGS, Spec
 
@@ -61,7 +62,7 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "rungs": [rung for rung in rungs if rung["entries"]],
         "instances": len({each["instance"]["sha256"] for each in sidecars}),
         "entries": len(sidecars),
-        "tokens": {name: TOKENS[name] for name in spec.formulations},
+        "tokens": {name: FORMULATIONS[name].short for name in spec.formulations},
         "kinds": {each["formulation"]: each for each in reversed(sidecars)},
         "formats": [entry for name, entry in FORMATS.items() if name in written],
         "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),

@@ -15,19 +15,6 @@ from ...models.errors import InputError
 from ...models.formulations import FORMULATIONS
 from .spec import Rung, Sketch, Spec
 
-TOKENS: Final = {
-    "minlp-parity": "parity",
-    "minlp-quartic": "quartic",
-    "minlp-cubic": "cubic",
-    "miqcp-bilinear": "bilin",
-    "miqcp-bilinear-l1": "bilin1",
-    "miqp-mccormick": "miqp",
-    "milp-mccormick": "milp",
-    "qp-fixed": "qp",
-    "miqp-exact": "exact",
-}
-"""Formulations as names of entries carry them."""
-
 LONGEST: Final = 32
 """Characters of a name before its suffix."""
 
@@ -77,7 +64,7 @@ class InstancePlan:
 
 def entry_name(instance: str, formulation: str, facet: str) -> str:
     """Name of an entry."""
-    return f"{instance}{'_printed' if facet == 'printed' else ''}_{TOKENS[formulation]}"
+    return f"{instance}{'_printed' if facet == 'printed' else ''}_{FORMULATIONS[formulation].short}"
 
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:

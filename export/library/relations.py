@@ -3,42 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any, Final
+from typing import Any
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations import FORMULATIONS
+from ...models.formulations import AT_JUMPS, FORMULATIONS, TWO_NORM
 from ...models.problem import Problem
 from ..formats import FORMATS, carried
 from ..lp import needs_one
 from .recipe import EntryRecipe, entry_name
-
-_SQUARES: Final = "the 2-norm energy"
-_MIXED: Final = "the 1-norm of the smoothness with squares of stroke and skew terms"
-_ABSOLUTE: Final = "the 1-norm energy"
-
-MEANING: Final = {
-    "minlp-parity": _SQUARES,
-    "minlp-quartic": _SQUARES,
-    "minlp-cubic": _SQUARES,
-    "miqp-exact": _SQUARES,
-    "miqcp-bilinear": _MIXED,
-    "miqp-mccormick": _MIXED,
-    "miqcp-bilinear-l1": _ABSOLUTE,
-    "milp-mccormick": _ABSOLUTE,
-    "qp-fixed": "the 2-norm energy at given jumps",
-}
-"""What a formulation minimises; those with the same words have the same optimum (with the facet of the hull)."""
-
-_HOW: Final = {
-    "minlp-parity": "p = p1 + 2 p2, and cos(pi p) = 1 - 2 p1",
-    "minlp-quartic": "squares of alpha_i - alpha_j + pi/2 (p1 + 2 p2) and of (1 - 2 p1) beta_i - beta_j",
-    "minlp-cubic": "the expanded squares with p1^2 = p1, which holds for binary p1 only",
-    "miqp-exact": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
-    "miqcp-bilinear": "the products p1 beta_i stand in the rows",
-    "miqp-mccormick": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
-    "miqcp-bilinear-l1": "the products p1 beta_i stand in the rows",
-    "milp-mccormick": "z = p1 beta_i at every point with binary p1, by the four facets of its hull",
-}
 
 
 def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
@@ -56,20 +28,20 @@ def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, An
             recipe,
             other,
             names,
-            f"both minimise {meaning}; {_HOW[other]}; points transfer by alpha, beta and the jumps",
+            f"both minimise {declared.minimises}; {declared.how}; points transfer by alpha, beta and the jumps",
         )
-        for other, meaning in MEANING.items()
-        if other != recipe.formulation and meaning == MEANING[recipe.formulation]
+        for other, declared in FORMULATIONS.items()
+        if other != recipe.formulation and declared.minimises == FORMULATIONS[recipe.formulation].minimises
     ]
 
 
 def not_equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
     """Formulations of the same instance that have another optimum, and how it differs."""
-    mine = MEANING[recipe.formulation]
+    mine = FORMULATIONS[recipe.formulation].minimises
     found = [
         _relation(recipe, other, names, _difference(recipe, other))
-        for other, meaning in MEANING.items()
-        if meaning != mine
+        for other, declared in FORMULATIONS.items()
+        if declared.minimises != mine
     ]
     if "facet" in FORMULATIONS[recipe.formulation].settable:
         found.append(_other_facet(recipe, names))
@@ -82,10 +54,10 @@ def _relation(recipe: EntryRecipe, formulation: str, names: Collection[str], why
 
 
 def _difference(recipe: EntryRecipe, other: str) -> str:
-    mine, theirs = MEANING[recipe.formulation], MEANING[other]
-    if other == "qp-fixed" and mine == _SQUARES:
+    mine, theirs = FORMULATIONS[recipe.formulation].minimises, FORMULATIONS[other].minimises
+    if theirs == AT_JUMPS and mine == TWO_NORM:
         return "its jumps are fixed: its optimum is an upper bound of this one"
-    if recipe.formulation == "qp-fixed" and theirs == _SQUARES:
+    if mine == AT_JUMPS and theirs == TWO_NORM:
         return "its jumps are free: its optimum is a lower bound of this one"
     return f"it minimises {theirs}, this one {mine}: points transfer, optima differ"
 

@@ -22,6 +22,7 @@ from jinja2 import Environment
 from ... import templates
 from ...models.errors import InputError, InstanceError, OutputError
 from ...models.field_file import read_field
+from ...models.formulations import FORMULATIONS
 from ...models.instance_file import read_instance
 from ...models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ...templates import ENVIRONMENT
@@ -30,8 +31,6 @@ from .index import SOLU, SUMS
 from .mathematics import model
 from .pictures import field_picture, instance_picture, thumbnail, told
 from .preparing import about_file
-from .recipe import TOKENS
-from .relations import MEANING
 from .sidecar import Library, read_about, read_library
 from .spec import RUNGS
 
@@ -84,7 +83,7 @@ class Shown:
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
         """The field that is shown with an entry: best for the norm that the entry minimises, or the one whose jumps are its data."""
-        meaning = MEANING[entry["formulation"]]
+        meaning = FORMULATIONS[entry["formulation"]].minimises
         role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
         return next(each for each in self.pictures if role in each.roles)
 
@@ -200,7 +199,7 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         "instance_of": {entry["name"]: each for each in shown for entry in each.entries},
         "families": (families := _families(shown)),
         "faces": {name: max(members, key=_standing) for name, members in families.items()},
-        "tokens": TOKENS,
+        "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
         "model": model,
         "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
         "sums": sums,

@@ -31,8 +31,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from ...models.declaration import FACETS, FORMULATIONS
 from ...models.errors import InputError, shortened
-from ...models.formulations import FACETS, FORMULATIONS
 from ...models.input_limits import MAX_BYTES
 from ...models.instance import GAUGES
 from ...models.samples import SAMPLES, sample_svg
