@@ -5,6 +5,7 @@ Every number in the docs comes from here. Sizes, seeds and time limits stand in 
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -235,25 +236,35 @@ def readme() -> None:
     _, rows = tables()["formulations"]
     shown = ("name", "paper", "class", *DEFAULTS)
     replace_between(
+        README,
         "formulations",
         markdown(shown, [[f"`{row['name']}`", *(str(row[column]) for column in shown[1:])] for row in rows]),
     )
     shown = ("name", "kind", "description")
     replace_between(
-        "samples", markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows(24)])
+        README,
+        "samples",
+        markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows(24)]),
     )
 
 
-def replace_between(name: str, text: str) -> None:
-    """Put a generated table between its two markers in the README."""
-    begin, end = f"<!-- {name}: python docs/make.py readme -->", f"<!-- end of {name} -->"
-    page = README.read_text()
-    head, rest = page.split(begin)
-    README.write_text(f"{head}{begin}\n{text}\n{rest[rest.index(end) :]}")
+def architecture() -> None:
+    """docs/architecture.svg, and the table inside docs/architecture.md: the folders as they are."""
+    import rooms
+
+    (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
+    columns = ("folder", "what lives there", "uses, beside the top of `models/`")
+    replace_between(DOCS / "architecture.md", "folders", markdown(columns, rooms.table(DOCS.parent)))
+
+
+def replace_between(page: Path, name: str, text: str) -> None:
+    """Put a generated table between its two markers in a page."""
+    head, begin, rest = re.split(rf"(<!-- {name}: .*? -->\n)", page.read_text(), maxsplit=1)
+    page.write_text(f"{head}{begin}{text}\n{rest[rest.index(f'<!-- end of {name} -->') :]}")
 
 
 PAGES: dict[str, Callable[[], None]] = {
-    page.__name__: page for page in (formulations, errata, accuracy, pictures, readme)
+    page.__name__: page for page in (formulations, errata, accuracy, pictures, architecture, readme)
 }
 
 
