@@ -248,6 +248,13 @@ def readme() -> None:
     )
 
 
+def figures() -> None:
+    """docs/pictures/math_*.svg: the figures of docs/mathematics.md."""
+    import diagrams
+
+    diagrams.draw(DOCS / "pictures")
+
+
 def architecture() -> None:
     """docs/architecture.svg, and the table inside docs/architecture.md: the folders as they are."""
     import rooms
@@ -264,7 +271,7 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 
 PAGES: dict[str, Callable[[], None]] = {
-    page.__name__: page for page in (formulations, errata, accuracy, pictures, architecture, readme)
+    page.__name__: page for page in (formulations, errata, accuracy, pictures, figures, architecture, readme)
 }
 
 

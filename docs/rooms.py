@@ -74,7 +74,8 @@ def table(root: Path) -> list[list[str]]:
 # The picture: five columns; the data goes right in the first row and back in the third.
 
 WIDE, HIGH, GAP, LEFT = 168, 84, 78, 30
-WIDTH: Final = 2 * LEFT + 5 * WIDE + 4 * GAP
+WHOLE: Final = 5 * WIDE + 4 * GAP
+WIDTH: Final = WHOLE + 2 * LEFT
 PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
@@ -106,6 +107,10 @@ STYLE: Final = """text { font-family: Inter, 'Segoe UI', Helvetica, Arial, sans-
 .flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }"""
 
 
+TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7" orient="auto-start-reverse">
+<path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>"""
+
+
 def picture(root: Path) -> str:
     """The rooms and the way of data through them, as SVG."""
     height = 790
@@ -113,8 +118,7 @@ def picture(root: Path) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" role="img">',
         "<title>The folders of crossfield and the way of data through them</title>",
         f"<style>{STYLE}</style>",
-        '<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7" orient="auto-start-reverse">'
-        '<path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>',
+        TIP,
         f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
         *bars(root),
         *(box(root, folder) for folder in PLACES),
@@ -128,27 +132,27 @@ def picture(root: Path) -> str:
 
 def bars(root: Path) -> list[str]:
     """The folders that use all of the flow, above it, and the ground below it."""
-    whole = WIDTH - 2 * LEFT
     library = [folder for folder in ORDER if folder.startswith("export/library/")]
-    step = (whole - 24 + 8) / len(library)
+    step = (WHOLE - 24 + 8) / len(library)
     return [
-        bar(root, "export/cli", LEFT, 20, whole, 50),
-        bar(root, "export/library", LEFT, 82, whole, 84),
+        bar(root, "export/cli", 20, 50),
+        bar(root, "export/library", 82, 84),
         *(
             chip(folder.rpartition("/")[2], LEFT + 12 + at * step, 130, step - 8)
             for at, folder in enumerate(library)
         ),
-        bar(root, "export/verify", LEFT, 178, whole, 50),
-        chip("programs", LEFT + whole - 132, 191, 120),
-        bar(root, GROUND, LEFT, 725, whole, 50),
+        bar(root, "export/verify", 178, 50),
+        chip("programs", LEFT + WHOLE - 132, 191, 120),
+        bar(root, GROUND, 725, 50),
         written("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 755, "end"),
     ]
 
 
-def bar(root: Path, folder: str, x: float, y: float, width: float, height: float) -> str:
+def bar(root: Path, folder: str, y: int, height: int) -> str:
     """A folder over the whole width."""
-    said = f'<text x="{x + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan><tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan></text>'
-    return panel(folder, x, y, width, height) + said
+    what = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
+    said = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{what}</text>'
+    return panel(folder, LEFT, y, WHOLE, height) + said
 
 
 def chip(text: str, x: float, y: float, width: float) -> str:

@@ -59,7 +59,7 @@ class Instance:
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
     corner of pixel [0, 0], with y downwards as sketches have it.
 
-    Raises InstanceError when a rule is broken. Section 1 and 2 of the formulation notes.
+    Raises InstanceError when a rule is broken. See docs/mathematics.md, 1 and 4.
     """
 
     name: str
