@@ -319,6 +319,13 @@ def figures() -> None:
     diagrams.draw(DOCS / "pictures")
 
 
+def traps() -> None:
+    """The table of traps inside docs/format-rules.md: what the programs that are installed make of them."""
+    import traps as files
+
+    replace_between(DOCS / "format-rules.md", "traps", markdown(*files.table()))
+
+
 def architecture() -> None:
     """docs/architecture.svg, and the table inside docs/architecture.md: the folders as they are."""
     import rooms
@@ -335,7 +342,8 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 
 PAGES: dict[str, Callable[[], None]] = {
-    page.__name__: page for page in (formulations, errata, accuracy, pictures, figures, architecture, readme)
+    page.__name__: page
+    for page in (formulations, errata, accuracy, pictures, figures, traps, architecture, readme)
 }
 
 

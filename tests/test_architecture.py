@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -14,10 +14,9 @@ ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproj
 @pytest.fixture(scope="module")
 def rooms():
     """The program that draws the folders."""
-    found = importlib.util.spec_from_file_location("rooms", ROOT / "docs" / "rooms.py")
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "docs")
+        return import_module("rooms")
 
 
 @pytest.fixture(scope="module")

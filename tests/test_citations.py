@@ -12,7 +12,15 @@ from pathlib import Path
 ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists())
 PARTS = ("models", "export", "templates", "docs", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
-NOT_HERE = ("domain notes", "formulation notes", "the project's notes", "../shared", "the brief", "design.md")
+NOT_HERE = (
+    "formats.md",
+    "domain notes",
+    "formulation notes",
+    "the project's notes",
+    "../shared",
+    "the brief",
+    "design.md",
+)
 """What only those had who wrote the first version."""
 
 
@@ -57,7 +65,7 @@ def rules(text: str) -> list[str]:
 
 
 def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
-    page = (ROOT / "docs" / "format-rules.md").read_text()
+    page = (ROOT / "docs" / "format-rules.md").read_text().partition("<!-- traps:")[0]
     listed = re.findall(r"^\| ([LMGNBOQWR]\d+) \|", page, re.MULTILINE)
     assert len(set(listed)) == len(listed) > 80
     cited = {
