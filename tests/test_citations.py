@@ -170,3 +170,8 @@ def test_every_word_of_the_glossary_stands_once_and_in_order():
     assert len(words) > 50
     assert words == sorted(words, key=str.lower)
     assert len(set(words)) == len(words)
+
+
+def test_commands_have_one_form_that_of_an_activated_environment():
+    for path in PAGES:
+        assert re.findall(r"\.venv/bin/(?!activate\b)\S*", path.read_text()) == [], place(path)
