@@ -127,6 +127,23 @@ def same_problem(main: Run) -> str:
     return markdown(("problem", "formulation", "best objective", "proven"), rows)
 
 
+def in_short(main: Run, runs: list[Run]) -> str:
+    """How many files were read, how many as meant, and for how many formulations an optimum is proven."""
+    found = [f for each in runs for f in each.result.findings if f.step == "read"]
+    read = sum(f.verdict == Verdict.AGREES for f in found)
+    wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
+    values = [
+        [f.objective for f in main.of(name) if f.proven and f.objective is not None] for name in FORMULATIONS
+    ]
+    proven = [each for each in values if each]
+    apart = max(max(each) - min(each) for each in proven)
+    return (
+        f"{len(CONSUMERS)} programs read {read} files as they were meant, and {wrong} otherwise. "
+        f"Of the {len(FORMULATIONS)} formulations {len(proven)} are proven optimal by {min(map(len, proven))} to {max(map(len, proven))} routes each. "
+        f"The proven optima of one formulation are at most {apart:.1e} apart."
+    )
+
+
 def errata(runs: list[Run]) -> str:
     """The misprints as numbers: optimum, and the energy of the field it stands for."""
     rows = []
@@ -207,6 +224,7 @@ def main() -> None:
             f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each solve, on one thread where that can be set. "
             "Optima must agree to 1e-6. `crossfield verify DIR --solve` does the same for any folder."
         ),
+        in_short(main_run, runs),
         "## Reading",
         readings(runs),
         "## The same problem in several formulations",

@@ -13,7 +13,7 @@
     STARTING_POINT{ ... }
 
 Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of its own sections, and no rows (B5).
-No OPTIONS: they are the user's. B-numbers: the project's notes on formats, section 1.6; sections and grammar: BARON's user manual, section 4.
+No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections and grammar: BARON's user manual, section 4.
 """
 
 from __future__ import annotations

@@ -15,10 +15,10 @@ the switch RESULTS, because NEOS refuses them (G19).
 
 The CSV starts with model_status, solver_status (GAMS's numbers: 1 optimal, 2 locally optimal, 8 integer solution, 4, 5, 10
 infeasible, ...; 1 normal completion, 2 iterations, 3 time, ...) and objective; then all columns in order. Values have 16 digits,
-which is what put gives (nr=2, nd=15, nw=24: formats.md, section 2), with a blank where a minus would stand. Without a solution they are
+which is what put gives (nr=2, nd=15, nw=24: R7), with a blank where a minus would stand. Without a solution they are
 the start, so look at the status first; the same holds for a column in no term, which is not in GAMS's model (G11).
 
-G-numbers: the project's notes on formats, section 1.5.
+G-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
     End
 
 A constant is carried by the column ONE fixed to 1 (L1, L2); one term a line, so that no line is long (L30). A model without rows gets
-the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip. L-numbers: the project's notes on formats, section 1.1.
+the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip. L-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations

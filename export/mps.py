@@ -10,7 +10,7 @@
     QCMATRIX row                       both triangles, without one-half (M16), after BOUNDS (M17)
     ENDATA
 
-The objective's constant is the cost of a column ONE fixed to 1. M-numbers: the project's notes on formats, section 1.2.
+The objective's constant is the cost of a column ONE fixed to 1. M-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Block or row tag, row and column of the pixel (for a pair: of its first pixel), and for a pair `u` for the upper or `r` for the right
 neighbour. Zero-padded to the grid's width: at most 15 characters, no leading e, i or n, unique without regard to case
-(formats.md, rule 11), so that a solver's log can be read and every solution file maps back without the model.
+(docs/format-rules.md, W6), so that a solver's log can be read and every solution file maps back without the model.
 """
 
 from __future__ import annotations

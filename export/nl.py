@@ -1,6 +1,6 @@
 """AMPL .nl, text and binary, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
 
-Order of variables: nine groups (formats.md, 1.4): nonlinear in objective and rows; in rows alone; in the objective alone; linear. The
+Order of variables: nine groups (docs/format-rules.md, N1, N2): nonlinear in objective and rows; in rows alone; in the objective alone; linear. The
 first three are split into continuous and integer, the last into continuous, binary and integer. Nonlinear rows come first.
 Header, line by line:
 

@@ -14,7 +14,7 @@ our columns and rows. Counts stand before the lists. What the file holds is said
 
 Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so each stands once; `mult` of variables and
 rows is not taken, so each has its line; <sum> and <product> take any number of arguments, <square> and <cos> one; a constant of the objective becomes
-a fixed variable `objconstvar`. O-numbers: the project's notes on formats, section 1.6.
+a fixed variable `objconstvar`. O-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations

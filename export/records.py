@@ -31,7 +31,7 @@ BLOCK: Final = 8192
 
 LEAST: Final = 1e-9
 MOST: Final = 1e15
-"""Readers drop or refuse coefficients outside (LEAST, MOST): formats.md, rule 10 and M23."""
+"""Readers drop or refuse coefficients outside (LEAST, MOST): docs/format-rules.md, W5 and M23."""
 
 _FEW: Final = 100
 """Whole numbers within so small a range are numbered without sorting."""
@@ -313,7 +313,7 @@ def signed(values: Floats) -> Texts:
 
 
 def bounds(values: Floats) -> Texts:
-    """Numbers, `-inf` or `+inf` (formats.md, rule 4)."""
+    """Numbers, `-inf` or `+inf` (docs/format-rules.md, W4)."""
     return np.where(values == np.inf, np.bytes_(b"+inf"), numbers(values))
 
 

@@ -2,7 +2,7 @@
 
 Any paper that is lighter than the strokes will do: its level is taken from the picture. Directions are found at the
 picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness and coherence, so that
-junctions and corners drop out (domain notes, 3.2 and 3.4).
+junctions and corners drop out (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations

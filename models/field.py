@@ -109,7 +109,7 @@ class CrossField:
         return self.alpha[at] + self.beta[at] - self.instance.target
 
     def energy(self, norm: Norm = 2) -> Energy:
-        """The energy of section 3 of the formulation notes with squares (2) or absolute values (1) throughout."""
+        """The energy (docs/mathematics.md, 5) with squares (2) or absolute values (1) throughout."""
         instance = self.instance
         size = np.abs if norm == 1 else np.square
         return Energy(
@@ -151,7 +151,7 @@ class CrossField:
     def cross_error(self, u: Floats, v: Floats) -> Floats:
         """Angle to the crosses with line angles u and v (n,), in radians.
 
-        For both assignments of lines the mean of the two line differences, the smaller one (domain notes, 4).
+        For both assignments of lines the mean of the two line differences, the smaller one (docs/mathematics.md, 9).
         """
         mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
         straight = line_difference(mine, u) + line_difference(other, v)

@@ -3,7 +3,7 @@
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and version as JSON
             text, and the arrays of the instance's own .npz, their names led by `instance_`. No pickles.
 .json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
-.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its docs/file_formats.md): a line `4 F`,
+.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its page on file formats): a line `4 F`,
             then for each face u, v, -u, -v as 12 numbers. Counter-clockwise in every row, because the angle from u to v is
             pi/2 - 2 beta and |beta| <= pi/4.
 

@@ -1,7 +1,7 @@
 """The greedy strategy of BendFields: the baseline to compare with, and the start of solvers and searches.
 
 It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between cells, cheapest first, with the
-angles brought up to date after every batch (domain notes, 2.3; the strategy is that of mixed-integer quadrangulation).
+angles brought up to date after every batch (docs/mathematics.md, 10; the strategy is that of mixed-integer quadrangulation).
 """
 
 from __future__ import annotations

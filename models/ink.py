@@ -1,6 +1,6 @@
 """Which colours are strokes, and which strokes are red, on white paper.
 
-Designers mark curvature lines in red and draw silhouettes and creases in black (domain notes, 3.1).
+Designers mark curvature lines in red and draw silhouettes and creases in black (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ class Instance:
 
     Rounding makes instances, and so their hashes, the same where the last digit differs between processors. It changes nothing twice.
 
-    Raises InstanceError when a rule is broken. Section 1 and 2 of the formulation notes.
+    Raises InstanceError when a rule is broken. See docs/mathematics.md, 1 and 4.
     """
 
     name: str

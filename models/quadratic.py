@@ -1,6 +1,6 @@
 """The energy at fixed jumps as a quadratic form, and solves of the sparse systems it leads to.
 
-With x = (alpha, beta), shape (2n,), the 2-norm energy of section 3 of the formulation notes is x'Hx - 2 b'x + constant.
+With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant.
 H holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i, and w_beta.
 """
 

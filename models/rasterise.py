@@ -65,7 +65,7 @@ class Cover:
 
     @property
     def weight(self) -> Floats:
-        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height, width] (domain notes, 3.4)."""
+        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height, width] (docs/mathematics.md, 1)."""
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
         return weight

@@ -1,7 +1,7 @@
 """From a sketch to an instance: SVG, bitmap or .scap, with or without a mask.
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the field, so their pixels
-leave the mask. A sketch in one colour is all curvature lines (domain notes, 3.1 and 3.3).
+leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations

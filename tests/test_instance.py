@@ -1,4 +1,4 @@
-"""Instances: every rule has its message, windows and jump bounds hold what the notes promise, symmetries are symmetries."""
+"""Instances: every rule has its message, windows and jump bounds hold what docs/mathematics.md promises, symmetries are symmetries."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is equivalent to what, and what is not: sections 3 to 5 of the formulation notes as sentences, and what files change."""
+"""What is equivalent to what, and what is not: docs/mathematics.md, 5 to 7, as sentences, and what files change."""
 
 from __future__ import annotations
 

@@ -81,6 +81,10 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     lines = [
         "# How fast files are written",
         "",
+        "[All pages](index.md).",
+        "",
+        in_short(at, sizes, targets(at, sizes, names, middle, pixels)),
+        "",
         "Written by `python tests/bench`; every number is measured in a process of its own, one at a time. The instance is a full square of pixels, a",
         "fifth of them with a stroke. Seconds go from the instance to the closed file (names, SHA-256 and, for .nl, the files of names included),",
         "the median of three runs, or of one when it takes more than 5 s. Every run writes new files. *CPU* is the time of all threads: where other programs shared the cores, it is",
@@ -111,6 +115,23 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     lines += against_pyomo(at, names, middle)
     lines += ["## Where the time goes", "", *where(at, sizes[-2]), *others(at, sizes, pixels)]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
+    """How many targets are met, how fast LP and MPS are written, and what all formats take. lines: the table of targets."""
+    size = sizes[-2]
+    speeds = {
+        suffix.upper(): found["bytes"] / 1e6 / found["seconds"]
+        for suffix in ("lp", "mps")
+        if (found := at("ours", size, suffix))
+    }
+    told = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
+    all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
+    took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
+    return (
+        f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} targets are met; the first table has them all. "
+        f"At {size} x {size} pixels the writers make {told or 'what was not measured'}. All formats of the largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
+    )
 
 
 def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
