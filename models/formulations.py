@@ -194,7 +194,7 @@ def skew(norm: int) -> Families:
 
 
 def jump_bounds() -> Families:
-    """p_min <= p1 + 2 p2 <= p_max, where the bounds of p1 and p2 do not say it already."""
+    """Rows p_min <= p1 + 2 p2 <= p_max, where the bounds of p1 and p2 do not say it already."""
     yield row("jlo", E, p1 + 2 * p2 >= p_min, "(7), bounded", only=("p_min", 1))
     yield row("jup", E, p1 + 2 * p2 <= p_max, "(7), bounded", only=("p_max", 0))
 

@@ -28,7 +28,7 @@ from .interruption import interruptible
 from .landscape import Point
 from .power_field import power_field
 from .quadratic import Solver
-from .side_by_side import side_by_side
+from .side_by_side import checked, side_by_side
 
 Progress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
@@ -78,10 +78,11 @@ def search(
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without success. All work keeps to the seconds,
     the start too; beyond them goes one step of it (on a grid of 100 x 100 a second), and the last solve, with 5 % and half a second more.
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is not positive.
+    jobs: processes. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is not positive, and for too many jobs.
     """
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
+    checked(jobs)
     with interruptible() as interrupted:
         limits = _Limits(
             Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted

@@ -148,8 +148,10 @@ class Model:
 
 
 class Finding:
-    """What was found of a point: objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind,
-    and whether the file's own point has the objective that it claims, if it claims one that can be compared.
+    """What was found of a point.
+
+    Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and whether the file's own
+    point has the objective that it claims, if it claims one that can be compared.
     """
 
     def __init__(

@@ -51,7 +51,7 @@ class Inputs:
     def _submission(self, record: Record) -> Submitted:
         self.ledger.field(record)  # damage is told here, with the file's name
         provenance = Provenance(record.solver, record.version, record.seconds, record.by)
-        return Submitted(read_bytes(self.ledger.folder / str(record.point)), provenance)
+        return Submitted(read_bytes(self.ledger.path(record)), provenance)
 
 
 def _relation(each: InstancePlan) -> str:
