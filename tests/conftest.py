@@ -1,7 +1,8 @@
-"""Puts this folder on the path, so that test modules can import `cases` and `oracles`; says how many slow tests were left out."""
+"""Puts this folder on the path, so that test modules can import `cases` and `oracles`; says which tests were left out, and why."""
 
 import os
 import sys
+from collections import Counter
 from pathlib import Path
 
 # pytest-xdist gives every core a test; linear algebra with as many threads in each would only wait for one another.
@@ -19,40 +20,50 @@ settings.register_profile(
 settings.register_profile("fuzz", settings.get_profile("same"), derandomize=False, print_blob=True)
 settings.load_profile("same")
 
-SLOW = pytest.StashKey[int]()
+LEFT_OUT = pytest.StashKey[dict[str, int]]()
+FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
+"""Fixtures, and the program that those who use them need."""
 
 
-@pytest.fixture(autouse=True)
-def _needed_programs(request):
-    marks = list(request.node.iter_markers("needs"))
-    if marks:
-        from oracles import require
-
-        for mark in marks:
-            require(*mark.args)
-
-
-@pytest.hookimpl(tryfirst=True)
+@pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Before `-m` chooses: who needs a program is among the oracles, and slow tests are counted."""
+    """Marks who needs a program; leaves out, after -m and -k have chosen, who needs an absent one; and counts who is left out."""
     for item in items:
+        for fixture in FIXTURES.keys() & set(item.fixturenames):
+            item.add_marker(pytest.mark.needs(FIXTURES[fixture]))
         if item.get_closest_marker("needs"):
             item.add_marker("oracles")
-    config.stash[SLOW] = sum("slow" in item.keywords for item in items)
+    slow = sum("slow" in item.keywords for item in items)
+    result = yield
+    reasons = [_absent(item) for item in items]
+    config.hook.pytest_deselected(items=[item for item, reason in zip(items, reasons, strict=True) if reason])
+    items[:] = [item for item, reason in zip(items, reasons, strict=True) if not reason]
+    config.stash[LEFT_OUT] = dict(Counter(filter(None, reasons)))
+    if slow and config.option.markexpr == "not slow" and not config.option.keyword:
+        config.stash[LEFT_OUT]["slow; run them with -m slow"] = slow
+    return result
+
+
+def _absent(item):
+    marks = list(item.iter_markers("needs"))
+    if not marks:
+        return ""
+    from oracles import absence
+
+    return next(filter(None, (absence(*mark.args) for mark in marks)), "")
 
 
 def pytest_sessionfinish(session):
     if hasattr(session.config, "workeroutput"):
-        session.config.workeroutput["slow"] = session.config.stash.get(SLOW, 0)
+        session.config.workeroutput["left_out"] = session.config.stash.get(LEFT_OUT, {})
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
-    """The count of a worker of pytest-xdist, where the process on the terminal collects nothing."""
-    node.config.stash[SLOW] = getattr(node, "workeroutput", {}).get("slow", 0)
+    """What a worker of pytest-xdist left out, where the process on the terminal collects nothing."""
+    node.config.stash[LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", {})
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    left_out = config.stash.get(SLOW, 0)
-    if left_out and config.option.markexpr == "not slow":
-        terminalreporter.write_line(f"{left_out} slow tests were left out; run them with -m slow")
+    for reason, count in sorted(config.stash.get(LEFT_OUT, {}).items()):
+        terminalreporter.write_line(f"LEFT OUT [{count}] {reason}")

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from crossfield.export import consumer_asl, consumer_casadi, consumer_highs, consumer_scip
 from crossfield.export.comparison import of_problem
 from crossfield.export.consumers import CONSUMERS
 from crossfield.export.meaning import Meaning as Model
 from crossfield.models.grid import Floats
 
-__all__ = ["Model", "by_asl", "by_casadi", "by_gurobi", "by_highs", "by_scip", "of_problem", "require", "scip_columns"]  # fmt: skip
+__all__ = ["Model", "absence", "browser", "by_asl", "by_casadi", "by_gurobi", "by_highs", "by_scip", "of_problem", "scip_columns"]  # fmt: skip
 
 by_highs = consumer_highs.read
 by_scip = consumer_scip.read
@@ -30,23 +29,31 @@ def by_gurobi(path: Path) -> Model:
     return consumer_gurobi.read(path)
 
 
+def browser() -> str | None:
+    """The path of a Chromium."""
+    return next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chrome"))), None)
+
+
 OTHERS = {
-    "baron": (importlib.util.find_spec("gamspy_baron"), "BARON is not installed: pip install gamspy_baron"),
-    "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib is not installed: pip install pyqplib"),
-    "cbc": (shutil.which("cbc"), "CBC is not installed: apt-get install coinor-cbc"),
+    "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
+    "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
+    "chromium": (
+        importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),
+        "Chromium with its driver, or selenium,",
+        "apt install chromium chromium-driver",
+    ),
 }
-"""Programs that are no consumers of `verify`: a sign that they are here, and what to do where they are not."""
+"""Programs that are no consumers of `verify`: a sign that they are here, their names, and what to do where they are not."""
 
 
-def require(program: str) -> None:
-    """Skip the test when a consumer or another program is absent; all such skips have this one place, and so one line each."""
+def absence(program: str) -> str:
+    """Why tests that need a consumer or another program cannot run, in a line; nothing where it is here."""
     if program in OTHERS:
-        present, words = OTHERS[program]
+        present, title, remedy = OTHERS[program]
     else:
         entry = CONSUMERS[program]
-        present, words = entry.present, f"{entry.title} is not installed: {entry.install}"
-    if not present:
-        pytest.skip(words)
+        present, title, remedy = entry.present, entry.title, entry.install
+    return "" if present else f"{title} is not installed: {remedy}"
 
 
 def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:

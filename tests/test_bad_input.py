@@ -487,7 +487,9 @@ def test_without_one_solver_another_that_takes_the_class_is_used(tmp_path, insta
 def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
     prelude = "sys.modules['highspy'] = sys.modules['casadi'] = None"
-    done = in_child("run", tmp_path / "tiny.json", "-o", tmp_path / "out", "--json", prelude=prelude)
+    done = in_child(
+        "run", tmp_path / "tiny.json", "--time-limit", 1, "-o", tmp_path / "out", "--json", prelude=prelude
+    )
     assert done.returncode == 0
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out" / "report.json").read_text())

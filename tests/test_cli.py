@@ -299,15 +299,15 @@ def test_the_version_is_that_of_the_package(crossfield):
     assert crossfield("--version") == f"crossfield {version('crossfield')}\n"
 
 
-def test_debug_shows_the_traceback(tmp_path):
+def test_debug_shows_the_traceback(tmp_path, capsys):
     (tmp_path / "bad.json").write_text("{}")
-    plain, debug = (
-        child(*flags, "run", tmp_path / "bad.json", "-o", tmp_path / "out") for flags in ((), ("--debug",))
-    )
-    assert plain.returncode == debug.returncode == 1
-    assert plain.stderr.count("\n") == 1
-    assert "Traceback" in debug.stderr
-    assert "InstanceError" in debug.stderr
+    arguments = ["run", str(tmp_path / "bad.json"), "-o", str(tmp_path / "out")]
+    assert invoke(arguments) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    done = child("--debug", *arguments)
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "InstanceError" in done.stderr
 
 
 def test_what_should_not_happen_is_one_line_too(tmp_path, instance_file):

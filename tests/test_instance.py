@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
 
-pytestmark = pytest.mark.numeric
-
 GOOD = {
     "name": "small",
     "mask": np.array([[1, 1, 1], [1, 1, 0]], dtype=bool),

@@ -27,6 +27,7 @@ from crossfield.models.field_file import read_field
 from crossfield.models.formulations import FORMULATIONS, declare
 from crossfield.models.instance_file import read_instance
 from loops import for_each
+from oracles import browser as browser_program
 
 SPEC = """format = "crossfield-library-spec"
 version = 1
@@ -442,15 +443,11 @@ def address(site):
 @pytest.fixture(scope="module")
 def chromium():
     """A headless Chromium; its logs are kept."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    program = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chrome")
+    from selenium import webdriver
+
     driver = shutil.which("chromedriver")
-    if program is None or driver is None:
-        pytest.skip(
-            "there is no Chromium with its chromedriver; on Debian: apt-get install chromium chromium-driver"
-        )
     options = webdriver.ChromeOptions()
-    options.binary_location = program
+    options.binary_location = browser_program()
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})

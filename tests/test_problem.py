@@ -15,8 +15,6 @@ from crossfield.models.instance import HALF, QUARTER, Instance
 from crossfield.models.problem import formulate, lifted, with_integers_fixed, with_rest_fixed
 from loops import for_each
 
-pytestmark = pytest.mark.numeric
-
 POLYNOMIAL = [label for label in CASES if not label.startswith("minlp-parity")]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -29,19 +29,26 @@ from crossfield.models.instance_file import write_instance
 from crossfield.models.problem import formulate
 from crossfield.models.samples import sample
 from loops import for_each
-from oracles import require
 
 pytestmark = pytest.mark.oracles
 
 SECONDS = 0.3
 SOLVERS = {solver: entry.name for entry in CONSUMERS.values() for solver in entry.solvers}
 """Each solver and the consumer that runs it."""
+needing = pytest.mark.needs
+each_solver = pytest.mark.parametrize(
+    "solver",
+    [
+        pytest.param(name, marks=[needing(consumer), *([needing(name)] if name == "baron" else [])])
+        for name, consumer in SOLVERS.items()
+    ],
+)
 
 
-def needs_solver(solver: str) -> None:
-    require(SOLVERS[solver])
-    if remedy := lacking(solver):
-        pytest.skip(f"{EXTERNALS[solver].title} is not installed: {remedy}")
+def each_of(consumers: Iterable[str]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize(
+        "consumer", [pytest.param(name, marks=needing(name)) for name in consumers]
+    )
 
 
 def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Instance:
@@ -49,13 +56,6 @@ def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Inst
     pixels = np.argwhere(np.ones((height, width), bool))[: max(1, 2 * height * width // 3)]
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
     return Instance(name, np.ones((height, width), bool), pixels, theta, w, w_beta=1e-3)
-
-
-@pytest.fixture(params=SOLVERS)
-def solver(request: pytest.FixtureRequest) -> str:
-    """A solver that is here."""
-    needs_solver(request.param)
-    return str(request.param)
 
 
 INSTANCES: dict[str, Callable[[], Instance]] = {
@@ -87,10 +87,9 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Verifi
 
 
 @pytest.mark.parametrize("instance", LARGER)
-@pytest.mark.parametrize("consumer", CONSUMERS)
+@each_of(CONSUMERS)
 def test_every_file_means_the_problem(verified: Callable[[str], Verification], consumer: str, instance: str):
     """Each file of the consumer's formats is read and agrees, or is refused for a reason of the table."""
-    require(consumer)
     entry, verification = CONSUMERS[consumer], verified(instance)
     read = {f.file: f.verdict for f in verification.findings if f.consumer == consumer and f.step == "read"}
     files = [path.name for path in verification.folder.iterdir() if path.suffix[1:] in entry.formats]
@@ -107,6 +106,7 @@ def refuses(path: Path, solver: str) -> bool:
 
 
 @pytest.mark.parametrize("instance", LARGER)
+@each_solver
 def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):
     found = [f for f in verified(instance).findings if f.consumer == solver and f.step == "solve"]
     assert found
@@ -237,9 +237,9 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
     assert not found.ok
 
 
+@needing("scip")
 def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
     """An understated count of nonlinear variables in a header takes SCIP's process down; the next file is read all the same."""
-    require("scip")
     for name in ("crash", "well"):
         write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
     path = tmp_path / "crash.miqcp-bilinear.nl"
@@ -313,10 +313,9 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
         verify(tmp_path)
 
 
-@pytest.mark.parametrize("consumer", ["gurobi", "cplex", "xpress", "gams"])
+@each_of(["gurobi", "cplex", "xpress", "gams"])
 def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, consumer: str):
     """A size that no free edition takes; whoever has a licence sees it solved, or the time limit."""
-    require(consumer)
     MASKS.setdefault("wide", ["#" * 16] * 16)
     write_all(make_instance("wide"), tmp_path, ["miqp-mccormick"], ["lp", "gms"])
     found = verify(tmp_path, seconds=0.1, consumers=[consumer])
@@ -347,6 +346,7 @@ CLAIMS = [
 ]
 
 
+@each_solver
 @for_each("kind, name", CLAIMS)
 def test_claims_are_true(
     verified: Callable[[str], Verification],

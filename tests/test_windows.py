@@ -109,6 +109,7 @@ def test_limits_and_solvers_that_cannot_be_are_refused(given):
         search_windows(first_field(cf.sample("skew", 6)), **given)
 
 
+@pytest.mark.slow
 def test_from_the_command_line_with_highs(tmp_path, capsys):
     """On a grid as small as a window all windows are solved to the end, long before the limit."""
     instance = random_instance(1, shape=(2, 2), strokes=4)
