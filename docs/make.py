@@ -63,7 +63,7 @@ def formulations() -> None:
 
 def kinds_in_short() -> str:
     """How many formulations there are, of which kinds, and which solvers here close them."""
-    convex = [f"`{name}`" for name, recipe in FORMULATIONS.items() if recipe.convex]
+    convex = [f"`{name}`" for name in FORMULATIONS if declare(name).convex]
     _, rows = tables()["solvers"]
     solvers = [column for column in rows[0] if column != "formulation"]
     closed = {row["formulation"] for row in rows if any(row[solver] == "yes" for solver in solvers)}

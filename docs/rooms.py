@@ -14,11 +14,11 @@ from typing import Final
 
 PARTS: Final = ("models", "export", "templates")
 GROUND: Final = "models"
-"""At its top errors and storage: used by every folder, and so left out of the table."""
+"""At its top what every folder uses, and so left out of the table."""
 
 ORDER: Final = (
-    "models", "models/instance", "models/sketch", "models/field", "models/formulations", "models/search", "templates",
-    "export/writing", "export/formats", "export", "export/solutions", "export/bundle", "export/pictures", "export/solving",
+    "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations", "models/search", "templates",
+    "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions", "export/bundle", "export/pictures", "export/solving",
     "export/verify/programs", "export/verify", "export/library", "export/library/plan", "export/library/documents",
     "export/library/ledger", "export/library/building", "export/library/checking", "export/library/contributions",
     "export/library/site", "export/cli",
