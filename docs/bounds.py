@@ -13,8 +13,8 @@ from typing import Any, Final
 import crossfield as cf
 import highspy
 import numpy as np
-from crossfield.models.instance import Instance
-from crossfield.models.problem import Problem
+from crossfield.models.formulations.problem import Problem
+from crossfield.models.instance.instance import Instance
 from make import markdown, said
 
 DOCS: Final = Path(__file__).resolve().parent

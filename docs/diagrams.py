@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.models.field import CrossField, best_jumps
-from crossfield.models.instance import HALF, QUARTER, Instance
+from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from matplotlib.figure import Figure
 
 U, V, GREY, FILL = "#c0392b", "#2563a8", "#7a7a7a", "#dfe9f5"

@@ -23,12 +23,12 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.manifest import write_all
-from crossfield.export.verify import Finding, verify
-from crossfield.models.box_qp import fitted
-from crossfield.models.field import CrossField
-from crossfield.models.instance import Instance
-from crossfield.models.samples import SAMPLES
+from crossfield.export.bundle.manifest import write_all
+from crossfield.export.verify.verify import Finding, verify
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import Instance
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.sketch.samples import SAMPLES
 from make import markdown, said
 from PIL import Image
 

@@ -14,14 +14,14 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.formats import DEFAULTS
-from crossfield.export.methods import METHODS, Candidate, Request
-from crossfield.export.tables import sample_rows, tables
-from crossfield.models.formulations import FORMULATIONS, declare
-from crossfield.models.instance import GAUGES, Gauge, Instance
-from crossfield.models.latex import latex
-from crossfield.models.notation import VARIABLES
-from crossfield.models.samples import SAMPLES
+from crossfield.export.cli.tables import sample_rows, tables
+from crossfield.export.formats.registry import DEFAULTS
+from crossfield.export.solving.methods import METHODS, Candidate, Request
+from crossfield.models.formulations.catalogue import FORMULATIONS, declare
+from crossfield.models.formulations.latex import latex
+from crossfield.models.formulations.symbols import VARIABLES
+from crossfield.models.instance.instance import GAUGES, Gauge, Instance
+from crossfield.models.sketch.samples import SAMPLES
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent

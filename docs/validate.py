@@ -14,14 +14,14 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.capabilities import EXTERNALS, takes
-from crossfield.export.consumers import CONSUMERS
-from crossfield.export.manifest import write_all
-from crossfield.export.starts import STARTS
-from crossfield.export.tables import smallest_problems
-from crossfield.export.verify import Finding, Verdict, Verification, verify
-from crossfield.models.formulations import FORMULATIONS
-from crossfield.models.instance import GAUGES, Gauge, Instance
+from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.starts import STARTS
+from crossfield.export.cli.tables import smallest_problems
+from crossfield.export.solvers_table import EXTERNALS, takes
+from crossfield.export.verify.programs.registry import CONSUMERS
+from crossfield.export.verify.verify import Finding, Verdict, Verification, verify
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import markdown, said
 
 DOCS: Final = Path(__file__).resolve().parent

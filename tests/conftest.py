@@ -1,4 +1,4 @@
-"""Puts this folder on the path, so that test modules can import `cases` and `oracles`; says which tests were left out, and why."""
+"""Puts the folder `support` on the path, so that test modules can import `cases` and `oracles`; says which tests were left out, and why."""
 
 import os
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 
 # pytest-xdist gives every core a test; linear algebra with as many threads in each would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 
 import pytest
 from hypothesis import HealthCheck, settings

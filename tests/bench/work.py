@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from crossfield.export.formats import FORMATS, carried, write
-from crossfield.models.instance import Instance
-from crossfield.models.problem import Problem, formulate
+from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.models.formulations.problem import Problem, formulate
+from crossfield.models.instance.instance import Instance
 
 Measured = Callable[[], object]
 WARM = 6
@@ -69,7 +69,7 @@ def chunks_of(problem: Problem, suffix: str, dialect: str) -> Any:
 
 def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """Pyomo: building the model, and its own writer with numbered names."""
-    from crossfield.export.pyomo_model import to_pyomo
+    from crossfield.export.formats.pyomo_model import to_pyomo
 
     def run() -> None:
         problem = formulated(formulation, instance)
@@ -205,8 +205,8 @@ def copied(
 
 def everything(instance: Instance, formulation: str, suffix: str, path: Path, jobs: int = 1) -> Measured:
     """Every format of one formulation, or of all, as `crossfield export` writes them."""
-    from crossfield.export.manifest import write_all
-    from crossfield.models.formulations import FORMULATIONS
+    from crossfield.export.bundle.manifest import write_all
+    from crossfield.models.formulations.catalogue import FORMULATIONS
 
     names = [formulation] if formulation != "all" else list(FORMULATIONS)
     dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
@@ -247,7 +247,7 @@ def hashed(instance: Instance, formulation: str, suffix: str, path: Path) -> Mea
 
 def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """A drawing as a bitmap of four times the size to an instance."""
-    from crossfield.models.sketch import read_sketch
+    from crossfield.models.sketch.read import read_sketch
     from PIL import Image, ImageDraw
 
     size = instance.grid.height
@@ -266,7 +266,7 @@ def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Me
 
 def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """A solution file, `highs` or `ampl`, to a field: read, mapped, rounded, cut into angles and jumps."""
-    from crossfield.export.solution import read_solution
+    from crossfield.export.solutions.solution import read_solution
 
     problem = formulated(formulation, instance)
     point = np.random.default_rng(1).normal(size=problem.columns)
@@ -277,8 +277,8 @@ def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> M
 
 def write_highs(path: Path, problem: Problem, point: Any) -> None:
     """A solution file as HiGHS writes it."""
-    from crossfield.export.names import Names
-    from crossfield.export.records import render, words
+    from crossfield.export.writing.names import Names
+    from crossfield.export.writing.records import render, words
 
     head = (
         f"Model status\nOptimal\n\n# Primal solution values\nFeasible\nObjective 0\n# Columns {len(point)}\n"
@@ -294,8 +294,8 @@ def write_highs(path: Path, problem: Problem, point: Any) -> None:
 
 def write_ampl(path: Path, problem: Problem, point: Any) -> None:
     """A solution file as the AMPL Solver Library writes it."""
-    from crossfield.export.nl import Layout
-    from crossfield.export.records import render, words
+    from crossfield.export.formats.nl import Layout
+    from crossfield.export.writing.records import render, words
 
     counts = (3, 1, 1, 0, problem.row_count, 0, len(point), len(point))
     with path.open("wb") as stream:

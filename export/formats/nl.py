@@ -1,0 +1,436 @@
+"""AMPL .nl, text and binary, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
+
+Order of variables: nine groups (docs/format-rules.md, N1, N2): nonlinear in objective and rows; in rows alone; in the objective alone; linear. The
+first three are split into continuous and integer, the last into continuous, binary and integer. Nonlinear rows come first.
+Header, line by line:
+
+    g3 1 1 0                           b3 1 1 0 for binary; the options come back in the .sol
+    variables rows objectives ranges equations
+    nonlinear rows, objectives
+    0 0                                no network
+    nlvc nlvo nlvb                     nlvo is a prefix bound, not a count (N2)
+    0 0 arith 1                        flag 1: the solver reports its code (arith 1: little-endian binary)
+    nbv niv nlvbi nlvci nlvoi          integers among the nonlinear groups are not counted in nbv, niv (N1)
+    nonzeros of Jacobian, gradient     a nonlinear variable has its entry, with coefficient 0
+    longest names of rows, columns
+    0 0 0 0 0                          no defined variables (N7)
+
+Segments: C (rows), O, x (start), r, b, k (cumulative column counts, N4), J, G; none empty (N3), no comments (N6). Opcodes: o0 + , o2 * ,
+o5 power, o16 minus, o46 cos, o54 sum of three or more (N14). The objective is written as declared, factored, with its constant inside;
+of a nonlinear row the linear part stands in J and the constant in r. Binary: one letter, little-endian int32 and float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.instance.grid import Bools, Floats, Ints
+from ..writing.names import OBJECTIVE, Names, name_length
+from ..writing.records import Decimals, Pieces, Raw, check_coefficients, render, words
+from .lp import scalar_when_constant
+
+ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
+_FUNCTIONS: Final = {sp.cos: COSINE}
+
+
+class Text:
+    """Tokens of the text form, each on its own line."""
+
+    letter = b"g"
+    arith = 0
+    padded = True
+
+    def segment(self, name: bytes, *numbers: int | Ints) -> Pieces:
+        """The head of a segment: its letter and integers."""
+        parts: list[Any] = [name]
+        for place, value in enumerate(numbers):
+            parts += [b" "] if place else []
+            parts.append(_decimal(value))
+        return [*parts, b"\n"]
+
+    def entry(self, index: Ints, value: Floats | float) -> Pieces:
+        """An index and a number."""
+        return [Decimals(index), b" ", words(value), b"\n"]
+
+    def integer(self, value: Ints) -> Pieces:
+        """An integer of the segment k."""
+        return [Decimals(value), b"\n"]
+
+    def bound(self, code: int, *values: Floats | float) -> Pieces:
+        """A line of the segments r and b."""
+        return [str(code).encode(), *(part for value in values for part in (b" ", words(value))), b"\n"]
+
+    def operator(self, code: int) -> Pieces:
+        """An operator of fixed arity."""
+        return [b"o%d\n" % code]
+
+    def sum(self, count: int) -> Pieces:
+        """The sum of three or more."""
+        return [b"o%d\n%d\n" % (SUM, count)]
+
+    def variable(self, index: Ints) -> Pieces:
+        """A variable."""
+        return [b"v", Decimals(index), b"\n"]
+
+    def constant(self, value: Floats | float) -> Pieces:
+        """A number."""
+        return [b"n", words(value), b"\n"]
+
+
+class Binary:
+    """Tokens of the binary form: one letter, then little-endian int32 and float64."""
+
+    letter = b"b"
+    arith = 1
+    padded = False
+
+    def segment(self, name: bytes, *numbers: int | Ints) -> Pieces:
+        """The head of a segment: its letter and integers."""
+        return [name, *map(_int32, numbers)]
+
+    def entry(self, index: Ints, value: Floats | float) -> Pieces:
+        """An index and a number."""
+        return [_int32(index), _float64(value)]
+
+    def integer(self, value: Ints) -> Pieces:
+        """An integer of the segment k."""
+        return [_int32(value)]
+
+    def bound(self, code: int, *values: Floats | float) -> Pieces:
+        """A record of the segments r and b."""
+        return [str(code).encode(), *map(_float64, values)]
+
+    def operator(self, code: int) -> Pieces:
+        """An operator of fixed arity."""
+        return [b"o", _int32(code)]
+
+    def sum(self, count: int) -> Pieces:
+        """The sum of three or more."""
+        return [b"o", _int32(SUM), _int32(count)]
+
+    def variable(self, index: Ints) -> Pieces:
+        """A variable."""
+        return [b"v", _int32(index)]
+
+    def constant(self, value: Floats | float) -> Pieces:
+        """A number."""
+        return [b"n", _float64(value)]
+
+
+Encoder = Text | Binary
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Order of columns and rows in a .nl file.
+
+    order: column of the problem at each place of the file; place: the inverse. rows: families in file order.
+    """
+
+    problem: Problem
+
+    @cached_property
+    def nonlinear_rows(self) -> tuple[Bound, ...]:
+        """Families of rows that are not linear."""
+        return tuple(family for family in self.problem.rows if family.degree > 1)
+
+    @cached_property
+    def rows(self) -> tuple[Bound, ...]:
+        """Families of rows, nonlinear ones first."""
+        return self.nonlinear_rows + tuple(family for family in self.problem.rows if family.degree <= 1)
+
+    @cached_property
+    def nonlinear_objective(self) -> tuple[Bound, ...]:
+        """Terms of the objective that are not linear."""
+        return tuple(family for family in self.problem.objective if family.degree > 1)
+
+    @cached_property
+    def in_objective(self) -> Bools:
+        """True for columns in nonlinear terms of the objective."""
+        found = np.zeros(self.problem.columns, dtype=bool)
+        for family in self.nonlinear_objective:
+            for symbol in family.variables:
+                found[family.columns(symbol)] = True
+        return found
+
+    @cached_property
+    def in_rows(self) -> Bools:
+        """True for columns in nonlinear terms of rows."""
+        found = np.zeros(self.problem.columns, dtype=bool)
+        for family in self.nonlinear_rows:
+            for term in nonlinear_terms(family):
+                for factor in term.factors:
+                    found[factor] = True
+        return found
+
+    @cached_property
+    def group(self) -> NDArray[np.int8]:
+        """Group 0..8 of each column; small integers are sorted by counting."""
+        problem, rows, objective = self.problem, self.in_rows, self.in_objective
+        binary = problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
+        nonlinear = np.where(rows & objective, 0, np.where(rows, 2, 4)) + problem.integer
+        linear = np.where(binary, 7, np.where(problem.integer, 8, 6))
+        return np.where(rows | objective, nonlinear, linear).astype(np.int8)
+
+    @cached_property
+    def order(self) -> Ints:
+        """Column of the problem at each place of the file."""
+        return np.argsort(self.group, kind="stable").astype(np.int32)
+
+    @cached_property
+    def place(self) -> Ints:
+        """Place in the file of each column of the problem."""
+        place = np.empty_like(self.order)
+        place[self.order] = np.arange(len(place), dtype=np.int32)
+        return place
+
+    @cached_property
+    def stretches(self) -> list[tuple[Block, slice]]:
+        """Runs of places that hold columns of one block, in file order."""
+        blocks = [block for block in self.problem.blocks.values() if block.count]
+        number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
+        return [(blocks[number[self.order[run.start]]], run) for run in _runs(number[self.order])]
+
+    def places(self, family: Bound, symbol: sp.Symbol) -> Ints:
+        """Place in the file of the symbol's column at each element of a family."""
+        places, inside = self.place[family.block(symbol).columns], family.inside(symbol)
+        return places if inside is None else places[inside]
+
+    def column_file(self) -> Iterator[bytes]:
+        """The bytes of the .col file: names of columns in file order, one a line."""
+        names = Names(self.problem)
+        for block, run in self.stretches:
+            inside = self.order[run] - block.offset
+            yield from render([names.of(block).at(inside), b"\n"], len(inside))
+
+    def row_file(self) -> Iterator[bytes]:
+        """The bytes of the .row file: names of rows in file order, then of the objective, one a line."""
+        names = Names(self.problem)
+        for family in self.rows:
+            yield from render([names.row(family), b"\n"], family.count)
+        yield OBJECTIVE + b"\n"
+
+
+def _runs(values: NDArray[Any]) -> list[slice]:
+    """Stretches of equal values."""
+    cuts = [0, *(np.nonzero(np.diff(values))[0] + 1).tolist(), len(values)]
+    return [slice(first, last) for first, last in pairwise(cuts)]
+
+
+def nonlinear_terms(family: Bound) -> tuple[Term, ...]:
+    """The monomials of degree two and more."""
+    return tuple(term for term in family.terms or () if term.degree > 1)
+
+
+def generate(problem: Problem, *, binary: bool = False, start: Floats | None = None) -> Iterator[bytes]:
+    """The bytes of the .nl file. start: a point (columns,) for the segment x."""
+    layout, code = Layout(problem), Binary() if binary else Text()
+    yield _header(layout, code)
+    first = 0
+    for family in layout.rows:
+        body = _sum(
+            code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]
+        ) or code.constant(0.0)
+        yield from render(
+            [*code.segment(b"C", np.arange(first, first + family.count, dtype=np.int32)), *body],
+            family.count,
+            padded=code.padded,
+        )
+        first += family.count
+    yield from _objective(layout, code)
+    if start is not None:
+        yield from _once(code, code.segment(b"x", problem.columns))
+        parts = code.entry(np.arange(problem.columns, dtype=np.int32), start[layout.order])
+        yield from render(parts, problem.columns, padded=code.padded)
+    yield from _limits(layout, code)
+    yield from _bounds(layout, code)
+    yield from _jacobian(layout, code)
+
+
+def _header(layout: Layout, code: Encoder) -> bytes:
+    problem, count = layout.problem, np.bincount(layout.group, minlength=9)
+    nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
+    equations = sum(family.count for family in layout.rows if family.family.sense == "==")
+    entries = sum(family.count * len(_entries(family)) for family in layout.rows)
+    rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in layout.rows)
+    columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
+    lines = [
+        code.letter + b"3 1 1 0",
+        b" %d %d 1 0 %d" % (problem.columns, problem.row_count, equations),
+        b" %d %d" % (sum(family.count for family in layout.nonlinear_rows), bool(layout.nonlinear_objective)),
+        b" 0 0",
+        b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
+        b" 0 0 %d 1" % code.arith,
+        b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
+        b" %d %d" % (entries, len(_gradient(layout)[0])),
+        b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),
+        b" 0 0 0 0 0",
+    ]
+    return b"\n".join(lines) + b"\n"
+
+
+def _objective(layout: Layout, code: Encoder) -> Iterator[bytes]:
+    families = layout.nonlinear_objective
+    yield from _once(code, code.segment(b"O", 0, 0))
+    summands = sum(family.count for family in families)
+    if not summands:
+        yield from _once(code, code.constant(0.0))
+    elif summands > 1:
+        yield from _once(code, code.operator(ADD) if summands == 2 else code.sum(summands))
+    for family in families:
+        yield from render(_tree(layout, code, family, family.family.body), family.count, padded=code.padded)
+
+
+def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
+    """The expression in prefix notation; parts free of columns become one number."""
+    if not expression.free_symbols & set(family.variables):
+        return code.constant(family.data(expression))
+    if expression.is_Symbol:
+        return code.variable(layout.places(family, expression))
+    if expression.is_Add or expression.is_Mul:
+        return _chain(layout, code, family, expression)
+    if expression.is_Pow:
+        return [
+            *code.operator(POWER),
+            *_tree(layout, code, family, expression.base),
+            *code.constant(float(expression.exp)),
+        ]
+    return [*code.operator(_FUNCTIONS[expression.func]), *_tree(layout, code, family, expression.args[0])]
+
+
+def _chain(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
+    """A sum or a product, its parts free of columns joined into one number in front."""
+    join = sp.Add if expression.is_Add else sp.Mul
+    data = [arg for arg in expression.args if not arg.free_symbols & set(family.variables)]
+    rest = [_tree(layout, code, family, arg) for arg in expression.args if arg not in data]
+    if join is sp.Add:
+        return _sum(code, ([code.constant(family.data(sp.Add(*data)))] if data else []) + rest)
+    parts = list(rest[-1])
+    for factor in reversed(rest[:-1]):
+        parts = [*code.operator(MULTIPLY), *factor, *parts]
+    if not data:
+        return parts
+    if sp.Mul(*data) == -1:
+        return [*code.operator(NEGATE), *parts]
+    return [*code.operator(MULTIPLY), *code.constant(family.data(sp.Mul(*data))), *parts]
+
+
+def _sum(code: Encoder, summands: list[Pieces]) -> Pieces:
+    flat = [part for summand in summands for part in summand]
+    if len(summands) < 2:
+        return flat
+    return [*(code.operator(ADD) if len(summands) == 2 else code.sum(len(summands))), *flat]
+
+
+def _monomial(layout: Layout, code: Encoder, term: Term) -> Pieces:
+    check_coefficients(term.coefficient, "a nonlinear row")
+    parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(term.coefficient)]
+    *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
+    for factor in others:
+        parts += [*code.operator(MULTIPLY), *code.variable(factor)]
+    return [*parts, *code.variable(last)]
+
+
+def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
+    if not layout.rows:
+        return
+    yield from _once(code, code.segment(b"r"))
+    for family in layout.rows:
+        kind = {">=": 2, "<=": 1, "==": 4}[family.family.sense]
+        yield from render(
+            code.bound(kind, scalar_when_constant(family.limit)), family.count, padded=code.padded
+        )
+
+
+def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
+    """Bounds in file order, one stretch of one block and of equal kind after the other."""
+    yield from _once(code, code.segment(b"b"))
+    for block, run in layout.stretches:
+        inside = layout.order[run] - block.offset
+        lower, upper = block.lower[inside], block.upper[inside]
+        kind = np.select(
+            [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
+        )
+        for part in _runs(kind):
+            low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
+            values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
+            yield from render(
+                code.bound(int(kind[part.start]), *values), part.stop - part.start, padded=code.padded
+            )
+
+
+def _entries(family: Bound) -> list[tuple[sp.Symbol, Floats | float]]:
+    """Symbols and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
+    linear = {term.symbols[0]: term.coefficient for term in family.of_degree(1)}
+    return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
+
+
+def _gradient(layout: Layout) -> tuple[Ints, Floats]:
+    """Places and coefficients of G: costs of linear terms, and 0 for columns of nonlinear ones."""
+    problem = layout.problem
+    costs = np.zeros(problem.columns)
+    for family in problem.objective:
+        if family.degree <= 1:
+            for term in family.of_degree(1):
+                np.add.at(costs, term.factors[0], term.coefficient)
+    check_coefficients(costs, "the objective")
+    place = np.nonzero(((costs != 0) | layout.in_objective)[layout.order])[0].astype(np.int32)
+    return place, costs[layout.order[place]]
+
+
+def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
+    problem = layout.problem
+    rows = [(family, _entries(family)) for family in layout.rows]
+    if rows:
+        count = np.zeros(problem.columns, dtype=np.int32)
+        for family, entries in rows:
+            for symbol, _ in entries:
+                block, inside = family.block(symbol), family.inside(symbol)
+                count[block.columns] += 1 if inside is None else np.bincount(inside, minlength=block.count)
+        yield from _once(code, code.segment(b"k", problem.columns - 1))
+        yield from render(
+            code.integer(np.cumsum(count[layout.order])[:-1].astype(np.int32)),
+            problem.columns - 1,
+            padded=code.padded,
+        )
+    first = 0
+    for family, entries in rows:
+        parts = list(code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries)))
+        for symbol, value in entries:
+            check_coefficients(value, f"row family {family.family.tag}")
+            parts += code.entry(layout.places(family, symbol), value)
+        yield from render(parts, family.count, padded=code.padded)
+        first += family.count
+    place, costs = _gradient(layout)
+    if len(place):
+        yield from _once(code, code.segment(b"G", 0, len(place)))
+        yield from render(code.entry(place, costs), len(place), padded=code.padded)
+
+
+def _once(code: Encoder, parts: Pieces) -> Iterator[bytes]:
+    yield from render(parts, 1, padded=code.padded)
+
+
+def _decimal(value: int | Ints) -> bytes | Decimals:
+    return str(value).encode() if isinstance(value, int) else Decimals(value)
+
+
+def _int32(value: int | Ints) -> bytes | Raw:
+    if isinstance(value, int):
+        return value.to_bytes(4, "little", signed=True)
+    return Raw(value.astype("<i4"))
+
+
+def _float64(value: Floats | float) -> bytes | Raw:
+    if np.ndim(value) == 0:
+        return np.asarray(value, dtype="<f8").tobytes()
+    return Raw(np.asarray(value, dtype="<f8"))
