@@ -1,4 +1,7 @@
-"""Jinja2 layouts of model files. Layout only: every line of bulk is streamed in."""
+"""Layouts of texts, in Jinja2.
+
+models: of model files; library: texts of a library; site: its pages. Layout only: every line of bulk is streamed in.
+"""
 
 from __future__ import annotations
 
