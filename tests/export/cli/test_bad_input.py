@@ -490,7 +490,16 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
     prelude = "sys.modules['highspy'] = sys.modules['casadi'] = None"
     done = in_child(
-        "run", tmp_path / "tiny.json", "--time-limit", 1, "-o", tmp_path / "out", "--json", prelude=prelude
+        "run",
+        tmp_path / "tiny.json",
+        "--time-limit",
+        1,
+        "--threads",
+        1,
+        "-o",
+        tmp_path / "out",
+        "--json",
+        prelude=prelude,
     )
     assert done.returncode == 0
     report = json.loads(done.stdout)

@@ -126,7 +126,18 @@ def two_parts(tmp_path_factory):
         ImageDraw.Draw(mask).rectangle(box, fill=255)
     sketch.save(folder / "cross.png")
     mask.save(folder / "mask.png")
-    options = ("--mask", folder / "mask.png", "--size", 9, "--time-limit", 0.5, "-o", folder / "out")
+    options = (
+        "--mask",
+        folder / "mask.png",
+        "--size",
+        9,
+        "--time-limit",
+        0.5,
+        "--threads",
+        1,
+        "-o",
+        folder / "out",
+    )
     return folder / "out", child("run", folder / "cross.png", *options)
 
 
@@ -336,7 +347,10 @@ def test_quiet_prints_nothing(tmp_path, crossfield, instance_file):
     solution, manifest = set_ / "tiny.milp-mccormick.highs.sol", set_ / "tiny.milp-mccormick.manifest.json"
     assert crossfield("read", solution, "--manifest", manifest, "-o", tmp_path / "f.npz", "-q") == ""
     assert crossfield("draw", tmp_path / "f.npz", "-o", tmp_path / "f.png", "-q") == ""
-    assert crossfield("run", instance_file, "--time-limit", 1, "-o", tmp_path / "run", "-q") == ""
+    assert (
+        crossfield("run", instance_file, "--time-limit", 1, "--threads", 1, "-o", tmp_path / "run", "-q")
+        == ""
+    )
 
 
 def test_json_is_all_there_is_on_standard_output(tmp_path, crossfield, instance_file):
@@ -462,7 +476,17 @@ def test_exports_are_the_same_bytes_twice(tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_leaves_a_field_and_tells_its_energy(tmp_path, crossfield, instance_file, method):
     out = crossfield(
-        "solve", instance_file, "--method", method, "--time-limit", 0.5, "--json", "-o", tmp_path
+        "solve",
+        instance_file,
+        "--method",
+        method,
+        "--time-limit",
+        0.5,
+        "--threads",
+        1,
+        "--json",
+        "-o",
+        tmp_path,
     )
     facts = json.loads(out)
     (path,) = tmp_path.glob(f"*.{method}.field.npz")

@@ -346,6 +346,7 @@ CLAIMS = [
 ]
 
 
+@pytest.mark.slow
 @each_solver
 @for_each("kind, name", CLAIMS)
 def test_claims_are_true(

@@ -29,7 +29,7 @@ def by_terms(terms, count, point):
 @for_each("label", POLYNOMIAL)
 def test_terms_give_the_values_of_every_family(label):
     for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
-        for point in points_of(problem):
+        for point in points_of(problem, 5):
             for family in (*problem.objective, *problem.rows):
                 np.testing.assert_allclose(
                     by_terms(family.terms, family.count, point), family.values(point), rtol=1e-10, atol=1e-10
@@ -49,7 +49,7 @@ def test_merged_objective_gives_its_value(label):
             assert (np.diff(index, axis=1) >= 0).all()
             assert len(np.unique(index, axis=0)) == len(index)
             assert index.tolist() == sorted(index.tolist())
-        for point in points_of(problem):
+        for point in points_of(problem, 5):
             value = sum(np.prod(point[index], axis=1) @ coefficient for index, coefficient in merged)
             assert value == pytest.approx(problem.objective_value(point), rel=1e-10, abs=1e-10)
 
