@@ -2,7 +2,6 @@
 
 import bz2
 import gzip
-import hashlib
 import io
 import json
 import lzma
@@ -25,6 +24,7 @@ from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import CrossfieldError, InputError, SolutionError
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
+from forging import change, seal
 from loops import for_each
 
 SOLUTIONS = places.SOLUTIONS
@@ -194,45 +194,6 @@ def built(tmp_path_factory):
 def lib(built, tmp_path):
     """A copy of it that may be changed."""
     return shutil.copytree(built, tmp_path / "lib")
-
-
-def sha256(data):
-    return hashlib.sha256(data).hexdigest()
-
-
-def change(path, **given):
-    """Change keys of a JSON document; keys of parts of it are written a__b."""
-    document = json.loads(path.read_text())
-    for key, value in given.items():
-        *parts, last = key.split("__")
-        part = document
-        for name in parts:
-            part = part[name]
-        part[last] = value(part[last]) if callable(value) else value
-    path.write_text(json.dumps(document))
-
-
-def seal(folder):
-    """Make all checksums fit again, as somebody would who wants to hide a change."""
-    sidecars = [
-        path for path in folder.glob("*.json") if path.name.count(".") == 1 and path.name.startswith("cf_")
-    ]
-    for path in [*sidecars, *folder.glob("*.about.json")]:
-        document = json.loads(path.read_text())
-        for file in document["files"]:
-            held = folder / file["name"]
-            if held.is_file() and held.parent == folder:
-                file |= {"bytes": held.stat().st_size, "sha256": sha256(held.read_bytes())}
-        path.write_text(json.dumps(document))
-    sums = {path.stem: sha256(path.read_bytes()) for path in sidecars}
-    if (folder / "library.json").is_file():
-        change(folder / "library.json", sha256=sums)
-    sums = "".join(
-        f"{sha256(path.read_bytes())}  {path.name}\n"
-        for path in sorted(folder.iterdir())
-        if path.is_file() and path.name != "SHA256SUMS"
-    )
-    (folder / "SHA256SUMS").write_text(sums)
 
 
 def repack(path, old, new):

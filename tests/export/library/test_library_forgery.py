@@ -15,7 +15,7 @@ from crossfield.export.library.ledger.dual_bounds import contradicts, cut, is_pr
 from crossfield.export.library.ledger.ledger import Record, add_record
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
-from test_library_check import seal
+from forging import seal
 
 SPEC = """
 format = "crossfield-library-spec"

@@ -13,6 +13,7 @@ import crossfield as cf
 import highspy
 import numpy as np
 import pytest
+from answers import FILES, GOOD, STATUS_ALONE, TINY, WITH_POINT, problem, problem_of
 from cases import make_field, make_instance
 from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.formats.nl import Layout
@@ -25,7 +26,6 @@ from crossfield.export.solutions.readers.text import ADDED_COLUMNS, Status
 from crossfield.export.solutions.solution import LARGEST, Solution, read_solution
 from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
-from test_solver_readers import FILES, GOOD, STATUS_ALONE, TINY, WITH_POINT, problem, problem_of
 
 MILP = "milp-mccormick"
 needs_glpk = pytest.mark.skipif(shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils")  # fmt: skip
