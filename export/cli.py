@@ -111,9 +111,7 @@ def run_command(
     from .solvers import Limits
 
     limits = Limits(time_limit, gap, threads)
-    if not (quiet or as_json):
-        say(plan(limits))
-    with progress(quiet=quiet) as show:
+    with progress(quiet=quiet, first=plan(limits)) as show:
         show("reading the sketch")
         instance = load(sketch, size, mask, gauge)
         dialects = _dialects(gams_layout, nl_form)

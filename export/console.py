@@ -32,9 +32,10 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Progress]:
+def progress(*, quiet: bool, first: str = "") -> Iterator[Progress]:
     """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
 
+    first: a line that stays above, where anything is shown.
     Raises InterruptedRunError for a Ctrl-C that nobody caught.
     """
     from rich.console import Console
@@ -44,6 +45,8 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
     console = Console(stderr=True)
     shown = console.is_terminal and not quiet
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    if shown and first:
+        console.print(first, markup=False, highlight=False)
     try:
         with Bar(*columns, console=console, transient=True, disable=not shown) as bar:
             task = bar.add_task("starting")

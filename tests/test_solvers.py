@@ -14,7 +14,6 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.nl import Layout
-from crossfield.export.run import plan
 from crossfield.export.solution_text import Status
 from crossfield.export.solvers import SOLVERS, solver_for
 from crossfield.export.tables import tables
@@ -500,7 +499,7 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
 @pytest.mark.solver
 def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
     code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], after=0.1)
-    assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
+    assert (code, out) == (1, "")
     assert err == "crossfield: interrupted; files that stand are whole\n"
     assert not list(tmp_path.rglob("*.part"))
     assert not (tmp_path / "report.json").exists()
