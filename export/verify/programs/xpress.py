@@ -108,13 +108,14 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
         model.setControl(option, value)
+    # Before the search: when it is cut short, the names are those of the presolved model, and the values of the whole one.
+    names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
         _, found = model.optimize()
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
         _complain(error)
     words = str(found).removeprefix("SolStatus.")
     status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
-    names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
         return Outcome(status, words, names, np.zeros(0))
     mixed = model.attributes.mipents or model.attributes.qconstraints
