@@ -80,7 +80,7 @@ SecondsEach = Annotated[
         "--time-limit",
         min=0.1,
         metavar="SECONDS",
-        help="Seconds for each of the methods that search; the first line of progress says what that makes in all.",
+        help="Seconds for each of the methods that search; what that makes in all is said before they start.",
     ),
 ]
 Gap = Annotated[

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, Self
@@ -98,7 +99,8 @@ class Worker:
             child.kill()
         child.wait()
         if child.stdin is not None:
-            child.stdin.close()
+            with suppress(BrokenPipeError):  # a task that the child did not take any more
+                child.stdin.close()
 
     def _last_words(self) -> str:
         log = self._folder / _LOG

@@ -88,7 +88,7 @@ def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     start = first_field(cf.sample("mouse", 10))
     told = []
     found = search_windows(
-        start, seconds=0.5, solver=solver, jobs=2, progress=lambda *line: told.append(line)
+        start, seconds=2.0, solver=solver, jobs=2, progress=lambda *line: told.append(line)
     )
     field = found.field
     assert field.energy().total <= start.energy().total
@@ -96,7 +96,8 @@ def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     assert (np.abs(field.beta) <= QUARTER).all()
     assert (field.alpha >= field.instance.alpha_lower).all()
     assert (field.alpha <= field.instance.alpha_upper).all()
-    assert told[-1] == (found.windows, field.energy().total)
+    # On a busy machine no window ends within the time, and nothing is told.
+    assert told[-1:] == [(found.windows, field.energy().total)] * bool(found.windows)
     assert 0 <= found.closed <= found.windows
     assert found.ended in {"time", "windows"}
 
