@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
-from .read import check_size, instance_of
+from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
 Kind = Literal["sketch", "analytic"]
@@ -61,7 +61,7 @@ def samples() -> list[Sample]:
     return list(SAMPLES.values())
 
 
-def sample(name: str, size: int = 24, gauge: Gauge = "strokes") -> Instance:
+def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
     For the exact answer of an analytic one see `analytic`. Raises InputError for an unknown name or size.
