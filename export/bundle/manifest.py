@@ -247,7 +247,7 @@ def write_all(
     dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
     .gz.
     progress: called with each name. Raises InputError for an unknown format, FormulationError for an unknown
-    formulation or option, InstanceError for a start on another instance, and OutputError.
+    formulation, InstanceError for a start on another instance, and OutputError.
     """
     manifests = []
     with _pool(jobs) as pool:

@@ -101,7 +101,7 @@ Run = Callable[[Job], Answer]
 class Solver:
     """A local solver: the format it reads, what it is called in Python, and whether an answer without proof is wanted of it.
 
-    What it takes stands in the table of capabilities.
+    What it takes stands in the table of solvers.
     """
 
     name: str
