@@ -101,7 +101,7 @@ Run = Callable[[Job], Answer]
 class Solver:
     """A local solver: the format it reads, what it is called in Python, and whether an answer without proof is wanted of it.
 
-    What it takes stands in the table of solvers.
+    What it takes stands in the table of capabilities.
     """
 
     name: str
@@ -275,13 +275,9 @@ def solve(
 ) -> Solution:
     """The solution that a local solver finds, read back from the file it leaves and checked, all within the time limit.
 
-    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the
-    solution back. start: a field whose complete point is handed over as incumbent or starting point. Ctrl-C
-    ends the solver and gives its best point so far.
-    solver: `highs`, `ipopt` or `bonmin`, by default one for the problem's class; limits: Limits() by default,
-    60 seconds.
-    Raises InputError for another solver, UnsupportedBySolverError, MissingSolverError, SolverError,
-    OutputError.
+    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the solution back. start: a field whose complete point is handed over as
+    incumbent or starting point. Ctrl-C ends the solver and gives its best point so far.
+    Raises UnsupportedBySolverError, MissingSolverError, SolverError, OutputError.
     """
     chosen = solver_for(problem, solver)
     if folder is None:
