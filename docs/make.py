@@ -308,7 +308,7 @@ def readme() -> None:
     replace_between(
         README,
         "samples",
-        markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows(24)]),
+        markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows()]),
     )
 
 

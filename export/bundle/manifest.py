@@ -240,9 +240,14 @@ def write_all(
 ) -> list[Manifest]:
     """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
 
-    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says which.
-    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written at once.
-    progress: called with each name.
+    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says
+    which.
+    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written
+    at once.
+    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
+    .gz.
+    progress: called with each name. Raises InputError for an unknown format, FormulationError for an unknown
+    formulation, InstanceError for a start on another instance, and OutputError.
     """
     manifests = []
     with _pool(jobs) as pool:

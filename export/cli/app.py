@@ -1,21 +1,23 @@
 """The command line: the verbs of the package, with progress, tables, exit codes and one-line errors.
 
-Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far, and a run with a report of what
-there is: that is fine too, and said on standard error. Where there is nothing to keep, the exit code is 1. Heavy libraries are imported
-inside the commands.
+Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far, and
+a run with a report of what there is: that is fine too, and said on standard error. Where there is nothing to
+keep, the exit code is 1. Heavy libraries are imported inside the commands.
 """
 
 from __future__ import annotations
 
 import signal
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
-from .inputs import DEFAULT_SIZE, known, load, options_of, start_field
+from .help_texts import Command
+from .inputs import known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
@@ -44,7 +46,6 @@ from .output import (
     INTERRUPTED,
     complain,
     degrade,
-    described,
     progress,
     say,
     say_json,
@@ -62,12 +63,15 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="crossfield",
-    help="From a rough concept sketch to optimization instances, and from solvers' answers back to a cross field.",
+    help="Turn a concept sketch into an optimization problem in files for any solver, and a solver's answer"
+    " into a cross field: two line directions at every pixel.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+command = partial(app.command, cls=Command)
 
 _STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
 
@@ -75,10 +79,12 @@ _STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
 @app.callback(invoke_without_command=True)
 def root(
     *,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,  # noqa: ARG001 - `invoke` looks at it
+    debug: Annotated[  # noqa: ARG001
+        bool, typer.Option("--debug", help="Show the traceback of an error.")
+    ] = False,
     version: Annotated[bool, typer.Option("--version", help="Show the version.", is_eager=True)] = False,
 ) -> None:
-    """Options before the command."""
+    """Options before the command; `invoke` looks at --debug."""
     if version:
         from importlib.metadata import version as installed
 
@@ -86,7 +92,7 @@ def root(
         raise typer.Exit
 
 
-@app.command("run")
+@command("run")
 def run_command(
     sketch: What,
     output: Folder,
@@ -104,9 +110,10 @@ def run_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Do everything: instance, all solver files, the solves that can be done here, the best field, pictures, a report.
+    """Do everything for one sketch: write all solver files, try methods, keep the best field, draw it.
 
-    Ctrl-C ends the present method with its best field and the run with it; a second one ends at once.
+    The methods are {methods of a run}. report.json has all facts. Ctrl-C ends the run with the best field so
+    far; a second one ends at once.
     """
     from ..solving.local import Limits
     from ..solving.run import plan, run
@@ -115,7 +122,6 @@ def run_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         instance = load(sketch, size, mask, gauge)
-        dialects = _dialects(gams_layout, nl_form)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -124,7 +130,7 @@ def run_command(
             output,
             limits=limits,
             options={"facet": facet},
-            dialects=dialects,
+            dialects=_dialects(gams_layout, nl_form),
             jobs=jobs,
             progress=show,
         )
@@ -136,7 +142,7 @@ def run_command(
         complain(f"interrupted: {report.interrupted}; the report says what there is")
 
 
-@app.command("instance")
+@command("instance")
 def instance_command(
     sketch: What,
     output: Output,
@@ -146,7 +152,7 @@ def instance_command(
     gauge: GaugeName = None,
     quiet: Quiet = False,
 ) -> None:
-    """Turn a sketch (SVG, bitmap, .scap) or a built-in sample into an instance file (.json or .npz)."""
+    """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels."""
     from ...models.instance.file import write_instance
 
     _require_suffix(output, (".json", ".npz"))
@@ -155,10 +161,10 @@ def instance_command(
         instance = load(sketch, size, mask, gauge)
         write_instance(instance, output)
     if not quiet:
-        say(f"{output}: {described(instance)}")
+        say(f"{output}: {instance.summary}")
 
 
-@app.command("export")
+@command("export")
 def export_command(
     instance: What,
     output: Folder,
@@ -180,7 +186,12 @@ def export_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Write an instance (or sketch, or sample) as solver files: every formulation in every format, with manifests."""
+    """Write an instance as files for solvers, in every formulation and format.
+
+    Beside the files of each formulation lies its manifest (.manifest.json), which `crossfield read` needs to
+    read a solver's answer.
+    """
+    from ...models.field.file import read_field
     from ...models.formulations.catalogue import FORMULATIONS
     from ..bundle.manifest import write_all
     from ..bundle.starts import write_starts
@@ -192,7 +203,7 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         loaded = load(instance, size, mask, gauge)
-        field = None if start is None else start_field(start, loaded)
+        field = None if start is None else read_field(start, on=loaded)
         manifests = write_all(
             loaded,
             output,
@@ -217,17 +228,25 @@ def export_command(
         show_manifests(manifests, output)
 
 
-@app.command("read")
+command("solve")(solve_command)
+
+
+@command("read")
 def read_command(
     solution: Annotated[
         Path,
         typer.Argument(
             metavar="SOLUTION",
-            help="A solver's solution file, plain or .gz; its kind is told by its content, see `list`.",
+            help="A solution file of {answers}, plain or .gz; which of them is seen from its content.",
         ),
     ],
     manifest: Annotated[
-        Path, typer.Option("--manifest", metavar="FILE", help="The .manifest.json that export wrote.")
+        Path,
+        typer.Option(
+            "--manifest",
+            metavar="FILE",
+            help="The .manifest.json that `crossfield export` wrote beside the file that was solved.",
+        ),
     ],
     output: Output,
     *,
@@ -237,16 +256,17 @@ def read_command(
             "--tolerance",
             metavar="X",
             min=0,
-            help="How far the point may be off (radians, jumps; of the objective a part) before what the file claims is refused.",
+            help="How far the answer may break a row or a bound, and how far, relatively, its objective may be"
+            " off, before it is refused.",
         ),
     ] = 1e-5,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Read a solver's solution file back as a cross field; objective and violations are recomputed.
+    """Read a solver's solution file back as a cross field, and check it.
 
-    Where they contradict what the file claims, or the solver says that its values are no answer, the facts are shown, nothing is written
-    and the exit code is 1.
+    Objective and violations are computed again from the instance. Where they contradict what the file claims,
+    or the solver says that its values are no answer, no field is written and the exit code is 1.
     """
     from ...models.errors import SolutionError
     from ...models.field.file import write_field
@@ -270,7 +290,7 @@ def read_command(
         )
 
 
-@app.command("draw")
+@command("draw")
 def draw_command(
     what: Annotated[
         Path, typer.Argument(metavar="FIELD|INSTANCE", help="File (.npz, .json) of a field or an instance.")
@@ -279,7 +299,7 @@ def draw_command(
     *,
     kind: Annotated[
         str | None,
-        typer.Option("--kind", metavar="NAME", help="instance, crosses, field, angle, energy or overview."),
+        typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds."),
     ] = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,
@@ -303,9 +323,12 @@ def draw_command(
         say(str(output))
 
 
-@app.command("list")
+command("verify")(verify_command)
+
+
+@command("list")
 def list_command(*, as_json: Json = False) -> None:
-    """List formulations, formats and solvers, and which go together."""
+    """List formulations, formats, solvers and methods, and which go together."""
     from .tables import tables
 
     found = tables()
@@ -315,32 +338,30 @@ def list_command(*, as_json: Json = False) -> None:
         show_lists(found)
 
 
-@app.command("samples")
+@command("samples")
 def samples_command(*, as_json: Json = False) -> None:
     """List the built-in samples."""
     from .tables import sample_rows
 
-    rows = sample_rows(DEFAULT_SIZE)
+    rows = sample_rows()
     if as_json:
         say_json(rows)
     else:
         show_samples(rows)
 
 
-app.command("solve")(solve_command)
-app.command("verify")(verify_command)
 app.add_typer(library, name="library")
 
 
 def main() -> NoReturn:
-    """Run the command line and leave with its exit code; asked to end (SIGTERM), nothing half done is left either."""
+    """Run the command line and leave with its exit code; SIGTERM leaves nothing half done either."""
     degrade()
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(invoke(sys.argv[1:]))
 
 
 def invoke(arguments: list[str]) -> int:
-    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage. Errors are one line on standard error.
+    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage; an error is one line.
 
     With --debug the error itself is raised.
     """
@@ -364,8 +385,10 @@ def _line(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory; choose a smaller --size"
     if isinstance(error, OSError):
-        return f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}; check the path and the free space"
-    return f"this should not happen, please report it: {type(error).__name__}: {shortened(error)} (crossfield --debug ... shows where)"
+        what = (error.strerror or str(error)).lower()
+        return f"{error.filename or 'a file'}: {what}; check the path and the free space"
+    what = f"{type(error).__name__}: {shortened(error)}"
+    return f"this should not happen, please report it: {what} (crossfield --debug ... shows where)"
 
 
 def _field_or_instance(path: Path) -> CrossField | Instance:

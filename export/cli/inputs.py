@@ -1,19 +1,15 @@
-"""What users name on the command line: sketches, samples, instances, starting fields, names of tables."""
+"""What users name on the command line: sketches, samples, instances, names of tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from ...models.errors import InputError
-from .output import described
 
 if TYPE_CHECKING:
-    from ...models.field.field import CrossField
     from ...models.instance.instance import Gauge, Instance
-
-DEFAULT_SIZE: Final = 24
 
 
 def load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
@@ -30,7 +26,7 @@ def load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) ->
 def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
     """The instance of an instance file, a sketch file or a built-in sample, in this order."""
     from ...models.instance.file import read_instance
-    from ...models.sketch.read import read_sketch
+    from ...models.sketch.read import DEFAULT_SIZE, read_sketch
     from ...models.sketch.samples import SAMPLES, sample
 
     path = Path(what)
@@ -51,20 +47,6 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) 
         )
     instance = read_instance(path)
     return instance if gauge is None else instance.with_gauge(gauge)
-
-
-def start_field(path: Path, instance: Instance) -> CrossField:
-    """The field in a file, which must be on the instance."""
-    from ...models.field.file import read_field
-
-    field = read_field(path)
-    if field.instance.sha256 != instance.sha256:
-        raise InputError(
-            f"is a field on another instance ({described(field.instance)}), not on this one ({described(instance)}); "
-            "give a field of the same sketch, size and gauge",
-            file=path,
-        )
-    return field
 
 
 def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from .help_texts import Command
 from .options import Folder, Json, Processes, Quiet, Seconds
 from .output import complain, progress, say, say_json
 
 library = typer.Typer(
-    help="Build, solve, check and show a library of instances as files for every solver.",
+    help="Build, check, solve and show a library: instances in every formulation, with best known points.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+command = partial(library.command, cls=Command)
+
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
 
-@library.command("build")
+@command("build")
 def build_command(
     spec: Annotated[
         str,
@@ -35,8 +39,10 @@ def build_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Build a library: every instance of the specification in every formulation and format, with points and sidecars.
+    """Build a library: every instance that the specification asks for, in its formulations and formats.
 
+    Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file of all
+    that is known of it.
     What is whole in the folder is kept, so that a build that was stopped continues.
     """
     from ..library.building.build import build, unmatched
@@ -52,30 +58,34 @@ def build_command(
         say(f"{output}: {len(built.document['entries'])} entries")
     if stale := sorted({record.entry for record in unmatched(built)}):
         complain(
-            f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have changed since:"
-            f" {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with `crossfield library solve`"
+            f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
+            f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
+            " `crossfield library solve`"
         )
 
 
-@library.command("solve")
+@command("solve")
 def solve_command(
     folder: Library,
     *,
     solver: Annotated[
         list[str] | None,
-        typer.Option("--solver", metavar="NAME", help="Solver, may be repeated; all that apply by default."),
+        typer.Option(
+            "--solver", metavar="NAME", help="{solvers}; all that take an entry by default, may be repeated."
+        ),
     ] = None,
     time_limit: Seconds = 10.0,
     up_to: Annotated[
-        str | None, typer.Option("--up-to", metavar="RUNG", help="Last rung: tiny, small, medium or large.")
+        str | None,
+        typer.Option("--up-to", metavar="RUNG", help="Largest rung (class of sizes) to solve: {rungs}."),
     ] = None,
     by: Annotated[
-        str | None, typer.Option("--by", metavar="TEXT", help="Who measures, for the ledger.")
+        str | None, typer.Option("--by", metavar="TEXT", help="Who measures, as the ledger is to say.")
     ] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the local solvers on the entries of a library; adds their bounds and times to its ledger, and better points."""
+    """Run the installed solvers on a library; its ledger.json keeps their bounds, times and better points."""
     from ..library.contributions.solve import solve_library
 
     with progress(quiet=quiet) as show:
@@ -88,7 +98,7 @@ def solve_command(
         say(f"{folder / 'ledger.json'}: {len(records)} new records")
 
 
-@library.command("verify")
+@command("verify")
 def verify_command(
     folder: Annotated[
         Path,
@@ -98,7 +108,10 @@ def verify_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Check a library: checksums, schemas, points, and files against their sidecars. Exit code 1 when something is wrong."""
+    """Check a library: every entry is made again and compared, with its points, files and checksums.
+
+    The exit code is 1 when something is wrong.
+    """
     from dataclasses import asdict
 
     from ..library.checking.check_library import verify_library
@@ -115,21 +128,30 @@ def verify_command(
         raise typer.Exit(1)
 
 
-@library.command("submit-point")
+@command("submit-point")
 def submit_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Solution file of any solver that is read.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Solution file of {answers}.")],
     folder: Annotated[Path, typer.Option("--library", metavar="DIR", help="The library.")],
     *,
     entry: Annotated[
-        str | None, typer.Option("--entry", metavar="NAME", help="Entry; by default from the file's name.")
+        str | None,
+        typer.Option(
+            "--entry", metavar="NAME", help="The entry that it solves; by default as the file is named."
+        ),
     ] = None,
-    solver: Annotated[str | None, typer.Option("--solver", metavar="NAME", help="Who found it.")] = None,
-    version: Annotated[str | None, typer.Option("--version", metavar="TEXT", help="Its version.")] = None,
-    seconds: Annotated[float | None, typer.Option("--seconds", min=0.0, help="How long it took.")] = None,
-    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Who submits it.")] = None,
+    solver: Annotated[
+        str | None, typer.Option("--solver", metavar="NAME", help="The solver that found the point.")
+    ] = None,
+    version: Annotated[
+        str | None, typer.Option("--version", metavar="TEXT", help="The solver's version.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.0, help="How long the solver took.")
+    ] = None,
+    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Who submits the point.")] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Check a solver's solution of an entry and, when it is better than what is known, keep it with its provenance."""
+    """Check a solver's solution of an entry, and keep it with who found it when it is the best so far."""
     from ..library.contributions.submit import submit_point
 
     with progress(quiet=quiet) as show:
@@ -147,7 +169,7 @@ def submit_command(
         say(str(happened))
 
 
-@library.command("site")
+@command("site")
 def site_command(folder: Library, output: Folder, *, quiet: Quiet = False) -> None:
     """Write a static site about a library: a table of all entries and a page for each."""
     from ..library.site.site import write_site

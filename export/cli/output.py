@@ -15,7 +15,6 @@ import typer
 from ...models.errors import CrossfieldError, printable
 
 if TYPE_CHECKING:
-    from ...models.instance.instance import Instance
     from ..bundle.manifest import Manifest
     from ..solutions.solution import Solution
     from ..solving.run import Report
@@ -106,16 +105,6 @@ def show_table(
     console.print(table)
 
 
-def described(instance: Instance) -> str:
-    """An instance in a line: name, grid, pixels, strokes, separate parts of the mask, gauge."""
-    grid = instance.grid
-    parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
-    return (
-        f"{instance.name}: {grid.width} x {grid.height}, {grid.size} pixels{parts}, "
-        f"{len(instance.theta)} with strokes, gauge {instance.gauge}"
-    )
-
-
 def show_report(report: Report, folder: Path) -> None:
     """Print what a run found and where it lies, and what failed."""
     columns = ("method", "2-norm", "1-norm", "singular", "|beta|", "seconds", "status")
@@ -131,7 +120,7 @@ def show_report(report: Report, folder: Path) -> None:
         ]
         mark = "*" if candidate is report.best else ""
         rows.append([candidate.method + mark, *numbers, str(facts.get("status", ""))])
-    show_table(described(report.instance), columns, rows, numbers=columns[1:-1])
+    show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
     say(f"* kept, the least 2-norm energy: {folder / 'field.npz'} (.json, .rawfield)")
     if not report.interrupted:
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
@@ -161,7 +150,7 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
                 *written,
             ]
         )
-    show_table(described(manifests[0].instance()), columns, rows, numbers=columns[2:])
+    show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
             say(f"not written: {reason}")
@@ -192,8 +181,8 @@ _ONLY_IF_ANY: Final = (
 
 
 def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None) -> None:
-    """Print what a solution claims beside what was recomputed, and where its field lies, if it was written."""
-    show_facts(described(solution.problem.instance), facts)
+    """Print what a solution claims beside what was recomputed, and where its field lies, if written."""
+    show_facts(solution.problem.instance.summary, facts)
     if solution.point is not None and field is not None:
         say(f"field: {field}")
 
@@ -240,7 +229,7 @@ def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) 
     )
     show_table("formats", formats[0], _cells(formats[1], formats[0]))
     methods, readers = tables["methods"], tables["readers"]
-    show_table("ways to a field (solve --method)", methods[0], _cells(methods[1], methods[0]))
+    show_table("methods: ways to a field (solve --method)", methods[0], _cells(methods[1], methods[0]))
     show_table("solution files that are read", readers[0], _cells(readers[1], readers[0]))
 
 

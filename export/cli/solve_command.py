@@ -9,7 +9,7 @@ import typer
 
 from ...models.errors import InputError
 from ...models.processes.deadline import Deadline
-from .inputs import known, load, options_of, start_field
+from .inputs import known, load, options_of
 from .options import (
     BetaNorm,
     Facet,
@@ -27,7 +27,7 @@ from .options import (
     Threads,
     What,
 )
-from .output import complain, described, progress, say, say_json, show_facts, show_solution
+from .output import complain, progress, say, say_json, show_facts, show_solution
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -40,7 +40,9 @@ def solve_command(
     *,
     formulation: Annotated[
         str | None,
-        typer.Option("-f", "--formulation", metavar="NAME", help="Formulation to hand to a solver."),
+        typer.Option(
+            "-f", "--formulation", metavar="NAME", help="Hand this formulation to a solver: {formulations}."
+        ),
     ] = None,
     method: Annotated[
         str | None,
@@ -48,13 +50,13 @@ def solve_command(
             "-m",
             "--method",
             metavar="NAME",
-            help="Way to a field: search, windows, two-stage, greedy or power.",
+            help="Find a field in this way: {methods}; `crossfield list` describes them.",
         ),
     ] = None,
     solver: Annotated[
         str | None,
         typer.Option(
-            "--solver", metavar="NAME", help="highs, ipopt or bonmin; by default the one for the class."
+            "--solver", metavar="NAME", help="{solvers}; by default one that suits the formulation."
         ),
     ] = None,
     size: Size = None,
@@ -71,11 +73,14 @@ def solve_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Find a field by one of the methods, or solve one formulation here; leaves files, logs and the field in the folder.
+    """Find a field, by a method (-m) or by a solver for one formulation (-f).
 
-    Both start from the greedy field, improved, unless --start gives another. Ctrl-C ends the search and keeps the best so far.
+    The field, and what the solver read and wrote, is left in the folder. Both begin at the improved greedy
+    field unless --start gives another.
+    Ctrl-C ends the search and keeps the best so far.
     """
     deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
+    from ...models.field.file import read_field
     from ..solving.local import Limits
     from ..solving.methods import Request
 
@@ -87,7 +92,7 @@ def solve_command(
             loaded,
             output,
             options=options_of(facet, stroke_norm, beta_norm, relax=relax),
-            start=None if start is None else start_field(start, loaded),
+            start=None if start is None else read_field(start, on=loaded),
             solver=solver,
             progress=show,
             limits=Limits(time_limit, gap, threads).until(deadline),
@@ -165,14 +170,14 @@ def _tell_candidate(candidate: Candidate, field: Path, *, quiet: bool, as_json: 
     if as_json:
         say_json(facts)
     elif not quiet:
-        show_facts(described(candidate.field.instance), facts)
+        show_facts(candidate.field.instance.summary, facts)
         say(f"field: {field}")
     if candidate.interrupted:
         complain("interrupted; the best field so far was kept")
 
 
 def tell_solution(solution: Solution, field: Path | None, *, quiet: bool, as_json: bool) -> None:
-    """Print the facts of a solution; field: the file in which its field lies, None when it was not written."""
+    """Print the facts of a solution; field: the file in which its field lies, None when there is none."""
     from ..solving.run import facts_with_energies
 
     facts = facts_with_energies(solution)

@@ -1,4 +1,4 @@
-"""The tables of formulations, formats, solvers and readers, and which go together: for the command line and the docs."""
+"""The tables of formulations, formats, solvers and readers, and which go together: for commands and docs."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ def tables() -> Tables:
     }
 
 
-def sample_rows(size: int) -> list[Row]:
-    """Name, kind, grid, stroke share and one line of each built-in sample on a grid of that size."""
+def sample_rows() -> list[Row]:
+    """Name, kind, grid, stroke share and one line of each built-in sample on a grid of the default size."""
     rows = []
     for entry in samples():
-        instance = sample(entry.name, size)
+        instance = sample(entry.name)
         grid = instance.grid
         share = len(instance.theta) / grid.size
         row = {

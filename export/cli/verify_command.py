@@ -24,14 +24,19 @@ def verify_command(
     time_limit: Seconds = 10.0,
     consumer: Annotated[
         list[str] | None,
-        typer.Option("-c", "--consumer", metavar="NAME", help="Program, may be repeated; all by default."),
+        typer.Option(
+            "-c",
+            "--consumer",
+            metavar="NAME",
+            help="{programs}; all that are installed by default, may be repeated.",
+        ),
     ] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Hand every exported file to every solver that is here and compare what it reads with the problem.
+    """Hand every exported file to every solver that is installed, and compare what it reads with the problem.
 
-    Exit code 1 when one differs. All findings go to verify.json in the folder.
+    All findings go to verify.json in the folder. The exit code is 1 when something differs.
     """
     from ..verify.programs.registry import CONSUMERS
     from ..verify.verify import verify

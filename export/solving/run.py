@@ -116,9 +116,11 @@ def run(
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
-    limits: for each method that searches; `progress` is first told what that makes in all. A method that fails is noted in the report;
-    the fields that were found stand. Ctrl-C ends the present method with its best field and the run with it: no further method is
-    tried and nothing drawn. Before the first field is there it goes on as KeyboardInterrupt. Raises OutputError.
+    options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
+    method that searches; `progress` is first told what that makes in all. A method that fails is noted in the
+    report; the fields that were found stand. Ctrl-C ends the present method with its best field and the run
+    with it: no further method is tried and nothing drawn. Before the first field is there it goes on as
+    KeyboardInterrupt. Raises OutputError.
     """
     folder, limits = make_folder(folder), limits or Limits()
     for stale in (REPORT, *map(_picture, PICTURES)):

@@ -54,6 +54,9 @@ class Singularities:
 class CrossField:
     """Angles alpha, beta (n,) in radians and integer jumps p (m,) on the grid of an instance.
 
+    n pixels and m pairs in the order of `instance.grid`. Line u is at alpha + beta, line v at alpha + pi/2 -
+    beta, counter-clockwise from +x with y up; p compares the label of a pair's first pixel with that of its
+    second (docs/mathematics.md, 2 and 3).
     Raises InstanceError when a shape does not fit the grid or a value is not finite.
     """
 
@@ -109,7 +112,11 @@ class CrossField:
         return self.alpha[at] + self.beta[at] - self.instance.target
 
     def energy(self, norm: Norm = 2) -> Energy:
-        """The energy (docs/mathematics.md, 5) with squares (2) or absolute values (1) throughout."""
+        """The energy with squares (2) or absolute values (1) throughout, as three sums and their total.
+
+        2 sum (|A| + |B|) over pairs, w_strokes sum w |R| over stroke pixels, w_beta sum |beta| over pixels,
+        or all of them squared (docs/mathematics.md, 5).
+        """
         instance = self.instance
         size = np.abs if norm == 1 else np.square
         return Energy(
@@ -129,7 +136,7 @@ class CrossField:
 
     @cached_property
     def singularities(self) -> Singularities:
-        """Blocks with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
+        """Blocks of 2 x 2 pixels with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
         grid = self.instance.grid
         bottom, side, top, left = grid.blocks.T
         turn = self.p[bottom] + self.p[side] - self.p[top] - self.p[left]
@@ -165,7 +172,7 @@ class CrossField:
         )
 
     def image(self, values: np.ndarray[Any, Any], fill: float = np.nan) -> Floats:
-        """Values of the pixels as a picture [height, width], `fill` outside the mask."""
+        """Values (n,) of the pixels as a picture [height, width], `fill` outside the mask."""
         picture = np.full(self.instance.mask.shape, fill)
         picture[self.instance.mask] = values
         return picture

@@ -70,17 +70,26 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     return write_bytes(path, write(field))
 
 
-def read_field(path: str | Path) -> CrossField:
+def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """The field that a .npz or .json file holds, with its instance.
 
-    Raises InputError for another ending or an unreadable file, and InstanceError, with file and place, for a damaged one.
+    on: the instance that it must be on, when one is given.
+    Raises InputError for another ending, an unreadable file or another instance, and InstanceError, with file and place, for
+    a damaged one.
     """
     path = Path(path)
     read = _of_suffix(_READERS, path, "read")
     try:
-        return read(read_bytes(path, MAX_ARCHIVE))
+        field = read(read_bytes(path, MAX_ARCHIVE))
     except InstanceError as error:
         raise InstanceError(str(error), file=path) from error
+    if on is not None and field.instance.sha256 != on.sha256:
+        raise InputError(
+            f"is a field on another instance ({field.instance.summary}), not on this one ({on.summary}); "
+            "give a field of the same sketch, size and gauge",
+            file=path,
+        )
+    return field
 
 
 def _of_suffix(table: dict[str, _Kind], path: Path, verb: str) -> _Kind:

@@ -2,7 +2,7 @@
 
 Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels S_c or the neighbour
 pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all readings of these expressions. Equation numbers are the
-paper's. What a formulation is made of: declaration.py; the symbols: notation.py.
+paper's. What a formulation is made of: declaration.py; the symbols: symbols.py.
 """
 
 from __future__ import annotations

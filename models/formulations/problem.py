@@ -496,8 +496,10 @@ def _name(symbol: sp.Symbol) -> str:
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """The problem of that formulation on the instance.
 
-    options: facet, stroke_norm, beta_norm, relax; p: the jumps (m,), for `qp-fixed` alone.
-    Raises FormulationError for an unknown name, option or value.
+    name: as `crossfield list` shows them. options, where the formulation has them: facet (`hull`, `printed`),
+    stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the jumps (m,), for
+    `qp-fixed` alone.
+    Raises FormulationError for an unknown name, option or value (docs/formulations.md has the formulas).
     """
     return Problem(instance, declare(name, **options), p)
 
@@ -505,7 +507,8 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     """The same problem with its integer columns fixed at the jumps of a field: a continuous problem.
 
-    Raises InstanceError when the field is on another instance.
+    Fixed columns stay, with equal bounds: names and order are those of the problem. Raises InstanceError when
+    the field is on another instance.
     """
     return replace(problem, pinned=field)
 

@@ -248,6 +248,16 @@ class Instance:
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
         return replace(self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order])
 
+    @property
+    def summary(self) -> str:
+        """Name, grid, pixels, strokes, separate parts of the mask and gauge in a line."""
+        grid = self.grid
+        parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
+        return (
+            f"{self.name}: {grid.width} x {grid.height}, {grid.size} pixels{parts}, "
+            f"{len(self.theta)} with strokes, gauge {self.gauge}"
+        )
+
     @cached_property
     def sha256(self) -> str:
         """64 hexadecimal digits that stand for the whole content; equal for equal instances only."""

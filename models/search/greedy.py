@@ -32,8 +32,11 @@ _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the sm
 def greedy(instance: Instance, *, progress: Progress | None = None, over: Over = never) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha, beta and p.
 
-    The windows are kept by the last solve alone, as BendFields knows none. Deterministic. `progress` is called as
-    progress(jumps known, jumps in all) after every batch. Once the time is over, all jumps that are left are decided at once.
+    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
+    all angles are solved for again (docs/mathematics.md, 10). The windows are kept by the last solve alone,
+    as BendFields knows none. Deterministic.
+    progress: called as progress(jumps known, jumps in all) after every batch. over: says whether the time is
+    over; then all jumps that are left are decided at once.
     """
     cells = stroke_cells(instance)
     angle = np.append(instance.target, 0.0)[cells]

@@ -40,8 +40,11 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 def improved(field: CrossField, over: Over = never) -> CrossField:
     """A field of no more 2-norm energy, from which neither best jumps, nor best angles, nor the turn of a curve lead further down.
 
-    Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and turning seldom pays.
-    At most 40 curves are tried, the worst first. Where the time is over before, the best field so far, never one of more energy.
+    Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
+    turning seldom pays.
+    At most 40 curves are tried, the worst first. over: says whether the time is over; then the best field so
+    far comes back.
+    The energy is that of docs/mathematics.md, 5; deterministic.
     """
     state, solver = FreeField.of(field), Solver()
     settle(state, solver, over)

@@ -16,8 +16,10 @@ from .free_field import free_jumps
 def power_field(instance: Instance) -> CrossField:
     """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
 
-    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and beta = 0.
-    Parts without a stroke get alpha = 0.
+    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and
+    beta = 0.
+    Parts without a stroke get alpha = 0. Labels are then moved into the windows of the instance
+    (docs/mathematics.md, 10).
     """
     grid = instance.grid
     weight = stroke_weight(instance)

@@ -75,10 +75,13 @@ def search(
 ) -> Search:
     """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off, the improved greedy field.
 
-    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without success. All work keeps to the seconds,
-    the start too; beyond them goes one step of it (on a grid of 100 x 100 a second), and the last solve, with 5 % and half a second more.
+    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
+    success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
+    100 a second), and the last solve, with 5 % and half a second more.
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is not positive, and for too many jobs.
+    jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy and
+    power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so far. Raises
+    InputError for a limit that is not positive, and for too many jobs.
     """
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")

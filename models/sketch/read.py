@@ -29,6 +29,7 @@ from .outline import parts_with, silhouette
 from .scap import read_scap
 from .svg import read_svg
 
+DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
@@ -60,7 +61,7 @@ class _Sketch:
 def read_sketch(
     path: str | Path,
     *,
-    size: int = 48,
+    size: int = DEFAULT_SIZE,
     mask: str | Path | None = None,
     gauge: Gauge = "strokes",
     name: str | None = None,

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
-from .read import check_size, instance_of
+from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
 Kind = Literal["sketch", "analytic"]
@@ -57,14 +57,15 @@ SAMPLES: Final[dict[str, Sample]] = {
 
 
 def samples() -> list[Sample]:
-    """Every built-in sample, in the order of the table."""
+    """Name, kind and description of every built-in sample, in the order of the table."""
     return list(SAMPLES.values())
 
 
-def sample(name: str, size: int = 24, gauge: Gauge = "strokes") -> Instance:
+def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
-    For the exact answer of an analytic one see `analytic`. Raises InputError for an unknown name or size.
+    name: of one in `samples()`; size: 1..4096; gauge: as in Instance. For the exact answer of an analytic one
+    see `analytic`. Raises InputError for an unknown name or size.
     """
     check_size(size)
     if _known(name).kind == "analytic":

@@ -18,7 +18,7 @@ from ..instance.elementary import arctangent, cosine, length, sine, turned
 from ..instance.grid import Bools, Floats
 from ..instance.instance import Gauge, Instance
 from .cover import Cover, Frame, cover_by_segments, fit_frame
-from .read import LEAST_WEIGHT, check_size
+from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
 
 _NEWTON: Final = 12
 _SEEDS: Final = 120  # lattice of starting points a side
@@ -120,12 +120,14 @@ SURFACES: Final[dict[str, Surface]] = {
 """The surfaces by name: two developable ones and one that is not."""
 
 
-def analytic(name: str, size: int = 24, gauge: Gauge = "strokes") -> AnalyticInstance:
+def analytic(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> AnalyticInstance:
     """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
 
-    A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are evenly parametrised curvature lines of
-    both families, so many that the share of stroke pixels comes as close as possible to the surface's `share`; their theta is
-    exact at the pixel's centre, their w as for drawn strokes. Raises InputError for an unknown name or size.
+    A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are
+    evenly parametrised curvature lines of both families, so many that the share of stroke pixels comes as
+    close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
+    drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance.
+    Raises InputError for an unknown name or size.
     """
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")

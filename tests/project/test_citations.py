@@ -153,6 +153,18 @@ def test_paths_that_pages_and_comments_name_are_there():
     assert missing == []
 
 
+def test_modules_that_comments_name_without_a_folder_are_there():
+    """Words like `worker.py`; numpy.py is a file that a user may have by mistake."""
+    there = {path.name for path in modules()} | {"numpy.py"}
+    named = {
+        (place(path), name)
+        for path in modules()
+        for name in re.findall(r"(?<![\w/.*<{-])([a-z_]+\.py)\b", said(path))
+    }
+    assert len(named) > 10
+    assert {(where, name) for where, name in named if name not in there} == set()
+
+
 def test_the_index_leads_to_every_page_and_every_page_back():
     index = (ROOT / "docs" / "index.md").read_text()
     for path in PAGES:

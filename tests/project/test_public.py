@@ -47,7 +47,7 @@ def test_the_public_names_are_sorted_and_there():
         _ = crossfield.wings
 
 
-def test_the_verbs_of_the_brief_are_public():
+def test_all_steps_from_a_sketch_to_a_picture_are_public():
     wanted = "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw two_stage run greedy sample"
     assert set(wanted.split()) <= set(crossfield.__all__)
 

@@ -1,6 +1,6 @@
 """The programs that our files are for, as far as they can be had for free: one table, and how each is reached.
 
-A consumer's module (`consumer_<name>.py`) is imported in a child process only (consumer_worker.py). It has
+A program's module is imported in a child process only (worker.py). It has
 
     version() -> str                                 of the program
     read(path) -> Meaning                            the algebra of an LP or MPS file, where it tells it
@@ -37,7 +37,7 @@ class Consumer:
 
     algebra, behaviour: the formats of which it tells coefficients, or values. needs: its Python package, or its executable.
     tolerance: relative difference of the numbers that it tells, 0 for equal to the bit. free: what its free edition takes.
-    solvers: the solvers that it is asked for (names of capabilities.EXTERNALS); none when it solves nothing.
+    solvers: the solvers that it is asked for (names of EXTERNALS); none when it solves nothing.
     """
 
     name: str

@@ -745,7 +745,7 @@ def test_name_source_and_gauge_of_a_file(tmp_path):
     path.write_bytes(svg(LINE))
     instance = read_sketch(path, gauge="box")
     assert (instance.name, instance.source, instance.gauge) == ("my_sketch_3", "My Sketch 3.SVG", "box")
-    assert max(instance.mask.shape) == 48
+    assert max(instance.mask.shape) == 24
     assert read_sketch(path, name="other").name == "other"
     assert read_sketch(path).sha256 == read_sketch(path).sha256
     with pytest.raises(CrossfieldError, match="the name 'Other' is not allowed"):
