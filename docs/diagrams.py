@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from matplotlib.figure import Figure
 

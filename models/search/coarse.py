@@ -11,11 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import parity_sign, stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
 from .energy import Solver
-from .free_field import FreeField, parity_sign
+from .free_field import FreeField
 from .improvement import improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
@@ -77,10 +78,7 @@ def _face_strokes(state: FreeField) -> None:
     instance, at = state.instance, state.instance.stroke_index
     steps = np.zeros(instance.grid.size, dtype=np.int32)
     steps[at] = _nearest_label(instance.target, state.alpha[at], state.beta[at])
-    grid = instance.grid
-    state.alpha = state.alpha + HALF * steps
-    state.beta = parity_sign(steps) * state.beta
-    state.p = state.p - steps[grid.first] + steps[grid.second]
+    state.alpha, state.beta, state.p = stepped(instance.grid, state.alpha, state.beta, state.p, steps)
 
 
 def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:

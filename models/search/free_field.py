@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.field import CrossField, relabelled
-from ..instance.grid import Floats, Grid, Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.grid import Floats, Ints
+from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
 from .box_qp import fitted
 
@@ -56,22 +56,3 @@ def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
     upper = -lower
     lower[at], upper[at] = instance.alpha_lower[at], instance.alpha_upper[at]
     return lower, upper
-
-
-def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
-    """The best jump of each pair, in no range, and its energy; ties go to the smaller jump. Shapes (m,)."""
-    difference = alpha[grid.first] - alpha[grid.second]
-    lower = np.floor(-difference / HALF).astype(np.int32)
-    # The best even and the best odd jump are the two beside -2d/pi, unless that is a whole number.
-    candidates = lower + np.arange(-1, 3, dtype=np.int32)[:, None]
-    a = difference + HALF * candidates
-    b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
-    cost = np.round(2 * (a * a + b * b), 12)
-    best = np.argmin(cost, axis=0)
-    at = (best, np.arange(len(best)))
-    return candidates[at], cost[at]
-
-
-def parity_sign(p: Ints) -> Floats:
-    """The sign (-1)^p of each jump."""
-    return 1.0 - 2.0 * (p & 1).astype(np.float64)

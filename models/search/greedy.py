@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from .energy import CLOSE, Solver, energy_at, local_step
-from .free_field import FreeField, free_jumps
+from .free_field import FreeField
 from .nearest_stroke import stroke_cells
 
 Progress = Callable[[int, int], object]

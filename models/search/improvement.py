@@ -13,13 +13,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..field.field import CrossField
+from ..field.jumps import free_jumps, parity_sign, stepped
 from ..instance.angles import line_difference
 from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from .box_qp import least_in_box
 from .energy import CLOSE, Solver, energy_at
-from .free_field import FreeField, free_bounds, free_jumps, parity_sign
+from .free_field import FreeField, free_bounds
 from .greedy import greedy
 from .nearest_stroke import chamfer, stroke_cells
 
@@ -120,8 +121,7 @@ def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
     The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other line.
     """
     grid, sign = state.instance.grid, parity_sign(quarters)
-    jumps = state.p + quarters[grid.first] - quarters[grid.second]
-    trial = FreeField(state.instance, state.alpha - HALF * quarters, sign * state.beta, jumps)
+    trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
     energy = energy_at(trial.instance, trial.p)
     # In the old labels the system has changed at these strokes only, so that the factorisation at hand is close.
     old = np.concatenate([np.ones(grid.size), sign])

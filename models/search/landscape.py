@@ -25,10 +25,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
+from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from .energy import PULL, energy_at
-from .free_field import free_bounds, parity_sign
+from .free_field import free_bounds
 from .window_energy import WindowEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.field import CrossField, relabelled
+from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from .energy import energy_at, factored, stroke_weight
-from .free_field import free_jumps
 
 
 def power_field(instance: Instance) -> CrossField:

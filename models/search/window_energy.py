@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF
-from .free_field import parity_sign
 
 if TYPE_CHECKING:
     from .landscape import Window

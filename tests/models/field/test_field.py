@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from crossfield.models.errors import InstanceError
-from crossfield.models.field.field import DEGENERATE, CrossField, best_jumps, relabelled
+from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from hypothesis import given
 from hypothesis import strategies as st

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.read import LEAST_WEIGHT
 from crossfield.models.sketch.surfaces import SURFACES, _frame, _parameters, analytic

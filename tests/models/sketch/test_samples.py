@@ -21,7 +21,8 @@ ANALYTIC = [each.name for each in samples() if each.kind == "analytic"]
 
 def test_the_table_lists_every_drawing_and_every_surface():
     drawings = {
-        path.name.removesuffix(".svg") for path in files("crossfield.models").joinpath("samples").iterdir()
+        path.name.removesuffix(".svg")
+        for path in files("crossfield.models.sketch").joinpath("drawings").iterdir()
     }
     assert set(SKETCHES) == drawings
     assert set(ANALYTIC) == set(SURFACES)
