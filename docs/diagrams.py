@@ -1,4 +1,7 @@
-"""The figures of docs/mathematics.md: `python docs/make.py figures`. Every one is computed, none is drawn by hand."""
+"""The figures of docs/mathematics.md: `python docs/make.py figures`.
+
+Every one is computed, none is drawn by hand.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """A cross field: two lines at every pixel, the jumps between neighbours, and what they mean.
 
-A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with jump p
-the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the paper).
+A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with
+jump p the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the
+paper).
 """
 
 from __future__ import annotations
@@ -152,7 +153,8 @@ class CrossField:
     def cross_error(self, u: Floats, v: Floats) -> Floats:
         """Angle to the crosses with line angles u and v (n,), in radians.
 
-        For both assignments of lines the mean of the two line differences, the smaller one (docs/mathematics.md, 9).
+        For both assignments of lines the mean of the two line differences, the smaller one
+        (docs/mathematics.md, 9).
         """
         mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
         straight = line_difference(mine, u) + line_difference(other, v)
@@ -175,9 +177,9 @@ class CrossField:
 def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
 
-    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge `box` the
-    alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if nothing was clipped
-    the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge
+    `box` the alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if
+    nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
     """
     lower = instance.alpha_lower
     steps = np.ceil((lower - alpha) / HALF - 1e-12).astype(np.int32)
@@ -194,10 +196,12 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
 
 
 def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label, shape (s,): of three the one with the least clipping and misfit of the stroke.
+    """The step of each stroke pixel's label, shape (s,):
+    of three the one with the least clipping and misfit of the stroke.
 
-    The label in the window, the next one (on the window's edge both fit), and the one in which u stays nearest to
-    the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the energy punishes.
+    The label in the window, the next one (on the window's edge both fit), and the one in which u stays
+    nearest to the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the
+    energy punishes.
     """
     at = instance.stroke_index
     lower, upper = instance.alpha_lower[at], instance.alpha_upper[at]

@@ -1,6 +1,8 @@
-"""The jumps between the crosses of neighbouring pixels: the sign they give beta, the best ones, and steps of the label.
+"""The jumps between the crosses of neighbouring pixels: the sign they give beta, the best ones,
+and steps of the label.
 
-The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same cross.
+The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
+cross.
 """
 
 from __future__ import annotations
@@ -17,7 +19,10 @@ def parity_sign(p: Ints) -> Floats:
 
 
 def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
-    """The jump of least 2-norm energy for each pair, in [p_min, p_max]; ties go to the smaller jump. Shape (m,)."""
+    """The jump of least 2-norm energy for each pair, in [p_min, p_max]; ties go to the smaller jump.
+
+    Shape (m,).
+    """
     return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max))[0]
 
 
@@ -42,6 +47,8 @@ def _best(
 
 
 def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
-    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels; no residual changes but in sign."""
+    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels;
+    no residual changes but in sign.
+    """
     jumps = p - steps[grid.first] + steps[grid.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

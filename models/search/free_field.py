@@ -1,6 +1,7 @@
 """A field in the making: angles that may be any real numbers, jumps in no range, both free to change.
 
-Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is searched for, they are in the way.
+Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is
+searched for, they are in the way.
 """
 
 from __future__ import annotations
@@ -45,12 +46,16 @@ class FreeField:
         return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
 
     def bounded(self, over: Over = never) -> CrossField:
-        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha, beta and p."""
+        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha,
+        beta and p.
+        """
         return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only, for elsewhere every label will do."""
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only,
+    for elsewhere every label will do.
+    """
     size, at = instance.grid.size, instance.stroke_index
     lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
     upper = -lower

@@ -1,7 +1,8 @@
 """The greedy strategy of BendFields: the baseline to compare with, and the start of solvers and searches.
 
-It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between cells, cheapest first, with the
-angles brought up to date after every batch (docs/mathematics.md, 10; the strategy is that of mixed-integer quadrangulation).
+It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between
+cells, cheapest first, with the angles brought up to date after every batch (docs/mathematics.md, 10; the
+strategy is that of mixed-integer quadrangulation).
 """
 
 from __future__ import annotations
@@ -31,10 +32,12 @@ _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the sm
 
 
 def greedy(instance: Instance, *, progress: Progress | None = None, over: Over = never) -> CrossField:
-    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha, beta and p.
+    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha,
+    beta and p.
 
-    The windows are kept by the last solve alone, as BendFields knows none. Deterministic. `progress` is called as
-    progress(jumps known, jumps in all) after every batch. Once the time is over, all jumps that are left are decided at once.
+    The windows are kept by the last solve alone, as BendFields knows none. Deterministic. `progress` is
+    called as progress(jumps known, jumps in all) after every batch. Once the time is over, all jumps that are
+    left are decided at once.
     """
     cells = stroke_cells(instance)
     angle = np.append(instance.target, 0.0)[cells]
@@ -65,7 +68,9 @@ def _stitch(state: FreeField, cells: Ints, progress: Progress | None, over: Over
 
 
 def _settle(state: FreeField, known: Bools, solver: Solver | None) -> None:
-    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver, locally."""
+    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver,
+    locally.
+    """
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if solver is None:

@@ -1,6 +1,7 @@
 """The power field: crosses by smoothing exp(4 i theta), which needs no jumps.
 
-The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles everywhere.
+The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles
+everywhere.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from .energy import energy_at, factored, stroke_weight
 def power_field(instance: Instance) -> CrossField:
     """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
 
-    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and beta = 0.
-    Parts without a stroke get alpha = 0.
+    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and
+    beta = 0. Parts without a stroke get alpha = 0.
     """
     grid = instance.grid
     weight = stroke_weight(instance)

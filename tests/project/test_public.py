@@ -48,7 +48,10 @@ def test_the_public_names_are_sorted_and_there():
 
 
 def test_the_verbs_of_the_brief_are_public():
-    wanted = "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw two_stage run greedy sample"
+    wanted = (
+        "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw "
+        "two_stage run greedy sample"
+    )
     assert set(wanted.split()) <= set(crossfield.__all__)
 
 

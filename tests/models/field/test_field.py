@@ -46,7 +46,9 @@ def random_field(instance, seed):
 
 
 def lines(field):
-    """Both lines of each pixel as a set that knows neither order nor sign: sum and product of exp(2i angle)."""
+    """Both lines of each pixel as a set that knows neither order nor sign:
+    sum and product of exp(2i angle).
+    """
     first, second = (
         np.exp(2j * angle) for angle in (field.alpha + field.beta, field.alpha + HALF - field.beta)
     )

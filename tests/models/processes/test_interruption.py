@@ -24,7 +24,9 @@ report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.
 
 @contextmanager
 def started(command, first):
-    """A process that has printed a line which begins so; afterwards neither it nor any that it has started is left."""
+    """A process that has printed a line which begins so;
+    afterwards neither it nor any that it has started is left.
+    """
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
@@ -89,7 +91,9 @@ def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
 
 
 def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
-    """The first line says how long the searches can take. At that size the greedy field takes longer than the signal.
+    """The first line says how long the searches can take.
+
+    At that size the greedy field takes longer than the signal.
 
     Not while libraries load: there Python may drop a KeyboardInterrupt that comes inside a callback.
     """
