@@ -1,4 +1,5 @@
-"""Crossfield: from a rough concept sketch to optimization instances, and from solvers' answers back to a cross field.
+"""Crossfield: from a rough concept sketch to optimization instances,
+and from solvers' answers back to a cross field.
 
 The verbs are imported on first use, so that `import crossfield` itself takes milliseconds.
 """

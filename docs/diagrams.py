@@ -1,4 +1,7 @@
-"""The figures of docs/mathematics.md: `python docs/make.py figures`. Every one is computed, none is drawn by hand."""
+"""The figures of docs/mathematics.md: `python docs/make.py figures`.
+
+Every one is computed, none is drawn by hand.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,8 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from matplotlib.figure import Figure
 

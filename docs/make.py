@@ -1,4 +1,5 @@
-"""Make the generated pages and pictures of docs/: `python docs/make.py` (some five minutes), or one of them by name.
+"""Make the generated pages and pictures of docs/: `python docs/make.py` (some five minutes),
+or one of them by name.
 
 Every number in the docs comes from here. Sizes, seeds and time limits stand in the tables themselves.
 """
@@ -51,7 +52,10 @@ def formulations() -> None:
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
         settable = ", ".join(sorted(recipe.settable)) or "none"
-        facts = f"Section {recipe.paper} of the paper. {recipe.kind}. {recipe.summary[0].upper()}{recipe.summary[1:]}. Options: {settable}."
+        facts = (
+            f"Section {recipe.paper} of the paper. {recipe.kind}. "
+            f"{recipe.summary[0].upper()}{recipe.summary[1:]}. Options: {settable}."
+        )
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
     parts += [
@@ -69,17 +73,22 @@ def kinds_in_short() -> str:
     closed = {row["formulation"] for row in rows if any(row[solver] == "yes" for solver in solvers)}
     whole = [name for name in FORMULATIONS if name in closed]
     return (
-        f"There are {len(FORMULATIONS)} formulations, each printed here from its one declaration. {len(convex)} are convex once their integers are relaxed: "
-        f"{', '.join(convex)}. HiGHS, Ipopt and Bonmin, which are installed with crossfield, take {len(whole)} as they stand, and relaxations of others: the table at the end."
+        f"There are {len(FORMULATIONS)} formulations, each printed here from its one declaration. "
+        f"{len(convex)} are convex once their integers are relaxed: "
+        f"{', '.join(convex)}. HiGHS, Ipopt and Bonmin, which are installed with crossfield, "
+        f"take {len(whole)} as they stand, and relaxations of others: the table at the end."
     )
 
 
-INTRODUCTION = r"""[What the words and symbols mean](mathematics.md), step by step. In short: a cross at pixel $i$ has line $u$ at angle $\alpha_i + \beta_i$ and line $v$ at angle $\alpha_i + \pi/2 - \beta_i$. $I$ are
-the pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and reliability $w_i$, and $E$ the ordered pairs
-$(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in radians, counter-clockwise, $y$ up. The window
-$[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data: under the gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes
-and $[0, \pi/2]$ elsewhere; under `box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow
-from the windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper prints it."""
+INTRODUCTION = r"""[What the words and symbols mean](mathematics.md), step by step. In short: a cross at pixel
+$i$ has line $u$ at angle $\alpha_i + \beta_i$ and line $v$ at angle $\alpha_i + \pi/2 - \beta_i$. $I$ are the
+pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and reliability $w_i$, and $E$ the
+ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in radians,
+counter-clockwise, $y$ up. The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data: under the
+gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere; under
+`box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the
+windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
+prints it."""
 
 
 def methods(instance: Instance) -> Iterator[Candidate]:
@@ -129,9 +138,10 @@ def accuracy() -> None:
 
 {errors_in_short(rows)}
 
-Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one; over all pixels. Strokes are
-exact curvature lines of both families. Search and MILP are given {SECONDS:g} s each, and start from the greedy field, improved. The MILP minimises
-the 1-norm energy, and a lower 1-norm energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest
+Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one;
+over all pixels. Strokes are exact curvature lines of both families. Search and MILP are given {SECONDS:g} s
+each, and start from the greedy field, improved. The MILP minimises the 1-norm energy, and a lower 1-norm
+energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest
 2-norm energy.
 
 {markdown(columns, rows)}
@@ -140,7 +150,9 @@ the 1-norm energy, and a lower 1-norm energy can well mean a higher 2-norm energ
 
 
 def errors_in_short(rows: list[list[str]]) -> str:
-    """How near the fields of lowest energy come, and how often another method is nearer. rows: those of the page's table."""
+    """How near the fields of lowest energy come, and how often another method is nearer.
+    rows: those of the page's table.
+    """
     cases: dict[tuple[str, str], list[list[str]]] = {}
     for row in rows:
         cases.setdefault((row[0], row[1]), []).append(row)
@@ -152,8 +164,10 @@ def errors_in_short(rows: list[list[str]]) -> str:
     )
     highest = max(float(row[4]) for row in rows)
     return (
-        f"At size {finest} the fields of lowest energy are off by {errors[0]:.1f} to {errors[-1]:.1f} degrees on average. "
-        f"In {nearer} of {len(cases)} cases another method comes nearer than the field of lowest energy: a lower energy need not be a better field. "
+        f"At size {finest} the fields of lowest energy are off by {errors[0]:.1f} to {errors[-1]:.1f} "
+        "degrees on average. "
+        f"In {nearer} of {len(cases)} cases another method comes nearer than the field of lowest energy: "
+        "a lower energy need not be a better field. "
         f"The worst field in the table is off by {highest:.1f} degrees."
     )
 
@@ -224,19 +238,22 @@ def errata() -> None:
 
 ## (26) as printed
 
-`milp-mccormick` on 4 x 4 grids with random strokes, solved to proven optimality by HiGHS. With the printed facet the optimum drops below
-the true 1-norm energy of the field it stands for: where p1 = 0, z is free in an interval and t is cheated through it.
+`milp-mccormick` on 4 x 4 grids with random strokes, solved to proven optimality by HiGHS. With the printed
+facet the optimum drops below the true 1-norm energy of the field it stands for: where p1 = 0, z is free in an
+interval and t is cheated through it.
 
 {markdown(("seed", "facet", "optimum", "energy of its field", "status"), facets)}
 
 ## The box (1)
 
-`miqp-exact` on 2 x 3 grids with random strokes, solved by Bonmin. With the box of the paper the optimum is higher, and it changes when the
-sketch is turned by a quarter; with the gauge `strokes` it does not (to the accuracy of the solver).
+`miqp-exact` on 2 x 3 grids with random strokes, solved by Bonmin. With the box of the paper the optimum is
+higher, and it changes when the sketch is turned by a quarter; with the gauge `strokes` it does not (to the
+accuracy of the solver).
 
 {markdown(("seed", "gauge", "optimum", "of the turned sketch", "Bonmin says"), gauges)}
 
-One pixel with a stroke at 120 degrees (`qp-fixed`, Ipopt): the box forces a skewed cross where nothing asks for one. Degrees.
+One pixel with a stroke at 120 degrees (`qp-fixed`, Ipopt): the box forces a skewed cross where nothing asks
+for one. Degrees.
 
 {markdown(("gauge", "alpha", "beta", "angle between the lines"), angles)}
 """
@@ -255,9 +272,12 @@ def misprints_in_short(facets: list[list[str]], gauges: list[list[str]], angles:
     changed = sum(abs(values[seed, "box"][0] - values[seed, "box"][1]) > 1e-4 for seed in sketches)
     between = {gauge: degrees for gauge, _, _, degrees in angles}
     return (
-        f"With (26) as printed the optimum is too low in {len(lower)} of {len(seeds)} instances, and the field that comes with it has up to {worst:.1f} times the least energy. "
-        f"With the box (1) the optimum is higher in {higher} of {len(sketches)} sketches, and turning the sketch by a quarter changes it in {changed}. "
-        f"A lone stroke at 120 degrees gets lines {between['box']} degrees apart from the box, and {between['strokes']} from the window round the stroke."
+        f"With (26) as printed the optimum is too low in {len(lower)} of {len(seeds)} instances, "
+        f"and the field that comes with it has up to {worst:.1f} times the least energy. "
+        f"With the box (1) the optimum is higher in {higher} of {len(sketches)} sketches, "
+        f"and turning the sketch by a quarter changes it in {changed}. "
+        f"A lone stroke at 120 degrees gets lines {between['box']} degrees apart from the box, "
+        f"and {between['strokes']} from the window round the stroke."
     )
 
 
@@ -289,7 +309,8 @@ def samples_in_short() -> str:
     """How many samples there are, of which kinds, and what the pictures show."""
     known = [entry.kind for entry in SAMPLES.values()].count("analytic")
     return (
-        f"There are {len(SAMPLES)} samples: {len(SAMPLES) - known} sketches and {known} computed surfaces whose true crosses are known. "
+        f"There are {len(SAMPLES)} samples: "
+        f"{len(SAMPLES) - known} sketches and {known} computed surfaces whose true crosses are known. "
         "Each can be named where a command takes a sketch, as in `crossfield run mouse -o out`. "
         "The pictures show fields that a search of 10 rounds finds on grids of 48 pixels."
     )

@@ -1,7 +1,8 @@
-"""The folders of the package, what each uses, and their picture, for docs/architecture.md: `python docs/make.py architecture`.
+"""The folders of the package, what each uses, and their picture, for docs/architecture.md:
+`python docs/make.py architecture`.
 
-What lives in a folder is the first line of the docstring in its `__init__.py`; what it uses are its imports. Only the order of the
-folders and their places in the picture stand here.
+What lives in a folder is the first line of the docstring in its `__init__.py`; what it uses are its imports.
+Only the order of the folders and their places in the picture stand here.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ GROUND: Final = "models"
 """At its top what every folder uses, and so left out of the table."""
 
 ORDER: Final = (
-    "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations", "models/search", "templates",
-    "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions", "export/bundle", "export/pictures", "export/solving",
-    "export/verify/programs", "export/verify", "export/library", "export/library/plan", "export/library/documents",
-    "export/library/ledger", "export/library/building", "export/library/checking", "export/library/contributions",
+    "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations",
+    "models/search", "templates",
+    "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions",
+    "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",
+    "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
+    "export/library/building", "export/library/checking", "export/library/contributions",
     "export/library/site", "export/cli",
 )  # fmt: skip
 """From the ground up: a folder uses only folders that stand before it."""
@@ -80,7 +83,8 @@ PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
     "models/search": (1, 470), "templates": (3, 470), "export/bundle": (4, 470),
-    "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620), "export/solving": (4, 620),
+    "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
+    "export/solving": (4, 620),
 }  # fmt: skip
 FLOW: Final = (
     ("models/sketch", "models/instance", "strokes,", "mask"),
@@ -103,11 +107,13 @@ INK: Final = {
     "templates": ("#f8efdc", "#b08a3c"),
 }
 STYLE: Final = """text { font-family: Inter, 'Segoe UI', Helvetica, Arial, sans-serif; fill: #223; }
-.name { font-weight: 600; font-size: 14px; } .what { font-size: 12px; } .data { font-size: 11.5px; font-style: italic; fill: #555; }
+.name { font-weight: 600; font-size: 14px; } .what { font-size: 12px; }
+.data { font-size: 11.5px; font-style: italic; fill: #555; }
 .flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }"""
 
 
-TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7" orient="auto-start-reverse">
+TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7"
+orient="auto-start-reverse">
 <path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>"""
 
 
@@ -115,7 +121,10 @@ def picture(root: Path) -> str:
     """The rooms and the way of data through them, as SVG."""
     height = 790
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" role="img">',
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
+            f'height="{height}" role="img">'
+        ),
         "<title>The folders of crossfield and the way of data through them</title>",
         f"<style>{STYLE}</style>",
         TIP,
@@ -166,7 +175,10 @@ def chip(text: str, x: float, y: float, width: float) -> str:
 def panel(folder: str, x: float, y: float, width: float, height: float) -> str:
     """A box in the colour of its part."""
     fill, line = INK[folder.partition("/")[0]]
-    return f'<rect x="{x}" y="{y}" width="{width}" height="{height}" rx="8" fill="{fill}" stroke="{line}" stroke-width="1.4"/>'
+    return (
+        f'<rect x="{x}" y="{y}" width="{width}" height="{height}" rx="8" fill="{fill}" '
+        f'stroke="{line}" stroke-width="1.4"/>'
+    )
 
 
 def corner(folder: str) -> tuple[int, int]:
@@ -181,9 +193,9 @@ def box(root: Path, folder: str) -> str:
     lines = "".join(
         f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
     )
-    return (
-        panel(folder, x, y, WIDE, HIGH)
-        + f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text><text class="what" x="{x + 12}" y="{y + 27}">{lines}</text>'
+    return panel(folder, x, y, WIDE, HIGH) + (
+        f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
+        f'<text class="what" x="{x + 12}" y="{y + 27}">{lines}</text>'
     )
 
 
@@ -199,7 +211,10 @@ def arrow(begin: str, end: str, above: str, below: str) -> str:
     if to_x == x:
         middle, downwards = x + WIDE / 2, to_y > y
         start, stop = (y + HIGH, to_y - 3) if downwards else (y, to_y + HIGH + 3)
-        return f'<path class="flow" d="M{middle} {start}V{stop}"/>{written(above, middle + 8, (start + stop) / 2 + 4, "start")}'
+        return (
+            f'<path class="flow" d="M{middle} '
+            f'{start}V{stop}"/>{written(above, middle + 8, (start + stop) / 2 + 4, "start")}'
+        )
     return slanted(x, y, to_x, to_y, above)
 
 

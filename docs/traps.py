@@ -1,4 +1,5 @@
-"""What programs make of files that break the rules of docs/format-rules.md: `python docs/make.py traps`, with the extra `oracles`.
+"""What programs make of files that break the rules of docs/format-rules.md: `python docs/make.py traps`,
+with the extra `oracles`.
 
 Each file has a few lines and one trap; how a program read it shows in the optimum that it finds.
 """
@@ -22,7 +23,9 @@ SECONDS: Final = 60
 
 @dataclass(frozen=True)
 class Trap:
-    """A file: the rule that it breaks (or keeps, when `good`), what is in it, its text, and the optimum that is meant."""
+    """A file: the rule that it breaks (or keeps, when `good`), what is in it, its text,
+    and the optimum that is meant.
+    """
 
     rule: str
     what: str
@@ -51,7 +54,10 @@ def mps(rule: str, what: str, meant: Answer, *, good: bool = False, **sections: 
         "TAIL": "",
     } | sections
     bounds = f"BOUNDS\n{parts['BOUNDS']}" if parts["BOUNDS"] else ""
-    text = f"NAME model FREE\n{parts['HEAD']}ROWS\n N obj\n{parts['ROWS']}COLUMNS\n{parts['COLUMNS']}RHS\n{parts['RHS']}{bounds}{parts['TAIL']}ENDATA\n"
+    text = (
+        f"NAME model FREE\n{parts['HEAD']}ROWS\n N obj\n{parts['ROWS']}COLUMNS\n{parts['COLUMNS']}"
+        f"RHS\n{parts['RHS']}{bounds}{parts['TAIL']}ENDATA\n"
+    )
     return Trap(rule, what, "model.mps", text, meant, good)
 
 
@@ -65,13 +71,16 @@ FIXED: Final = {
 ONE_TRIANGLE: Final = " x x 2\n x y 1\n y y 2\n"
 
 TRAPS: Final = (
-    lp("W2", "the constant as cost of a fixed column", "x + 7 ONE", "x >= 1", 8.0, rest="Bounds\n 1 <= ONE <= 1\n", good=True),
+    lp("W2", "the constant as cost of a fixed column", "x + 7 ONE", "x >= 1", 8.0,
+       rest="Bounds\n 1 <= ONE <= 1\n", good=True),
     lp("L1", "`x + 7`", "x + 7", "x >= 1", 8.0),
     lp("L2", "`7 + x`", "7 + x", "x >= 1", 8.0),
     lp("L3", "`x + 5 <= 10`, greatest x", "- x", "x + 5 <= 10", -5.0),
-    lp("L4", "`x <= 10 + z`, z up to 1, greatest x", "- x", "x <= 10 + z", -11.0, rest="Bounds\n 0 <= z <= 1\n"),
+    lp("L4", "`x <= 10 + z`, z up to 1, greatest x", "- x", "x <= 10 + z", -11.0,
+       rest="Bounds\n 0 <= z <= 1\n"),
     lp("L5", "`Integers`, x up to 3.5, greatest x", "- x", "x <= 3.5", -3.0, rest="Integers\n x\n"),
-    lp("L6", "bounds after `Generals`, x up to 2.5", "- x", "x <= 9", -2.0, rest="Generals\n x\nBounds\n 0 <= x <= 2.5\n"),
+    lp("L6", "bounds after `Generals`, x up to 2.5", "- x", "x <= 9", -2.0,
+       rest="Generals\n x\nBounds\n 0 <= x <= 2.5\n"),
     lp("L9", "`[ x^2 ]` at x = 2", "[ x^2 ]", "x >= 2", 4.0),
     lp("L13", "`-1 <= x <= 5`", "x", "-1 <= x <= 5", 0.0),
     lp("L14", "`x + x` at x = 1", "x + x", "x >= 1", 2.0),
@@ -83,7 +92,8 @@ TRAPS: Final = (
     lp("L34", "`[ x ^2 ] / 2` at x = 2", "[ x ^2 ] / 2", "x >= 2", 2.0, good=True),
     lp("L34", "`[ x ^ 2 ] / 2` at x = 2", "[ x ^ 2 ] / 2", "x >= 2", 2.0),
     mps("M1", "an integer without bounds, greatest x", -1.0, COLUMNS=WHOLE, **UP_TO_5),
-    mps("M2", "an integer with `LO 0` alone, up to 5", -5.0, COLUMNS=WHOLE, BOUNDS=" LO BND1 x 0\n", **UP_TO_5),
+    mps("M2", "an integer with `LO 0` alone, up to 5", -5.0, COLUMNS=WHOLE,
+        BOUNDS=" LO BND1 x 0\n", **UP_TO_5),
     mps("M3", "`UP -3` alone, x from -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS=" UP BND1 x -3\n"),
     mps("M4", "right side 7 of the objective, at x = 1", -6.0, RHS=" RHS1 c 1\n RHS1 obj 7\n"),
     mps("M5", "`OBJSENSE MAX`, x up to 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
@@ -96,7 +106,8 @@ TRAPS: Final = (
     mps("M13", "QUADOBJ, both triangles", REFUSED, TAIL=f"QUADOBJ\n{ONE_TRIANGLE} y x 1\n", **FIXED),
     mps("M14", "QMATRIX, one triangle", REFUSED, TAIL=f"QMATRIX\n{ONE_TRIANGLE}", **FIXED),
     mps("M15", "QSECTION", 3.0, TAIL=f"QSECTION obj\n{ONE_TRIANGLE}", **FIXED),
-    mps("M25", "`BV`, then `UP 5`, greatest x", REFUSED, COLUMNS=" x obj -1\n x c 1\n", BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
+    mps("M25", "`BV`, then `UP 5`, greatest x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
+        BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
 )  # fmt: skip
 """`meant` is what a person would take the file for; `refused` where it has no clear meaning."""
 
@@ -205,8 +216,8 @@ def executed(*words: str) -> None:
 
 
 PROGRAMS: Final[dict[str, tuple[str, Callable[[Path], Answer]]]] = {
-    "HiGHS": ("highspy", highs), "Gurobi": ("gurobipy", gurobi), "CPLEX": ("cplex", cplex), "Xpress": ("xpress", xpress),
-    "SCIP": ("pyscipopt", scip), "GLPK": ("glpsol", glpk), "CBC": ("cbc", cbc),
+    "HiGHS": ("highspy", highs), "Gurobi": ("gurobipy", gurobi), "CPLEX": ("cplex", cplex),
+    "Xpress": ("xpress", xpress), "SCIP": ("pyscipopt", scip), "GLPK": ("glpsol", glpk), "CBC": ("cbc", cbc),
 }  # fmt: skip
 """Title -> its Python package or executable, and how its optimum is found."""
 

@@ -1,7 +1,7 @@
 """How much is read at most of files that come from elsewhere: the one table of all readers of inputs.
 
-A file beyond a limit is refused with a message that states it, before the work or the memory is spent. Each limit is far above what sketches,
-instances and fields of the largest grid need.
+A file beyond a limit is refused with a message that states it, before the work or the memory is spent. Each
+limit is far above what sketches, instances and fields of the largest grid need.
 """
 
 from __future__ import annotations
@@ -51,6 +51,8 @@ MAX_PIXELS: Final = 80_000_000
 MAX_GRID: Final = 9999
 """Rows and columns of a grid."""
 MAX_ARCHIVE: Final = 1 << 31
-"""Bytes of an .npz, and of what is read of it unpacked: a field on a grid of 9999 x 9999 takes more, one that can be solved far less."""
+"""Bytes of an .npz, and of what is read of it unpacked: a field on a grid of 9999 x 9999 takes more,
+one that can be solved far less.
+"""
 MAX_HEAD: Final = 1 << 20
 """Bytes of the text in an .npz."""

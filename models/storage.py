@@ -56,9 +56,11 @@ def neighbour(path: Path) -> Path:
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove the temporary files and folders that killed processes of this machine have left in a folder; looked for once in a process.
+    """Remove the temporary files and folders that killed processes of this machine have left in a folder;
+    looked for once in a process.
 
-    Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and of other machines.
+    Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and
+    of other machines.
     """
     for entry in os.scandir(folder):
         mark = _MARK.fullmatch(entry.name)
@@ -96,7 +98,9 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
 
 
 def read_bytes(path: str | Path, most: int | None = None) -> bytes:
-    """The whole content of a file. Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes.
+    """The whole content of a file.
+
+    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes.
 
     With `most` it must be a plain file, because nothing else tells its length.
     """

@@ -1,6 +1,7 @@
 """Pictures of instances and cross fields as PNG, SVG or PDF: same input, same bytes.
 
-The Agg, SVG and PDF writers of matplotlib are used directly; pyplot and the user's matplotlib settings play no part.
+The Agg, SVG and PDF writers of matplotlib are used directly; pyplot and the user's matplotlib settings play
+no part.
 """
 
 from __future__ import annotations
@@ -91,10 +92,10 @@ def draw(
 ) -> Path:
     """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
 
-    kind: a name in KINDS; for an Instance only `instance` makes sense. sketch: polylines (k, 2) in the coordinates of the
-    sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to the grid.
-    Raises InputError for an unknown kind or suffix, a kind that needs a field, or a malformed sketch, and OutputError when
-    the file cannot be written.
+    kind: a name in KINDS; for an Instance only `instance` makes sense. sketch: polylines (k, 2) in the
+    coordinates of the sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to
+    the grid. Raises InputError for an unknown kind or suffix, a kind that needs a field, or a malformed
+    sketch, and OutputError when the file cannot be written.
     """
     path = Path(path)
     suffix = _suffix(path)
@@ -121,7 +122,8 @@ def _suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(
-            f"pictures are not written as {suffix or 'a name without suffix'}; use one of {', '.join(SUFFIXES)}",
+            f"pictures are not written as {suffix or 'a name without suffix'}; "
+            f"use one of {', '.join(SUFFIXES)}",
             file=path,
         )
     return suffix
@@ -132,7 +134,8 @@ def _kind(kind: str, what: CrossField | Instance) -> Kind:
         raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
     if KINDS[kind].needs_field and isinstance(what, Instance):
         raise InputError(
-            f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, or use kind instance"
+            f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, "
+            "or use kind instance"
         )
     return KINDS[kind]
 
@@ -147,7 +150,8 @@ def _on_grid(sketch: Sequence[ArrayLike], instance: Instance) -> tuple[Floats, .
             points = np.array(np.nan)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise InputError(
-                f"polyline {number} of the sketch is no list of finite points (x, y); leave it out or repair it"
+                f"polyline {number} of the sketch is no list of finite points (x, y); "
+                "leave it out or repair it"
             )
         scaled = (points - instance.origin) / instance.pixel_size - 0.5
         lines.append(scaled * np.array([1.0, -1.0]))
@@ -208,7 +212,8 @@ def _caption(picture: panels.Picture, *, full: bool) -> str:
         parts.append(_counted(picture.field))
     if picture.field is not None and full:
         parts.append(
-            f"energy {picture.field.energy(2).total:.4g} (2-norm), {picture.field.energy(1).total:.4g} (1-norm)"
+            f"energy {picture.field.energy(2).total:.4g} (2-norm), "
+            f"{picture.field.energy(1).total:.4g} (1-norm)"
         )
     if full:
         parts.append(f"gauge {instance.gauge}")

@@ -1,7 +1,7 @@
 """The panels of a picture: each function draws one kind onto one set of matplotlib axes.
 
-Axes are in pixel units, x = column, y = -row (y up); pixel [row, column] is the unit square round (column, -row).
-Widths, marks and spacings are in points of the printed picture, so that 24 and 200 pixels look alike.
+Axes are in pixel units, x = column, y = -row (y up); pixel [row, column] is the unit square round (column,
+-row). Widths, marks and spacings are in points of the printed picture, so that 24 and 200 pixels look alike.
 The two families are teal and orange, which stay apart for all common kinds of colour blindness.
 """
 
@@ -61,7 +61,8 @@ class Picture:
         """The field. Raises InputError where the picture has none."""
         if self.field is None:
             raise InputError(
-                f"{self.instance.name} is an instance without a field; draw it with kind instance, or solve it first"
+                f"{self.instance.name} is an instance without a field; draw it with kind instance, "
+                "or solve it first"
             )
         return self.field
 

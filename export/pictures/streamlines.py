@@ -1,16 +1,18 @@
 """Evenly spaced streamlines of a cross field, traced on labels instead of nearest directions.
 
-Between four pixel centres the angles alpha and beta are interpolated bilinearly after the jumps p have brought the four
-crosses to one label, so the interpolant is continuous across cells and has exactly the differences A and B that the energy
-measures. A line carries its label q with it (direction d_q of d_0..d_3 = u, v, -u, -v) and passes it on from pixel to pixel
-by p: sign and family are continuous even where the two lines almost coincide. Cells round which the jumps do not add up to
-zero are singular; lines end there, at the border of the mask, and where the two lines are one.
+Between four pixel centres the angles alpha and beta are interpolated bilinearly after the jumps p have
+brought the four crosses to one label, so the interpolant is continuous across cells and has exactly the
+differences A and B that the energy measures. A line carries its label q with it (direction d_q of d_0..d_3 =
+u, v, -u, -v) and passes it on from pixel to pixel by p: sign and family are continuous even where the two
+lines almost coincide. Cells round which the jumps do not add up to zero are singular; lines end there, at the
+border of the mask, and where the two lines are one.
 
-Positions are complex numbers x + iy in pixel units, y up: pixel [row, column] has its centre at column - i row and
-reaches half a unit to each side.
+Positions are complex numbers x + iy in pixel units, y up: pixel [row, column] has its centre at column - i
+row and reaches half a unit to each side.
 
-Placement follows Jobard and Lefer, Creating evenly-spaced streamlines of arbitrary density (1997): new lines start at the
-separation distance from lines already there and end where they come closer than a fraction of it.
+Placement follows Jobard and Lefer, Creating evenly-spaced streamlines of arbitrary density (1997): new lines
+start at the separation distance from lines already there and end where they come closer than a fraction of
+it.
 """
 
 from __future__ import annotations
@@ -51,8 +53,8 @@ class Streamline:
     """A line of a cross field.
 
     points: float (k, 2), x and y in pixel units, y up: pixel [row, column] has its centre at (column, -row).
-    families: int (k,), 0 or 1 at each point: the label u or v that the line has in the combed field there. It changes only
-    on the cuts that singularities force.
+    families: int (k,), 0 or 1 at each point: the label u or v that the line has in the combed field there. It
+    changes only on the cuts that singularities force.
     closed: True where the last point is the first one again.
     """
 
@@ -93,8 +95,8 @@ def trace(field: CrossField, seeds: Floats, labels: Labels, length: float) -> li
     """One half line from each seed, as points (k, 2); shape of seeds (m, 2), x and y in pixel units, y up.
 
     labels: int (m,), which direction to leave in: 0..3 = u, v, -u, -v of the pixel that holds the seed.
-    length: greatest length in pixels. A seed off the mask or on a singular or degenerate place gives no points at all.
-    Raises InputError when a seed is not finite.
+    length: greatest length in pixels. A seed off the mask or on a singular or degenerate place gives no
+    points at all. Raises InputError when a seed is not finite.
     """
     start = np.asarray(seeds, dtype=np.float64).reshape(-1, 2)
     if not np.isfinite(start).all():
@@ -125,7 +127,8 @@ class _Cells:
         total = jump.sum(axis=1)
         complete: Bools = np.all(linked, axis=1)
         self.singular = complete & (total != 0)
-        # Diagonal neighbours without a common one have no jump between them: no interpolation, no way through.
+        # Diagonal neighbours without a common one have no jump between them: no interpolation, no way
+        # through.
         self.loose: Bools = ~np.any(linked, axis=1)
         jump[~complete, np.argmin(linked, axis=1)[~complete]] = -total[~complete]
         around = np.concatenate([np.zeros_like(jump[:, :1]), np.cumsum(jump[:, :3], axis=1)], axis=1)
@@ -140,7 +143,9 @@ class _Cells:
         return np.stack([corner.ravel() for corner in corners], axis=1)
 
     def _walks(self) -> tuple[_Array, Bools]:
-        """Jumps (cells, 4) on the counter-clockwise walk from the bottom left corner, and which of them exist."""
+        """Jumps (cells, 4) on the counter-clockwise walk from the bottom left corner,
+        and which of them exist.
+        """
         upper, right = (
             np.pad(table, 1, constant_values=-1) for table in self.field.instance.grid.pair_number
         )
@@ -159,7 +164,9 @@ class _Cells:
         return index
 
     def lift(self, z: Positions, pixel: Positions, q: Labels) -> tuple[_Array, _Array, Floats, Labels]:
-        """Cell and top left corner of each position, (alpha, beta) there in the cell's frame, and q in that frame."""
+        """Cell and top left corner of each position, (alpha, beta) there in the cell's frame,
+        and q in that frame.
+        """
         top, left = np.floor(-z.imag), np.floor(z.real)
         cell = ((top + 1) * (self.width + 1) + left + 1).astype(np.int64)
         corner = (2 * (-pixel.imag - top) + pixel.real - left).astype(np.int64)
@@ -200,7 +207,9 @@ def _free(z: Positions, _q: Labels) -> Bools:
 
 @dataclass(frozen=True)
 class _Pace:
-    """How lines are traced: step and greatest length in pixels, how near they may come back to their seed, what stops them."""
+    """How lines are traced: step and greatest length in pixels, how near they may come back to their seed,
+    what stops them.
+    """
 
     step: float
     length: float
@@ -274,7 +283,9 @@ def _joined(ahead: _Walk, behind: _Walk) -> _Walk:
 
 @dataclass(eq=False)
 class _Heads:
-    """Where traced lines have got to: line, position, centre of the pixel, label in it, heading; each of shape (m,)."""
+    """Where traced lines have got to: line, position, centre of the pixel, label in it, heading;
+    each of shape (m,).
+    """
 
     line: Labels
     z: Positions
@@ -346,7 +357,9 @@ def _returned(way: Positions, turn: Positions, count: int, pace: _Pace) -> tuple
 def _last_points(
     cells: _Cells, heads: _Heads, target: Positions, pace: _Pace
 ) -> tuple[Labels, Positions, Labels]:
-    """Line, position and label of the farthest allowed point on each last step that was refused, by bisection."""
+    """Line, position and label of the farthest allowed point on each last step that was refused,
+    by bisection.
+    """
     way, reach, size = target - heads.z, np.zeros(len(target)), 0.5
     for _ in range(_HALVINGS):
         allowed, _ = heads.at(cells, heads.z + (reach + size) * way, pace)
@@ -367,10 +380,11 @@ def _walks_of(record: list[tuple[Labels, Positions, Labels]], closed: Bools) -> 
 class _Cover:
     """A raster, finer than the separation, of what the lines of each family already cover.
 
-    near: closer than CLOSEST separations to a line: lines end here. wide: closer than the separation: no seeds here.
+    near: closer than CLOSEST separations to a line: lines end here. wide: closer than the separation: no
+    seeds here.
     shut: no seeds either, because the mask or the crosses end here or because lines from here are too short.
-    Families are those of the pixel that holds the raster cell; a line marks the family whose direction is nearest to its own,
-    so cuts of the combing do not matter.
+    Families are those of the pixel that holds the raster cell; a line marks the family whose direction is
+    nearest to its own, so cuts of the combing do not matter.
     """
 
     def __init__(self, cells: _Cells, separation: float) -> None:

@@ -1,7 +1,9 @@
-"""Pictures of a site as SVG that follows the reader's light or dark mode: small, without text, same input, same bytes.
+"""Pictures of a site as SVG that follows the reader's light or dark mode: small, without text, same input,
+same bytes.
 
-`draw` makes pictures with captions on white paper; a browser wants them bare, scalable and on its own background. Lines and colours are
-those of `panels`. The longer side of the mask is 320 units; pixel [row, column] is the square round (column, row) times the unit, y down.
+`draw` makes pictures with captions on white paper; a browser wants them bare, scalable and on its own
+background. Lines and colours are those of `panels`. The longer side of the mask is 320 units; pixel [row,
+column] is the square round (column, row) times the unit, y down.
 """
 
 from __future__ import annotations
@@ -61,7 +63,9 @@ def thumbnail(instance: Instance) -> bytes:
 
 
 def field_picture(field: CrossField) -> bytes:
-    """Crosses of a small grid or streamlines of a larger one, over faint strokes; singularities as red (+) and blue (-) dots."""
+    """Crosses of a small grid or streamlines of a larger one, over faint strokes;
+    singularities as red (+) and blue (-) dots.
+    """
     sheet = _Sheet(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = _crosses(sheet, field) if few else _streamlines(sheet, field)
@@ -109,7 +113,10 @@ class _Sheet:
         left, top, width, height = map(
             _text, _rounded(np.array([[*(low * self.unit - _EDGE), *(sides * self.unit + 2 * _EDGE)]]))[0]
         )
-        opening = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left} {top} {width} {height}" width="{width}" height="{height}">'
+        opening = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left} {top} {width} {height}" '
+            f'width="{width}" height="{height}">'
+        )
         return "\n".join([opening, _STYLE, *(part for part in parts if part), "</svg>", ""]).encode()
 
     def ground(self) -> list[str]:
@@ -149,7 +156,9 @@ class _Sheet:
         )
 
     def place(self, points: Floats) -> Floats:
-        """Points (x, y) of the field's own plane, y up and centres at whole numbers, as pixels of the picture."""
+        """Points (x, y) of the field's own plane, y up and centres at whole numbers,
+        as pixels of the picture.
+        """
         placed: Floats = points * np.array([1.0, -1.0]) + 0.5
         return placed
 
@@ -191,7 +200,8 @@ def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
     )
     at = np.stack([found.column + 1.0, found.row + 1.0], axis=1) * sheet.unit
     return [
-        f'<circle class="{"positive" if index > 0 else "negative"}" cx="{_text(x)}" cy="{_text(y)}" r="{_text(r)}"/>'
+        f'<circle class="{"positive" if index > 0 else "negative"}" cx="{_text(x)}" cy="{_text(y)}" '
+        f'r="{_text(r)}"/>'
         for (x, y), index, r in zip(
             _rounded(at), found.index.tolist(), np.round(radius, 2).tolist(), strict=True
         )
@@ -199,7 +209,9 @@ def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
 
 
 def _sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2) in pixels: between two pixels of the padded mask, or between one and the outside."""
+    """Sides of pixels as segments (k, 2, 2) in pixels: between two pixels of the padded mask,
+    or between one and the outside.
+    """
     first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
     row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
     level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
@@ -212,7 +224,8 @@ def _moves(starts: Floats, letters: list[str], lengths: Floats) -> str:
     """Path data that goes from each start along the axes and closes."""
     pairs = zip(_rounded(starts), _rounded(lengths), strict=True)
     return "".join(
-        f"M{_text(x)} {_text(y)}{''.join(f'{letter}{_text(by)}' for letter, by in zip(letters, steps, strict=True))}z"
+        f"M{_text(x)} "
+        f"{_text(y)}{''.join(f'{letter}{_text(by)}' for letter, by in zip(letters, steps, strict=True))}z"
         for (x, y), steps in pairs
     )
 
@@ -244,7 +257,10 @@ def _style() -> str:
         )
 
     shared = "path{fill:none;stroke-linecap:round;stroke-linejoin:round}circle{stroke:#fff;stroke-width:1.2}"
-    return f"<style>{shared}{rules(0)}@media (prefers-color-scheme:dark){{{rules(1)}circle{{stroke:#1d2126}}}}</style>"
+    return (
+        f"<style>{shared}{rules(0)}@media "
+        f"(prefers-color-scheme:dark){{{rules(1)}circle{{stroke:#1d2126}}}}</style>"
+    )
 
 
 _STYLE: Final = _style()

@@ -1,7 +1,8 @@
 """A cross field: two lines at every pixel, the jumps between neighbours, and what they mean.
 
-A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with jump p
-the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the paper).
+A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with
+jump p the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the
+paper).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ..errors import InstanceError
 from ..instance.angles import line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
+from .jumps import best_jumps, parity_sign, stepped
 
 Norm = Literal[1, 2]
 
@@ -103,7 +105,7 @@ class CrossField:
     def residual_b(self) -> Floats:
         """B = (-1)^p beta_i - beta_j of each pair, shape (m,)."""
         grid = self.instance.grid
-        return _sign(self.p) * self.beta[grid.first] - self.beta[grid.second]
+        return parity_sign(self.p) * self.beta[grid.first] - self.beta[grid.second]
 
     @property
     def residual_r(self) -> Floats:
@@ -158,7 +160,8 @@ class CrossField:
     def cross_error(self, u: Floats, v: Floats) -> Floats:
         """Angle to the crosses with line angles u and v (n,), in radians.
 
-        For both assignments of lines the mean of the two line differences, the smaller one (docs/mathematics.md, 9).
+        For both assignments of lines the mean of the two line differences, the smaller one
+        (docs/mathematics.md, 9).
         """
         mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
         straight = line_difference(mine, u) + line_difference(other, v)
@@ -178,50 +181,34 @@ class CrossField:
         return picture
 
 
-def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
-    """The jump of least 2-norm energy for each pair, in [p_min, p_max]; ties go to the smaller jump. Shape (m,)."""
-    grid = instance.grid
-    difference = alpha[grid.first] - alpha[grid.second]
-    near = np.clip(np.floor(-difference / HALF).astype(np.int32), instance.p_min, instance.p_max)
-    candidates = np.stack(
-        [
-            np.maximum(near - 1, instance.p_min),
-            near,
-            np.minimum(near + 1, instance.p_max),
-            np.minimum(near + 2, instance.p_max),
-        ]
-    )
-    a = difference + HALF * candidates
-    b = _sign(candidates) * beta[grid.first] - beta[grid.second]
-    cost = np.round(a * a + b * b, 12)  # equal costs must not be told apart by rounding
-    best: Ints = candidates[np.argmin(cost, axis=0), np.arange(len(difference))]
-    return best
-
-
 def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
 
-    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge `box` the
-    alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if nothing was clipped
-    the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge
+    `box` the alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if
+    nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
     """
-    grid = instance.grid
     lower = instance.alpha_lower
     steps = np.ceil((lower - alpha) / HALF - 1e-12).astype(np.int32)
     steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
-    shifted = np.clip(alpha + HALF * steps, lower, instance.alpha_upper)
-    turned = np.clip(_sign(steps) * beta, -QUARTER, QUARTER)
-    moved = np.clip(p - steps[grid.first] + steps[grid.second], instance.p_min, instance.p_max)
-    kept = CrossField(instance, shifted, turned, moved)
+    alpha, beta, p = stepped(instance.grid, alpha, beta, p, steps)
+    kept = CrossField(
+        instance,
+        np.clip(alpha, lower, instance.alpha_upper),
+        np.clip(beta, -QUARTER, QUARTER),
+        np.clip(p, instance.p_min, instance.p_max),
+    )
     best = kept.with_best_jumps()
     return best if best.energy().total < kept.energy().total else kept
 
 
 def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label, shape (s,): of three the one with the least clipping and misfit of the stroke.
+    """The step of each stroke pixel's label, shape (s,):
+    of three the one with the least clipping and misfit of the stroke.
 
-    The label in the window, the next one (on the window's edge both fit), and the one in which u stays nearest to
-    the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the energy punishes.
+    The label in the window, the next one (on the window's edge both fit), and the one in which u stays
+    nearest to the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the
+    energy punishes.
     """
     at = instance.stroke_index
     lower, upper = instance.alpha_lower[at], instance.alpha_upper[at]
@@ -229,14 +216,10 @@ def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) 
     candidates = np.stack([steps[at], steps[at] + 1, faithful])
     moved = alpha[at] + HALF * candidates
     shifted = np.clip(moved, lower, upper)
-    turned = np.clip(_sign(candidates) * beta[at], -QUARTER, QUARTER)
+    turned = np.clip(parity_sign(candidates) * beta[at], -QUARTER, QUARTER)
     cost = np.abs(moved - shifted) + np.abs(shifted + turned - instance.target)
     best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
     return best
-
-
-def _sign(p: Ints) -> Floats:
-    return 1.0 - 2.0 * (p & 1).astype(np.float64)
 
 
 def _unit(angle: Floats) -> Floats:

@@ -1,16 +1,18 @@
-"""Field files: .npz and documented JSON, which hold field and instance, and .rawfield with a mesh for Directional.
+"""Field files: .npz and documented JSON, which hold field and instance,
+and .rawfield with a mesh for Directional.
 
-.npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and version as JSON
-            text, and the arrays of the instance's own .npz, their names led by `instance_`. No pickles.
+.npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
+            version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
+            No pickles.
 .json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
-.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its page on file formats): a line `4 F`,
-            then for each face u, v, -u, -v as 12 numbers. Counter-clockwise in every row, because the angle from u to v is
-            pi/2 - 2 beta and |beta| <= pi/4.
+.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its page on file
+            formats): a line `4 F`, then for each face u, v, -u, -v as 12 numbers. Counter-clockwise in every
+            row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
 
-The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what Directional's
-examples read. Vertices at the pixels' centres would lose every pixel that is in no 2 x 2 block of the mask. Pixels that meet
-in a corner only get a vertex each there, so that the mesh is a manifold. Faces 2k and 2k + 1 are pixel k. Coordinates are
-those of the sketch, with y negated and z = 0.
+The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
+Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no 2 x 2 block
+of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
+2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
 """
 
 from __future__ import annotations
@@ -207,7 +209,8 @@ def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> N
     wrong: Bools = np.isnan(jumps) != (pair < 0)
     if wrong.any():
         raise InstanceError(
-            f"$.pixels[{int(np.argmax(wrong))}]: a jump belongs where the mask has the {name} neighbour, null elsewhere"
+            f"$.pixels[{int(np.argmax(wrong))}]: a jump belongs where the mask has the {name} neighbour, "
+            "null elsewhere"
         )
     p[pair[pair >= 0]] = jumps[pair >= 0].astype(np.int32)
 
@@ -220,17 +223,24 @@ def _rawfield(field: CrossField) -> bytes:
 
 
 def _obj(instance: Instance) -> bytes:
-    """The mesh: vertices and, 1-based, the triangles (top left, bottom left, bottom right), (top left, bottom right, top right)."""
+    """The mesh: vertices and, 1-based, the triangles (top left, bottom left, bottom right),
+    (top left, bottom right, top right).
+    """
     places, corners = _corners(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
     vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
     faces = _lines(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
-    return f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, row by row; y up\n{vertices}{faces}".encode()
+    return (
+        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
+        f"row by row; y up\n{vertices}{faces}"
+    ).encode()
 
 
 def _corners(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2), and the vertex at top left, top right, bottom left, bottom right of each pixel (n, 4)."""
+    """Vertices [row, column] (k, 2), and the vertex at top left, top right, bottom left,
+    bottom right of each pixel (n, 4).
+    """
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)

@@ -1,8 +1,9 @@
 """The nine formulations, each one function that reads from top to bottom like the paper.
 
-Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels S_c or the neighbour
-pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all readings of these expressions. Equation numbers are the
-paper's. What a formulation is made of: declaration.py; the symbols: symbols.py.
+Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
+S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
+readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
+declaration.py; the symbols: symbols.py.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ def minlp_parity() -> Families:
 
 @formulation(
     "minlp-quartic", paper="2, (8)", kind="polynomial MINLP of degree 4", short="quartic",
-    minimises=TWO_NORM, how="squares of alpha_i - alpha_j + pi/2 (p1 + 2 p2) and of (1 - 2 p1) beta_i - beta_j",
+    minimises=TWO_NORM,
+    how="squares of alpha_i - alpha_j + pi/2 (p1 + 2 p2) and of (1 - 2 p1) beta_i - beta_j",
 )  # fmt: skip
 def minlp_quartic() -> Families:
     """Parity bit p1 and even part p2, squares kept as squares."""

@@ -1,7 +1,9 @@
-"""What a declared formulation is made of: families of terms and rows, options, and the table that a declaration enters.
+"""What a declared formulation is made of: families of terms and rows, options,
+and the table that a declaration enters.
 
-A formulation is a function that yields its families from top to bottom. Its parameters are its options, the first line of its docstring is
-its summary, and the decorator `formulation` states all else that is known of it. Nothing about it stands anywhere else.
+A formulation is a function that yields its families from top to bottom. Its parameters are its options, the
+first line of its docstring is its summary, and the decorator `formulation` states all else that is known of
+it. Nothing about it stands anywhere else.
 """
 
 from __future__ import annotations
@@ -74,7 +76,9 @@ class Family:
 
 
 def term(tag: str, over: IndexSet, expression: sp.Expr, paper: str = "") -> Family:
-    """A term of the objective: the sum of the expression over an index set. paper: by default the formulation's own section."""
+    """A term of the objective: the sum of the expression over an index set.
+    paper: by default the formulation's own section.
+    """
     return Family(tag, over, expression, paper)
 
 
@@ -86,14 +90,18 @@ def row(
     *,
     only: tuple[str, int] | None = None,
 ) -> Family:
-    """A row for each element of an index set. number: of the equation in the paper, or a tag where it has none."""
+    """A row for each element of an index set. number: of the equation in the paper,
+    or a tag where it has none.
+    """
     tag = f"c{number}" if isinstance(number, int) else number
     return Family(tag, over, relation, paper or f"({number})", only)
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a formulation leaves open: facet of z, norms of the stroke and the skew term, integrality dropped."""
+    """What a formulation leaves open: facet of z, norms of the stroke and the skew term,
+    integrality dropped.
+    """
 
     facet: Facet = "hull"
     stroke_norm: int = 2
@@ -105,9 +113,10 @@ class Options:
 class Declaration:
     """A line of the table of formulations.
 
-    name; paper: its section; kind: the class as people call it; short: how names of library entries carry it; minimises: what its
-    objective is, the same words for formulations with the same optimum; how: why it says the same as the others with these words;
-    families: yields terms and rows for the options that it takes; fixed: variables that are data.
+    name; paper: its section; kind: the class as people call it; short: how names of library entries carry it;
+    minimises: what its objective is, the same words for formulations with the same optimum; how: why it says
+    the same as the others with these words; families: yields terms and rows for the options that it takes;
+    fixed: variables that are data.
     """
 
     name: str
@@ -133,7 +142,9 @@ class Declaration:
 
     @cached_property
     def settable(self) -> frozenset[str]:
-        """Names of the options that may be chosen; integrality can be dropped where a variable is an integer."""
+        """Names of the options that may be chosen;
+        integrality can be dropped where a variable is an integer.
+        """
         return frozenset(inspect.signature(self.families).parameters) | (
             {"relax"} if not self.fixed else set()
         )
@@ -145,7 +156,10 @@ class Declaration:
         return next((name for name in same if name != self.name), "")
 
     def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
-        """The formulation with the chosen options. Raises FormulationError for an unknown or unfitting one."""
+        """The formulation with the chosen options.
+
+        Raises FormulationError for an unknown or unfitting one.
+        """
         options = self._options(chosen)
         given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [
@@ -221,12 +235,16 @@ class Formulation:
 
     @property
     def weakened(self) -> bool:
-        """Whether lifting made it a relaxation of itself: z between its facets is p1 beta_i at p1 = 0 and 1 alone, and here p1 may lie between."""
+        """Whether lifting made it a relaxation of itself: z between its facets is p1 beta_i at p1 = 0 and 1
+        alone, and here p1 may lie between.
+        """
         return bool(self.lifted) and self.options.relax
 
     @property
     def convex(self) -> bool:
-        """Whether its continuous relaxation is known to be convex: linear rows, and an objective that is a sum of squares as written."""
+        """Whether its continuous relaxation is known to be convex: linear rows,
+        and an objective that is a sum of squares as written.
+        """
         return _is_convex(self.objective, self.rows, self.fixed)
 
 
@@ -271,7 +289,9 @@ FORMULATIONS: Final[Mapping[str, Declaration]] = MappingProxyType(_TABLE)
 def formulation(
     name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
 ) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
-    """A decorator that enters a function which yields families into the table, as the `Declaration` of that name."""
+    """A decorator that enters a function which yields families into the table,
+    as the `Declaration` of that name.
+    """
 
     def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
         assert name not in _TABLE, f"there are two formulations {name}"

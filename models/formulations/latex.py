@@ -69,5 +69,8 @@ def _summand(family: Family) -> str:
 
 def _row(family: Family) -> str:
     relation = family.expression
-    text = rf"& {expression(relation.lhs)} {_SENSE[family.sense]} {expression(relation.rhs)} && {_FOR[family.over]}"
+    text = (
+        rf"& {expression(relation.lhs)} {_SENSE[family.sense]} {expression(relation.rhs)} && "
+        rf"{_FOR[family.over]}"
+    )
     return rf"{text} \quad \text{{{family.paper}}}"

@@ -16,7 +16,9 @@ Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
 """Symbols, each as often as its power says, and coefficient, free of these symbols."""
 
 _NOISE: Final = 1e-12
-"""Relative to its element's largest coefficient: what cancels up to rounding, or comes from an angle of 1e-16, is noise."""
+"""Relative to its element's largest coefficient: what cancels up to rounding,
+or comes from an angle of 1e-16, is noise.
+"""
 
 
 @cache
@@ -47,7 +49,9 @@ def ordered(factors: tuple[Ints, ...]) -> Ints:
 
 
 def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
-    """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out. columns: more than any index."""
+    """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out.
+    columns: more than any index.
+    """
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]

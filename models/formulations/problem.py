@@ -1,7 +1,9 @@
-"""A problem: a formulation bound to an instance. Columns, rows and terms as arrays; values and violations at points.
+"""A problem: a formulation bound to an instance.
 
-Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the declaration: SymPy splits an
-expression into monomials once per family, index arrays do the rest.
+Columns, rows and terms as arrays; values and violations at points.
+
+Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the
+declaration: SymPy splits an expression into monomials once per family, index arrays do the rest.
 """
 
 from __future__ import annotations
@@ -51,7 +53,9 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A monomial of a family: its symbols, each as often as its power says, and its coefficient (a number or one per element)."""
+    """A monomial of a family: its symbols, each as often as its power says,
+    and its coefficient (a number or one per element).
+    """
 
     family: Bound
     symbols: tuple[sp.Symbol, ...]
@@ -59,7 +63,9 @@ class Term:
 
     @property
     def factors(self) -> tuple[Ints, ...]:
-        """Columns of its symbols, one array (count,) each; made anew at every call, so that none stays in memory."""
+        """Columns of its symbols, one array (count,) each; made anew at every call,
+        so that none stays in memory.
+        """
         return tuple(map(self.family.columns, self.symbols))
 
     @property
@@ -101,7 +107,9 @@ class Bound:
         return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
-        """Place in its block of the symbol at each element, shape (count,); None where it is the element's own place."""
+        """Place in its block of the symbol at each element, shape (count,);
+        None where it is the element's own place.
+        """
         index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
             return None if self.everywhere else self.elements
@@ -149,7 +157,9 @@ class Bound:
 
     @cached_property
     def scale(self) -> Floats:
-        """The largest coefficient of each element's monomials, shape (count,): rounding errors are measured by it."""
+        """The largest coefficient of each element's monomials, shape (count,):
+        rounding errors are measured by it.
+        """
         scale = np.zeros(self.count)
         for term in self.terms or ():
             scale = np.maximum(scale, np.abs(term.coefficient))
@@ -162,7 +172,9 @@ class Bound:
         return np.broadcast_to(0.0 - constant, (self.count,))
 
     def values(self, point: Floats) -> Floats:
-        """The expression (of a row: left minus right side) at a point, one value per element, shape (count,)."""
+        """The expression (of a row: left minus right side) at a point, one value per element,
+        shape (count,).
+        """
         symbols = sorted(self.family.body.free_symbols, key=_name)
         evaluate = numeric(symbols, self.family.body)
         given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
@@ -188,9 +200,9 @@ class Violation:
 class Problem:
     """A formulation bound to an instance.
 
-    jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns are fixed
-    (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are not fixed; the angles and
-    jumps of all others then are.
+    jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns
+    are fixed (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are
+    not fixed; the angles and jumps of all others then are.
     """
 
     instance: Instance
@@ -200,7 +212,9 @@ class Problem:
     free: Bools | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data, and that what is fixed is of this instance."""
+        """Check that jumps are there exactly where they are data,
+        and that what is fixed is of this instance.
+        """
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -224,7 +238,8 @@ class Problem:
     def _check_instance_of(self, field: CrossField) -> None:
         if field.instance.sha256 != self.instance.sha256:
             raise InstanceError(
-                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, or under another gauge"
+                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, "
+                "or under another gauge"
             )
 
     @property
@@ -274,7 +289,9 @@ class Problem:
         return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
 
     def _fixed(self, variable: Variable) -> Bools | None:
-        """True for the columns of a variable that are fixed at the pinned field, if there is one; None when none of them can be."""
+        """True for the columns of a variable that are fixed at the pinned field, if there is one;
+        None when none of them can be.
+        """
         count = elements(self.instance, variable.over)
         if self.free is None:
             return np.ones(count, bool) if variable.integer else None
@@ -340,7 +357,9 @@ class Problem:
 
     @property
     def problem_class(self) -> str:
-        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP, by what is in it (any QP and MIQP may be non-convex: see `convex`)."""
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP,
+        by what is in it (any QP and MIQP may be non-convex: see `convex`).
+        """
         integer = "MI" if self.integer.any() else ""
         if max(self.objective_degree, self.row_degree) > 2:
             return f"{integer}NLP"
@@ -356,7 +375,8 @@ class Problem:
         return self.formulation.convex
 
     def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
-        """The monomials of that degree, each set of columns once, sorted: columns (k, degree) and coefficients (k,).
+        """The monomials of that degree, each set of columns once, sorted:
+        columns (k, degree) and coefficients (k,).
 
         Coefficients that cancel are left out. Shape (1, 0) for the constant.
         """
@@ -412,7 +432,10 @@ class Problem:
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
-        """The cross field of a point, jumps rounded to the nearest integer. Raises InstanceError for jumps beyond 32 bits."""
+        """The cross field of a point, jumps rounded to the nearest integer.
+
+        Raises InstanceError for jumps beyond 32 bits.
+        """
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -431,7 +454,9 @@ class Problem:
 
     @cached_property
     def stamp(self) -> str:
-        """`sha256_` and the first 12 digits of the hash before products were lifted: the one that a manifest has, short enough for names."""
+        """`sha256_` and the first 12 digits of the hash before products were lifted:
+        the one that a manifest has, short enough for names.
+        """
         return f"sha256_{self._digest('')[:12]}"
 
     def _digest(self, lifting: str) -> str:
@@ -452,7 +477,9 @@ def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
 
 
 def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
-    """The block of columns `name` where angles and jumps have the given values, from the variable's own definition."""
+    """The block of columns `name` where angles and jumps have the given values,
+    from the variable's own definition.
+    """
     if name in given:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
@@ -470,7 +497,9 @@ def _excess(sense: str, values: Floats) -> Floats:
 
 
 def _costs(terms: list[Term], block: Block) -> tuple[Ints, Floats]:
-    """As `merged`, for the single columns of a block: one number each, to which the terms are added in turn."""
+    """As `merged`, for the single columns of a block: one number each,
+    to which the terms are added in turn.
+    """
     if not terms:
         return np.zeros((0, 1), np.int32), np.zeros(0)
     total, scale = np.zeros(block.count), np.zeros(block.count)
@@ -514,15 +543,19 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
 
 
 def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem:
-    """The same problem in which only the angles of some pixels and the jumps to and between them are free; all else as in a field.
+    """The same problem in which only the angles of some pixels and the jumps to and between them are free;
+    all else as in a field.
 
-    free: those pixels, shape (n,). Raises InstanceError when the field is on another instance, FormulationError for another shape.
+    free: those pixels, shape (n,). Raises InstanceError when the field is on another instance,
+    FormulationError for another shape.
     """
     return replace(problem, pinned=field, free=free)
 
 
 def lifted(problem: Problem) -> Problem:
-    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic; see `Formulation.weakened`."""
+    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic;
+    see `Formulation.weakened`.
+    """
     return replace(problem, formulation=lift_products(problem.formulation))
 
 

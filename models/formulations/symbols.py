@@ -1,9 +1,9 @@
 """The symbols of the formulations: which quantity each one means, and where on the grid it lives.
 
-A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels S_c or the
-neighbour pairs E. A *slot* is a symbol in an expression over such a set; it names a quantity and the way to it: over the
-pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a sketch changes the length of the index
-arrays, never an expression.
+A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
+S_c or the neighbour pairs E. A *slot* is a symbol in an expression over such a set; it names a quantity and
+the way to it: over the pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a
+sketch changes the length of the index arrays, never an expression.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ R: Final = alpha + beta - theta
 class Variable:
     """A block of columns: one variable per element of an index set.
 
-    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format, NumPy and the formulas of the
-    docs read them; value: the variable at a given field, as an expression over its index set; meaning: one line for the docs.
+    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format,
+    NumPy and the formulas of the docs read them; value: the variable at a given field, as an expression over
+    its index set; meaning: one line for the docs.
     """
 
     name: str
@@ -73,10 +74,12 @@ VARIABLES: Final = {
         Variable("beta", "pixels", -_QUARTER, _QUARTER, beta, "skew of the cross"),
         Variable("p", "pairs", p_min, p_max, p, "jump between the labels of two neighbours", integer=True),
         Variable("p1", "pairs", _ZERO, sp.Integer(1), sp.Mod(p, 2), "1 when the jump is odd", integer=True),
-        Variable("p2", "pairs", sp.floor(p_min / 2), sp.floor(p_max / 2), sp.floor(p / 2), "half of the even part of the jump", integer=True),
+        Variable("p2", "pairs", sp.floor(p_min / 2), sp.floor(p_max / 2), sp.floor(p / 2),
+                 "half of the even part of the jump", integer=True),
         Variable("s", "pairs", _ZERO, _FREE, sp.Abs(A), "absolute change of direction"),
         Variable("t", "pairs", _ZERO, _FREE, sp.Abs(B), "absolute change of skew"),
-        Variable("z", "pairs", -_QUARTER, _QUARTER, p1 * beta_i, "the product of p1 and beta of the first pixel"),
+        Variable("z", "pairs", -_QUARTER, _QUARTER, p1 * beta_i,
+                 "the product of p1 and beta of the first pixel"),
         Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
         Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
         Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
@@ -159,7 +162,9 @@ def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., An
 
 @cache
 def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
-    """The declarations are few and fixed, so each is compiled once however many problems and points there are."""
+    """The declarations are few and fixed, so each is compiled once however many
+    problems and points there are.
+    """
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
 
 

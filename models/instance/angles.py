@@ -1,4 +1,6 @@
-"""Line directions: angles modulo pi, counter-clockwise from +x with y up, averaged by the double angle only."""
+"""Line directions: angles modulo pi, counter-clockwise from +x with y up,
+averaged by the double angle only.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Sine, cosine, arctangent, lengths and products that are the same to the last bit on every processor.
 
-Those of NumPy and of C libraries differ in the last digit between processors (with and without fused multiply-add, for one). These are made
-of additions, multiplications, divisions and square roots alone, each by itself, which IEEE 754 rounds in one way. They are right to 1e-15.
+Those of NumPy and of C libraries differ in the last digit between processors (with and without fused
+multiply-add, for one). These are made of additions, multiplications, divisions and square roots alone, each
+by itself, which IEEE 754 rounds in one way. They are right to 1e-15.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ def length(x: Floats, y: Floats) -> Floats:
 
 
 def turned(vectors: Floats, matrix: Floats) -> Floats:
-    """The vectors (..., k) times the matrix (c, k), shape (..., c): the sum for each entry from left to right."""
+    """The vectors (..., k) times the matrix (c, k), shape (..., c):
+    the sum for each entry from left to right.
+    """
     total = vectors[..., :1] * matrix[:, 0]
     for k in range(1, matrix.shape[1]):
         total = total + vectors[..., k : k + 1] * matrix[:, k]

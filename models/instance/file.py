@@ -46,7 +46,8 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
 def read_instance(path: str | Path) -> Instance:
     """The instance that a .json or .npz file holds.
 
-    Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the schema.
+    Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the
+    schema.
     """
     data = read_bytes(path, MAX_ARCHIVE)
     try:
@@ -96,7 +97,10 @@ def of_json(text: str) -> Instance:
 
 
 def parse_json(text: str) -> object:
-    """The document that JSON text holds, behind a byte order mark or not. Raises InstanceError with line and column."""
+    """The document that JSON text holds, behind a byte order mark or not.
+
+    Raises InstanceError with line and column.
+    """
     try:
         return cast("object", json.loads(text.removeprefix("\ufeff")))
     except (ValueError, RecursionError) as error:
@@ -104,7 +108,10 @@ def parse_json(text: str) -> object:
 
 
 def of_document(document: object) -> Instance:
-    """The instance that a parsed JSON document describes. Raises InstanceError with the place in the document."""
+    """The instance that a parsed JSON document describes.
+
+    Raises InstanceError with the place in the document.
+    """
     check_version(document, FORMAT, VERSION)
     document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
@@ -170,9 +177,12 @@ def check_schema(
     package: str,
     rows: Mapping[str, Callable[[list[Any]], bool]] | None = None,
 ) -> dict[str, Any]:
-    """The document, which obeys the `<schema>.schema.json` that ships with a package. Raises InstanceError with the place.
+    """The document, which obeys the `<schema>.schema.json` that ships with a package.
 
-    rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not looked at one by one.
+    Raises InstanceError with the place.
+
+    rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not
+    looked at one by one.
     """
     import jsonschema
 
@@ -228,7 +238,10 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def unpacked(data: bytes, prefix: str = "") -> Instance:
-    """The instance in an .npz, the names of its arrays led by a prefix. Raises InstanceError with the array's name."""
+    """The instance in an .npz, the names of its arrays led by a prefix.
+
+    Raises InstanceError with the array's name.
+    """
     return of_arrays(unpack_arrays(data, _ARCHIVE, prefix))
 
 

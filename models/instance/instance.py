@@ -30,7 +30,9 @@ MOST_WEIGHT: Final = 1e6
 """Greatest weight of a term of the energy."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-"""Instance names: lower case, digits and underscores, at most 32 characters, as instance libraries ask for."""
+"""Instance names: lower case, digits and underscores, at most 32 characters,
+as instance libraries ask for.
+"""
 
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 
@@ -62,17 +64,20 @@ class Instance:
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
     mask: bool [height, width], row 0 at the top; True = solve for this pixel.
     stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
-    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi, rounded to 12 decimals, and as 0
-    within 1e-8 of the horizontal: a cost that small would be dropped by readers of the files.
+    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi,
+    rounded to 12 decimals, and as 0 within 1e-8 of the horizontal: a cost that small would be dropped by
+    readers of the files.
     w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
-    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6), at most 1e6: beyond, an energy that rounding leaves in the one term
-    hides the others.
+    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6), at most 1e6: beyond, an energy
+    that rounding leaves in the one term hides the others.
     gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
     source: where the sketch came from, one line of text.
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
-    corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is in [1e-100, 1e100], origin up to that.
+    corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is
+    in [1e-100, 1e100], origin up to that.
 
-    Rounding makes instances, and so their hashes, the same where the last digit differs between processors. It changes nothing twice.
+    Rounding makes instances, and so their hashes, the same where the last digit differs between processors.
+    It changes nothing twice.
 
     Raises InstanceError when a rule is broken. See docs/mathematics.md, 1 and 4.
     """
@@ -113,7 +118,8 @@ class Instance:
     def _check_scalars(self) -> None:
         if not NAME.fullmatch(self.name):
             raise InstanceError(
-                f"the name {self.name[:40]!r} is not allowed; use a lower-case letter, then at most 31 lower-case letters, digits and underscores"
+                f"the name {self.name[:40]!r} is not allowed; use a lower-case letter, "
+                "then at most 31 lower-case letters, digits and underscores"
             )
         if self.gauge not in GAUGES:
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
@@ -121,7 +127,8 @@ class Instance:
             value = getattr(self, name)
             if not 0 <= value <= MOST_WEIGHT:
                 raise InstanceError(
-                    f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, beyond which rounding hides the other terms"
+                    f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, "
+                    "beyond which rounding hides the other terms"
                 )
         if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
             raise InstanceError(
@@ -139,18 +146,21 @@ class Instance:
             raise InstanceError("the mask has no pixel to solve for; draw something white in it")
         if max(self.mask.shape) > 9999:
             raise InstanceError(
-                f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; at most 9999 pixels a side are allowed"
+                f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; "
+                "at most 9999 pixels a side are allowed"
             )
         if self.stroke_pixels.size == 0:
             raise InstanceError("no stroke lies inside the mask; move the mask or draw a curvature line")
         if self.stroke_pixels.ndim != 2 or self.stroke_pixels.shape[1] != 2:
             raise InstanceError(
-                f"stroke_pixels has shape {self.stroke_pixels.shape}; give a row [row, column] for each stroke pixel"
+                f"stroke_pixels has shape {self.stroke_pixels.shape}; give a row [row, "
+                "column] for each stroke pixel"
             )
         count = len(self.stroke_pixels)
         if self.theta.shape != (count,) or self.w.shape != (count,):
             raise InstanceError(
-                f"{count} stroke pixels need as many theta and w, but there are {self.theta.size} and {self.w.size}"
+                f"{count} stroke pixels need as many theta and w, "
+                f"but there are {self.theta.size} and {self.w.size}"
             )
         for label, wrong in (
             ("theta is not a finite number", ~np.isfinite(self.theta)),
@@ -241,7 +251,9 @@ class Instance:
         return self._moved(self.mask[:, ::-1], pixels, np.pi - self.theta)
 
     def transposed(self) -> Instance:
-        """The instance with rows and columns exchanged: mirrored at the line from top left to bottom right."""
+        """The instance with rows and columns exchanged:
+        mirrored at the line from top left to bottom right.
+        """
         return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -HALF - self.theta)
 
     def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:

@@ -1,7 +1,9 @@
-"""The same work on several tasks at once, in processes that Ctrl-C does not reach and that never outlive this one.
+"""The same work on several tasks at once, in processes that Ctrl-C does not reach
+and that never outlive this one.
 
-The pools of the standard library read the user's program again in every process, and they and joblib leave processes behind. These here
-are programs of the package: they get tasks through a pipe, and end when it closes, however that comes about.
+The pools of the standard library read the user's program again in every process, and they and joblib leave
+processes behind. These here are programs of the package: they get tasks through a pipe, and end when it
+closes, however that comes about.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 MOST: Final = max(16, 2 * (os.cpu_count() or 1))
-"""Threads or processes that may be asked for: more than twice the cores make nothing quicker, and each takes its memory."""
+"""Threads or processes that may be asked for: more than twice the cores make nothing quicker,
+and each takes its memory.
+"""
 
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -46,10 +50,12 @@ def cores() -> int:
 
 @contextmanager
 def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
-    """A function that does the work on each of some tasks, in that many processes, and gives what was found in their order.
+    """A function that does the work on each of some tasks, in that many processes,
+    and gives what was found in their order.
 
-    work: a function of a module, not of the user's program. A process starts when there is a task for it; all have ended afterwards.
-    Raises what the work raises, InputError for a number of jobs that cannot be, and WorkerError when a process dies.
+    work: a function of a module, not of the user's program. A process starts when there is a task for it; all
+    have ended afterwards. Raises what the work raises, InputError for a number of jobs that cannot be, and
+    WorkerError when a process dies.
     """
     if checked(jobs) == 1:
         yield lambda tasks: [work(task) for task in tasks]
@@ -105,7 +111,8 @@ class _Workers:
             answer = pickle.load(child.stdout)  # noqa: S301 - from a process of our own
         except (OSError, EOFError, pickle.UnpicklingError) as error:
             raise WorkerError(
-                "a process ended before its work was done, for want of memory most likely; try fewer jobs or threads"
+                "a process ended before its work was done, for want of memory most likely; "
+                "try fewer jobs or threads"
             ) from error
         with self._lock:
             self._idle.append(child)
@@ -125,7 +132,8 @@ class _Workers:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    # -P: a file numpy.py where the user happens to be is not meant. A session of its own: Ctrl-C on a terminal is for this process.
+    # -P: a file numpy.py where the user happens to be is not meant. A session of its own: Ctrl-C on a
+    # terminal is for this process.
     return subprocess.Popen(
         [sys.executable, "-P", "-m", f"{__package__}.worker"],
         stdin=subprocess.PIPE,

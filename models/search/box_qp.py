@@ -1,8 +1,9 @@
 """The best angles for given jumps: the box-constrained quadratic program `qp-fixed`, without a solver.
 
-A projected Newton method (Bertsekas, SIAM J. Control Optim. 20, 1982). Variables near a bound that the slope pushes
-outwards make a plain gradient step. The others make a Newton step, which for a quadratic form leads to its minimum over
-them. Both are clipped, and halved until the energy falls enough. Once the right bounds are found, one step leads to the minimum.
+A projected Newton method (Bertsekas, SIAM J. Control Optim. 20, 1982). Variables near a bound that the slope
+pushes outwards make a plain gradient step. The others make a Newton step, which for a quadratic form leads to
+its minimum over them. Both are clipped, and halved until the energy falls enough. Once the right bounds are
+found, one step leads to the minimum.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 def fitted(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
 
-    This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not say (parts without
-    strokes), the angles stay near those given. The gradient's entries that no bound balances are below 1e-12 (1 + max |b|), see
-    models/search/energy.py for b. Where the time is over before, the best angles so far.
+    This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not
+    say (parts without strokes), the angles stay near those given. The gradient's entries that no bound
+    balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. Where the time is over before,
+    the best angles so far.
     """
     instance = field.instance
     quarter = np.full(instance.grid.size, QUARTER)
@@ -55,7 +57,8 @@ def least_in_box(
     tolerance: float = _SLOPE,
     over: Over = never,
 ) -> Floats:
-    """The point of least energy with lower <= x <= upper, searched from x; shapes (2n,), bounds may be infinite.
+    """The point of least energy with lower <= x <= upper, searched from x; shapes (2n,),
+    bounds may be infinite.
 
     Rounding, 500 steps, or time that is over end the search too: then the best point so far comes back.
     tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
@@ -84,6 +87,8 @@ def least_in_box(
 
 
 def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
-    """Whether a step lowers the energy by a fair share of what the slope promises; a step of nothing does not."""
+    """Whether a step lowers the energy by a fair share of what the slope promises;
+    a step of nothing does not.
+    """
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised

@@ -1,7 +1,8 @@
 """The same sketch on a grid of half the resolution, and a field brought from there to the fine grid.
 
-The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a quarter of the pairs. So the
-weights of strokes and of beta, which are sums over pixels, are made four times as large, up to the greatest that an instance may have.
+The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a
+quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, are made four times
+as large, up to the greatest that an instance may have.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import parity_sign, stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
 from .energy import Solver
-from .free_field import FreeField, parity_sign
+from .free_field import FreeField
 from .improvement import improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
@@ -24,7 +26,8 @@ _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes tha
 def halved(instance: Instance) -> Instance | None:
     """The instance with each 2 x 2 pixels made one, or None when no stroke is left.
 
-    A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels' strokes, by the double angle.
+    A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
+    strokes, by the double angle.
     """
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
@@ -51,8 +54,8 @@ def halved(instance: Instance) -> Instance | None:
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
 
-    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the stroke. Then they are improved
-    until the time is over.
+    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the
+    stroke. Then they are improved until the time is over.
     """
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
@@ -77,10 +80,7 @@ def _face_strokes(state: FreeField) -> None:
     instance, at = state.instance, state.instance.stroke_index
     steps = np.zeros(instance.grid.size, dtype=np.int32)
     steps[at] = _nearest_label(instance.target, state.alpha[at], state.beta[at])
-    grid = instance.grid
-    state.alpha = state.alpha + HALF * steps
-    state.beta = parity_sign(steps) * state.beta
-    state.p = state.p - steps[grid.first] + steps[grid.second]
+    state.alpha, state.beta, state.p = stepped(instance.grid, state.alpha, state.beta, state.p, steps)
 
 
 def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:

@@ -1,7 +1,8 @@
 """The energy at fixed jumps as a quadratic form, and solves of the sparse systems it leads to.
 
-With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant.
-H holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i, and w_beta.
+With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant. H
+holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i,
+and w_beta.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ class Quadratic:
 
 
 def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadratic:
-    """The 2-norm energy as a function of the angles, summed over the pairs whose jump is known (None: all)."""
+    """The 2-norm energy as a function of the angles,
+    summed over the pairs whose jump is known (None: all).
+    """
     grid, n, at = instance.grid, instance.grid.size, instance.stroke_index
     pairs = slice(None) if known is None else known
     i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
@@ -110,7 +113,9 @@ class Solver:
         self._inverse: Solve | None = None
 
     def step(self, matrix: Any, right: Floats, tolerance: float, free: Bools | None = None) -> Floats:
-        """The s with Hs = right on the free unknowns and s = 0 on the others, to a relative residual of `tolerance`."""
+        """The s with Hs = right on the free unknowns and s = 0 on the others,
+        to a relative residual of `tolerance`.
+        """
         if free is not None and not free.all():
             only = sparse.diags_array(free.astype(np.float64))
             right, matrix = only @ right, only @ matrix @ only + sparse.diags_array(1.0 - free)
@@ -122,7 +127,9 @@ class Solver:
         return self.attempt(matrix, right, tolerance)[0]
 
     def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:
-        """The step by few conjugate gradients with the present factorisation, and whether they were enough."""
+        """The step by few conjugate gradients with the present factorisation,
+        and whether they were enough.
+        """
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
         pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
         step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)

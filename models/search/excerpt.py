@@ -1,4 +1,6 @@
-"""A piece of a field with the ring of pixels round it: small enough for an exact solver, and put back when it is solved."""
+"""A piece of a field with the ring of pixels round it: small enough for an exact solver,
+and put back when it is solved.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,8 @@ from ..instance.instance import Instance
 class Excerpt:
     """A piece of a field, as a field on an instance of its own.
 
-    free: pixels of the piece that may change, shape (k,); the others are its rim. pixels (n,), pairs (m,): where the piece lies in
-    the whole field.
+    free: pixels of the piece that may change, shape (k,); the others are its rim. pixels (n,), pairs (m,):
+    where the piece lies in the whole field.
     """
 
     field: CrossField

@@ -1,6 +1,7 @@
 """A field in the making: angles that may be any real numbers, jumps in no range, both free to change.
 
-Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is searched for, they are in the way.
+Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is
+searched for, they are in the way.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.field import CrossField, relabelled
-from ..instance.grid import Floats, Grid, Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.grid import Floats, Ints
+from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
 from .box_qp import fitted
 
@@ -45,33 +46,18 @@ class FreeField:
         return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
 
     def bounded(self, over: Over = never) -> CrossField:
-        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha, beta and p."""
+        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha,
+        beta and p.
+        """
         return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only, for elsewhere every label will do."""
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only,
+    for elsewhere every label will do.
+    """
     size, at = instance.grid.size, instance.stroke_index
     lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
     upper = -lower
     lower[at], upper[at] = instance.alpha_lower[at], instance.alpha_upper[at]
     return lower, upper
-
-
-def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
-    """The best jump of each pair, in no range, and its energy; ties go to the smaller jump. Shapes (m,)."""
-    difference = alpha[grid.first] - alpha[grid.second]
-    lower = np.floor(-difference / HALF).astype(np.int32)
-    # The best even and the best odd jump are the two beside -2d/pi, unless that is a whole number.
-    candidates = lower + np.arange(-1, 3, dtype=np.int32)[:, None]
-    a = difference + HALF * candidates
-    b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
-    cost = np.round(2 * (a * a + b * b), 12)
-    best = np.argmin(cost, axis=0)
-    at = (best, np.arange(len(best)))
-    return candidates[at], cost[at]
-
-
-def parity_sign(p: Ints) -> Floats:
-    """The sign (-1)^p of each jump."""
-    return 1.0 - 2.0 * (p & 1).astype(np.float64)

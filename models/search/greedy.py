@@ -1,7 +1,8 @@
 """The greedy strategy of BendFields: the baseline to compare with, and the start of solvers and searches.
 
-It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between cells, cheapest first, with the
-angles brought up to date after every batch (docs/mathematics.md, 10; the strategy is that of mixed-integer quadrangulation).
+It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between
+cells, cheapest first, with the angles brought up to date after every batch (docs/mathematics.md, 10; the
+strategy is that of mixed-integer quadrangulation).
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from .energy import CLOSE, Solver, energy_at, local_step
-from .free_field import FreeField, free_jumps
+from .free_field import FreeField
 from .nearest_stroke import stroke_cells
 
 Progress = Callable[[int, int], object]
@@ -30,7 +32,8 @@ _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the sm
 
 
 def greedy(instance: Instance, *, progress: Progress | None = None, over: Over = never) -> CrossField:
-    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha, beta and p.
+    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha,
+    beta and p.
 
     The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
     all angles are solved for again (docs/mathematics.md, 10). The windows are kept by the last solve alone,
@@ -67,7 +70,9 @@ def _stitch(state: FreeField, cells: Ints, progress: Progress | None, over: Over
 
 
 def _settle(state: FreeField, known: Bools, solver: Solver | None) -> None:
-    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver, locally."""
+    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver,
+    locally.
+    """
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if solver is None:

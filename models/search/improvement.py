@@ -1,7 +1,9 @@
-"""Local improvement of a field: angles and jumps in turn, and whole curves that change to the other family of lines.
+"""Local improvement of a field: angles and jumps in turn,
+and whole curves that change to the other family of lines.
 
-A stroke is carried by line u. Which of two crossing curves is u where they meet is a choice of the jumps between them, and where curves
-cross at less than 45 degrees the cheapest jump takes both for one family. So turning a curve is tried for every curve.
+A stroke is carried by line u. Which of two crossing curves is u where they meet is a choice of the jumps
+between them, and where curves cross at less than 45 degrees the cheapest jump takes both for one family. So
+turning a curve is tried for every curve.
 """
 
 from __future__ import annotations
@@ -13,13 +15,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..field.field import CrossField
+from ..field.jumps import free_jumps, parity_sign, stepped
 from ..instance.angles import line_difference
 from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from .box_qp import least_in_box
 from .energy import CLOSE, Solver, energy_at
-from .free_field import FreeField, free_bounds, free_jumps, parity_sign
+from .free_field import FreeField, free_bounds
 from .greedy import greedy
 from .nearest_stroke import chamfer, stroke_cells
 
@@ -30,7 +33,8 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """The greedy field, improved as far as time allows: what solvers and searches start from, and whose jumps `qp-fixed` has by default.
+    """The greedy field, improved as far as time allows: what solvers and searches start from,
+    and whose jumps `qp-fixed` has by default.
 
     Deterministic where time does not cut it off.
     """
@@ -38,7 +42,8 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 
 
 def improved(field: CrossField, over: Over = never) -> CrossField:
-    """A field of no more 2-norm energy, from which neither best jumps, nor best angles, nor the turn of a curve lead further down.
+    """A field of no more 2-norm energy, from which neither best jumps, nor best angles,
+    nor the turn of a curve lead further down.
 
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
     turning seldom pays.
@@ -55,7 +60,9 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
 
 
 def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
-    """Solve within the bounds and choose jumps again, in turn, as long as the energy falls and until the time is over."""
+    """Solve within the bounds and choose jumps again, in turn,
+    as long as the energy falls and until the time is over.
+    """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
@@ -75,7 +82,8 @@ def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
 def _swap_lines(state: FreeField) -> None:
     """Exchange u and v where a stroke pixel's alpha has run against its window of the gauge `strokes`.
 
-    There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the other fits better.
+    There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the
+    other fits better.
     """
     instance, at = state.instance, state.instance.stroke_index
     if instance.gauge != "strokes":
@@ -89,7 +97,9 @@ def _swap_lines(state: FreeField) -> None:
 
 
 def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
-    """Let curves change to the other family of lines where that lowers the energy, those first that miss most."""
+    """Let curves change to the other family of lines where that lowers the energy,
+    those first that miss most.
+    """
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
     miss = CrossField(instance, state.alpha, state.beta, state.p).residual_r ** 2 * instance.w
@@ -120,13 +130,14 @@ def _turn_if_better(state: FreeField, own: Ints, solver: Solver, over: Over) -> 
 def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
     """The state after turning each pixel's labels back by `quarters`, solved: what v was before is now u.
 
-    The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other line.
+    The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other
+    line.
     """
     grid, sign = state.instance.grid, parity_sign(quarters)
-    jumps = state.p + quarters[grid.first] - quarters[grid.second]
-    trial = FreeField(state.instance, state.alpha - HALF * quarters, sign * state.beta, jumps)
+    trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
     energy = energy_at(trial.instance, trial.p)
-    # In the old labels the system has changed at these strokes only, so that the factorisation at hand is close.
+    # In the old labels the system has changed at these strokes only, so that the factorisation at hand is
+    # close.
     old = np.concatenate([np.ones(grid.size), sign])
     matrix = sparse.diags_array(old) @ energy.matrix @ sparse.diags_array(old)
     trial.x = trial.x + old * solver.step(matrix, -old * energy.slope(trial.x), CLOSE)
@@ -134,7 +145,9 @@ def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
 
 
 def stroke_curves(instance: Instance) -> Ints:
-    """The number of the curve of each stroke pixel: neighbours of nearly the same direction belong together. Shape (s,)."""
+    """The number of the curve of each stroke pixel:
+    neighbours of nearly the same direction belong together. Shape (s,).
+    """
     count = len(instance.theta)
     number = np.full(instance.grid.size, -1)
     number[instance.stroke_index] = np.arange(count)

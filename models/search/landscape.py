@@ -1,19 +1,23 @@
-"""The least energy as a function of the jumps: what every single jump would change, at once, and any change of jumps in no time.
+"""The least energy as a function of the jumps: what every single jump would change, at once,
+and any change of jumps in no time.
 
-For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H (models/search/energy.py). On a window of some hundred
-pixels G is a small dense matrix. A jump p_e of the pair (i, j) that changes by d
+For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
+(models/search/energy.py). On a window of some hundred pixels G is a small dense matrix. A jump p_e of the
+pair (i, j) that changes by d
 
 - moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 q r;
-- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p, which by the formula of
-  Woodbury changes G by a matrix of rank 2.
+- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p,
+  which by the formula of Woodbury changes G by a matrix of rank 2.
 
-So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change that is made costs one update of G.
-Angles outside the window stay as they are; the energy is that of the whole field.
+So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change
+that is made costs one update of G. Angles outside the window stay as they are; the energy is that of the
+whole field.
 
-Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of beta, (alpha + c, beta -+ c) costs
-w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends this state takes the difference of numbers as large as 1 / w_beta.
-So after every change the energy is taken from its definition (models/search/window_energy.py), and where the updates say another one, G is
-computed anew. Gains that no energy can have are not believed either.
+Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of
+beta, (alpha + c, beta -+ c) costs w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends
+this state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is taken
+from its definition (models/search/window_energy.py), and where the updates say another one, G is computed
+anew. Gains that no energy can have are not believed either.
 """
 
 from __future__ import annotations
@@ -25,10 +29,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
+from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from .energy import PULL, energy_at
-from .free_field import free_bounds, parity_sign
+from .free_field import free_bounds
 from .window_energy import WindowEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
@@ -44,7 +49,9 @@ _DRIFT: Final = (
 
 
 class Point(NamedTuple):
-    """Angles (alpha, beta) of the whole field, shape (2n,), jumps (m,), and the 2-norm energy that they have by definition."""
+    """Angles (alpha, beta) of the whole field, shape (2n,), jumps (m,),
+    and the 2-norm energy that they have by definition.
+    """
 
     energy: float
     x: Floats
@@ -63,7 +70,8 @@ class _State(NamedTuple):
 class Window:
     """Pixels whose angles are free and the pairs inside, by local numbers.
 
-    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second: (e,) local numbers of these ends.
+    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second:
+    (e,) local numbers of these ends.
     """
 
     instance: Instance
@@ -91,12 +99,13 @@ class Window:
 class Landscape:
     """The least energy over a window's angles at jumps that change step by step; angles outside stay.
 
-    energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite. Bounds of the angles are kept
-    by a stiff pull on those that would pass them, so that the energy is exact to about 1e-4 where bounds matter.
-    Without them (`gains` does not look ahead to bounds that a change would meet) walks lead
-    to points that look low and are not, so they are kept at every step.
+    energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite.
+    Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact
+    to about 1e-4 where bounds matter. Without them (`gains` does not look ahead to bounds that a change would
+    meet) walks lead to points that look low and are not, so they are kept at every step.
 
-    Raises LinAlgError, at the start and in a change, where the jumps leave a system that double precision cannot solve.
+    Raises LinAlgError, at the start and in a change, where the jumps leave a system that double precision
+    cannot solve.
     """
 
     def __init__(self, window: Window, x: Floats, p: Ints) -> None:
@@ -171,7 +180,9 @@ class Landscape:
         return gains
 
     def change(self, pairs: Ints, steps: Ints) -> None:
-        """Add steps, shape (c,), to the jumps of the window's pairs with those local numbers, each at most once."""
+        """Add steps, shape (c,), to the jumps of the window's pairs with those local numbers,
+        each at most once.
+        """
         try:
             self._follow(pairs, steps)
         except np.linalg.LinAlgError:
@@ -219,7 +230,9 @@ class Landscape:
         self._fresh = True
 
     def _settle(self) -> None:
-        """Keep the bounds, and solve anew where the updates have lost the energy; then bounds are kept once more."""
+        """Keep the bounds, and solve anew where the updates have lost the energy;
+        then bounds are kept once more.
+        """
         for _ in range(2):
             with suppress(np.linalg.LinAlgError):
                 self._keep_bounds()
@@ -260,7 +273,9 @@ class Landscape:
         return places + len(self.window.pixels), added
 
     def _small(self, places: Ints, added: Floats) -> Floats:
-        """C (1 + G C)^-1 for couplings C that are added at these places: H + C has the inverse G - G (...) G."""
+        """C (1 + G C)^-1 for couplings C that are added at these places:
+        H + C has the inverse G - G (...) G.
+        """
         inside = self._inverse[np.ix_(places, places)]
         small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
         return small

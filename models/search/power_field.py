@@ -1,6 +1,7 @@
 """The power field: crosses by smoothing exp(4 i theta), which needs no jumps.
 
-The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles everywhere.
+The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles
+everywhere.
 """
 
 from __future__ import annotations
@@ -8,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.field import CrossField, relabelled
+from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from .energy import energy_at, factored, stroke_weight
-from .free_field import free_jumps
 
 
 def power_field(instance: Instance) -> CrossField:

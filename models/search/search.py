@@ -1,9 +1,11 @@
 """A search for a field of low 2-norm energy: from the greedy field downwards, window by window, on all cores.
 
-Every round some windows of the grid are explored (models/search/walk.py) with all else fixed; what is lower is taken over, and angles and
-jumps of the whole grid follow from time to time. A small grid is one window. On one kind of processor the field at the end of a round depends
-on instance and seed alone, not on the number of processes, unless seconds are given and run out: then the clock decides where the start, the
-grids of lower resolution and the last round are cut off. What a round that was cut off has found is taken over if it is lower.
+Every round some windows of the grid are explored (models/search/walk.py) with all else fixed; what is lower
+is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one window. On
+one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
+processes, unless seconds are given and run out: then the clock decides where the start, the grids of lower
+resolution and the last round are cut off. What a round that was cut off has found is taken over if it is
+lower.
 """
 
 from __future__ import annotations
@@ -52,7 +54,8 @@ _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found: the field, the whole rounds it took, (round, energy) of every improvement, and how it ended.
+    """What a search found: the field, the whole rounds it took, (round, energy) of every improvement,
+    and how it ended.
 
     ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
     """
@@ -73,7 +76,8 @@ def search(
     start: CrossField | None = None,
     progress: Progress = lambda *_: None,
 ) -> Search:
-    """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off, the improved greedy field.
+    """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off,
+    the improved greedy field.
 
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
@@ -138,7 +142,9 @@ class _Limits:
 def _from_coarse(
     instance: Instance, seed: int, limits: _Limits, explorers: Explorers
 ) -> Iterator[CrossField]:
-    """Fields that were found on the grid of half the resolution, brought to this one, the best of there first."""
+    """Fields that were found on the grid of half the resolution, brought to this one,
+    the best of there first.
+    """
     coarse = halved(instance)
     if coarse is None:
         return
@@ -155,7 +161,9 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of the greedy field, of what the user gives, and, if there is time, of the power field, all improved while there is."""
+    """The best of the greedy field, of what the user gives, and, if there is time, of the power field,
+    all improved while there is.
+    """
     fields = [first_field(instance, limits.over)]
     if given is not None:
         fields.append(improved(given, limits.over))

@@ -1,7 +1,8 @@
-"""A walk over the jumps of one window of the grid: kick, follow the valley down, keep what is lower (iterated local search).
+"""A walk over the jumps of one window of the grid: kick, follow the valley down,
+keep what is lower (iterated local search).
 
-After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump at every step, uphill too, but
-none of a jump that has just changed, unless that is the lowest point so far.
+After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump
+at every step, uphill too, but none of a jump that has just changed, unless that is the lowest point so far.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ _REST: Final = (4, 12)  # changes for which a jump stays as it is once it has ch
 class Task:
     """A window to explore, from a field on.
 
-    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the window, shape (n,);
-    curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to try; seed: of their choice;
-    deadline: when to end.
+    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the window,
+    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to
+    try; seed: of their choice; deadline: when to end.
     """
 
     instance: Instance
@@ -48,7 +49,8 @@ class Task:
 
 
 class Explored(NamedTuple):
-    """The point of least energy, outside the window that of the task, or None when none was lower by more than 1e-7.
+    """The point of least energy, outside the window that of the task,
+    or None when none was lower by more than 1e-7.
 
     whole: whether all kicks were tried; if not, the clock has had a say in the point.
     """
@@ -60,7 +62,8 @@ class Explored(NamedTuple):
 def explore(task: Task) -> Explored:
     """What was found in a window; energies are those of the definition, within all bounds of the angles.
 
-    The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several threads end in other digits.
+    The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several
+    threads end in other digits.
     """
     with threadpool_limits(1, user_api="blas"), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
@@ -92,7 +95,8 @@ def _explore(task: Task, over: Over) -> Explored:
 def _kicked(
     land: Landscape, kick: Change, rng: np.random.Generator, goal: float, over: Over
 ) -> Landscape | None:
-    """The landscape at the lowest point below `goal` of the walk after a kick, anew: rounding of many updates must not add up.
+    """The landscape at the lowest point below `goal` of the walk after a kick, anew:
+    rounding of many updates must not add up.
 
     None when there is no such point, or none that can be computed.
     """

@@ -1,4 +1,6 @@
-"""The energy of a field as a function of the angles in a window, by its definition: squares of residuals, which no update can spoil."""
+"""The energy of a field as a function of the angles in a window, by its definition: squares of residuals,
+which no update can spoil.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..field.field import CrossField
+from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF
-from .free_field import parity_sign
 
 if TYPE_CHECKING:
     from .landscape import Window
 
 
 class WindowEnergy:
-    """The 2-norm energy of the whole field where only the angles in a window and the jumps between its pixels change."""
+    """The 2-norm energy of the whole field where only the angles in a window and the
+    jumps between its pixels change.
+    """
 
     def __init__(self, window: Window, x: Floats, p: Ints) -> None:
         """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the window stay."""
@@ -51,7 +55,9 @@ class WindowEnergy:
 
 
 def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
-    """The part of the energy that is none of the window's: of other pixels, and without these pairs and strokes."""
+    """The part of the energy that is none of the window's: of other pixels,
+    and without these pairs and strokes.
+    """
     instance = field.instance
     pair = field.residual_a**2 + field.residual_b**2
     stroke, skew = instance.w * field.residual_r**2, field.beta[~free] ** 2

@@ -1,8 +1,8 @@
 """Reading bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-Any paper that is lighter than the strokes will do: its level is taken from the picture. Directions are found at the
-picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness and coherence, so that
-junctions and corners drop out (docs/mathematics.md, 1).
+Any paper that is lighter than the strokes will do: its level is taken from the picture. Directions are found
+at the picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness
+and coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations
@@ -72,14 +72,19 @@ class Picture:
 
     @cached_property
     def stroke_width(self) -> float:
-        """Typical width of a stroke in pixels of the arrays, at least 1: twice its area over the length of its two edges."""
+        """Typical width of a stroke in pixels of the arrays, at least 1:
+        twice its area over the length of its two edges.
+        """
         down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
-        # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is turned.
+        # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is
+        # turned.
         edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
     def covers(self, frame: Frame) -> tuple[Cover, Cover]:
-        """The cover by curvature lines and by other strokes; everything is a curvature line unless red and other both occur."""
+        """The cover by curvature lines and by other strokes;
+        everything is a curvature line unless red and other both occur.
+        """
         share = float((self.ink * self.red).sum() / self.ink.sum())
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
             return self._cover(self.ink, frame), _no_cover(frame)
@@ -101,14 +106,17 @@ def _no_cover(frame: Frame) -> Cover:
 
 
 def stroke_directions(ink: Ink, width: float) -> Ink:
-    """Double-angle vectors (y up) of the strokes, as long as the structure tensor is coherent (0..1); shape [h, w, 2]."""
+    """Double-angle vectors (y up) of the strokes, as long as the structure tensor is coherent (0..1);
+    shape [h, w, 2].
+    """
     from scipy import ndimage
 
     # Derivatives of a Gaussian favour no direction, unlike differences of neighbours.
     down, right = (
         ndimage.gaussian_filter(ink, _BLUR, order=order, mode="constant") for order in ((1, 0), (0, 1))
     )
-    # The double angle of the tangent is opposite to that of the gradient; 2 gx gy changes its sign once more as y turns up.
+    # The double angle of the tangent is opposite to that of the gradient; 2 gx gy changes its sign once more
+    # as y turns up.
     tensor = np.stack([down**2 - right**2, 2 * right * down, right**2 + down**2])
     scale = max(1.5, 0.6 * width)
     cosine, sine, energy = (
@@ -121,7 +129,8 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
 def read_picture(data: bytes, size: int) -> Picture:
     """The ink of a bitmap, fine enough for a grid of `size` pixels.
 
-    Raises InputError when the bytes are no picture, are cut off, declare absurd dimensions, or show only paper.
+    Raises InputError when the bytes are no picture, are cut off, declare absurd dimensions, or show only
+    paper.
     """
     image = _opened(data)
     width, height = image.size
@@ -171,13 +180,16 @@ def _opened(data: bytes) -> Any:
 def _check_size(width: int, height: int) -> None:
     if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise InputError(
-            f"declares {width} x {height} pixels; at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
+            f"declares {width} x {height} pixels; "
+            f"at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
         )
 
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself, Pillow by its log."""
+    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself,
+    Pillow by its log.
+    """
     with _SILENCE:
         try:
             kept = os.dup(2)
@@ -200,8 +212,8 @@ def _short(error: Exception) -> str:
 
 
 def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
-    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows: colours of all pixels
-    at once would take many times the memory of the picture.
+    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows:
+    colours of all pixels at once would take many times the memory of the picture.
     """
     width, height = image.size
     rows = max(1, _BAND // (width * multiple)) * multiple
@@ -211,7 +223,10 @@ def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
 
 
 def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
-    """The value of white in pictures of 16 bit and floating point greys, None in others. Raises InputError for values that are not finite."""
+    """The value of white in pictures of 16 bit and floating point greys, None in others.
+
+    Raises InputError for values that are not finite.
+    """
     if image.mode.startswith("I;16") or image.mode == "I":
         return 65535.0
     if image.mode != "F":
@@ -224,7 +239,9 @@ def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
 
 
 def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
-    """The picture composited on white as uint8 [h, w, 1 or 3]; greys of which `white` is the lightest are scaled down."""
+    """The picture composited on white as uint8 [h, w, 1 or 3];
+    greys of which `white` is the lightest are scaled down.
+    """
     from PIL import Image
 
     if white is not None:
@@ -274,7 +291,9 @@ def _specks(ink: Ink) -> Bools:
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
-    """1 where the ink around is red, else 0: colour is coarser than brightness in JPEG, so it is looked at blurred."""
+    """1 where the ink around is red, else 0: colour is coarser than brightness in JPEG,
+    so it is looked at blurred.
+    """
     from scipy import ndimage
 
     if rgb.shape[-1] == 1:

@@ -23,14 +23,19 @@ Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 MARGIN: Final = 0.04
 """Empty border round a drawing, in parts of its longer side; at least one pixel."""
 LEAST_R: Final = 0.5
-"""Least R of a pixel with a direction. Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither
-of them; a single line that bends by as much as a right angle inside the pixel still has R = 0.64."""
+"""Least R of a pixel with a direction.
+
+Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither of them; a single line
+that bends by as much as a right angle inside the pixel still has R = 0.64.
+"""
 _NUDGE: Final = 1e-9  # of a pixel: what runs exactly along a pixel edge is shared by both sides
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the grid lies on the sketch: top left corner (x, y), side of a pixel, rows and columns; y down."""
+    """Where the grid lies on the sketch: top left corner (x, y), side of a pixel,
+    rows and columns; y down.
+    """
 
     x: float
     y: float
@@ -45,7 +50,9 @@ class Frame:
 
     @property
     def edges(self) -> tuple[Floats, Floats]:
-        """Where the rows begin and end in y, shape (height + 1,), and the columns in x, shape (width + 1,)."""
+        """Where the rows begin and end in y, shape (height + 1,), and the columns in x,
+        shape (width + 1,).
+        """
         rows: Floats = self.y + np.arange(self.height + 1.0) * self.pixel
         columns: Floats = self.x + np.arange(self.width + 1.0) * self.pixel
         return rows, columns
@@ -56,8 +63,8 @@ class Cover:
     """What one kind of stroke does on each pixel.
 
     amount: float [height, width], length of stroke in pixel sides; 1 = one stroke straight across.
-    direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1 for
-    one direction and near 0 at crossings and corners.
+    direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1
+    for one direction and near 0 at crossings and corners.
     """
 
     amount: Floats
@@ -65,14 +72,18 @@ class Cover:
 
     @property
     def weight(self) -> Floats:
-        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height, width] (docs/mathematics.md, 1)."""
+        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height,
+        width] (docs/mathematics.md, 1).
+        """
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
         return weight
 
 
 def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
-    """The frame of `size` pixels on its longer side round a box (left, top, right, bottom), which sits in its middle."""
+    """The frame of `size` pixels on its longer side round a box (left, top, right, bottom),
+    which sits in its middle.
+    """
     left, top, right, bottom = box
     longer = max(right - left, bottom - top)
     border = MARGIN if margin else 0.0
@@ -132,7 +143,8 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     crossings = np.maximum(np.ceil(high) - first, 0).astype(np.int64)
     if count + crossings.sum() > MAX_PIECES:
         raise InputError(
-            f"its strokes fall into more than {MAX_PIECES} pieces on this grid; simplify the drawing or choose a smaller size"
+            f"its strokes fall into more than {MAX_PIECES} pieces on this grid; "
+            "simplify the drawing or choose a smaller size"
         )
     owners, cuts = [np.arange(count)], [np.zeros(count)]
     for axis in (0, 1):
@@ -150,7 +162,9 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
 
 
 def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
-    """Sums [c, height, width] of values (c, m) at points (m, 2) given in pixels; what falls off the grid is left out."""
+    """Sums [c, height, width] of values (c, m) at points (m, 2) given in pixels;
+    what falls off the grid is left out.
+    """
     column, row = np.floor(points).astype(np.int64).T
     kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
     cell = row[kept] * frame.width + column[kept]

@@ -37,16 +37,18 @@ def lines_as_cubics(start: Floats, end: Floats) -> Floats:
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:
-    """Straight segments (m, 2, 2) that stay within `tolerance` of the curves (k, 4, 2), and the curve (m,) of each.
+    """Straight segments (m, 2, 2) that stay within `tolerance` of the curves (k, 4, 2),
+    and the curve (m,) of each.
 
-    A cubic cut into n equal steps is off by at most 3/4 M / n^2, with M the longer second difference of its control
-    points, because |B''| <= 6 M. Raises InputError when that needs more than MAX_SEGMENTS.
+    A cubic cut into n equal steps is off by at most 3/4 M / n^2, with M the longer second difference of its
+    control points, because |B''| <= 6 M. Raises InputError when that needs more than MAX_SEGMENTS.
     """
     bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
     steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)
     if steps.sum() > MAX_SEGMENTS:
         raise InputError(
-            f"has more than {MAX_SEGMENTS} segments at this size; simplify the drawing or choose a smaller size"
+            f"has more than {MAX_SEGMENTS} segments at this size; "
+            "simplify the drawing or choose a smaller size"
         )
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
@@ -55,7 +57,9 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
 
 
 def bounding_box(points: Floats) -> tuple[float, float, float, float]:
-    """Least x, least y, greatest x, greatest y of the curves themselves (their control points may lie outside)."""
+    """Least x, least y, greatest x, greatest y of the curves themselves (their
+    control points may lie outside).
+    """
     span = float(np.ptp(points.reshape(-1, 2), axis=0).max())
     corners = flatten(points, _BOX_TOLERANCE * span)[0].reshape(-1, 2) if span > 0 else points.reshape(-1, 2)
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()

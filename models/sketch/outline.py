@@ -9,20 +9,26 @@ import numpy as np
 from ..instance.grid import Bools, Floats
 
 GAPS: Final = (0.03, 0.06, 0.12)
-"""Widths of gaps in an outline that still count as closed, in parts of the grid's longer side, tried in turn."""
+"""Widths of gaps in an outline that still count as closed, in parts of the grid's longer side,
+tried in turn.
+"""
 ENCLOSED: Final = 0.25
 """Least share of the strokes' convex hull that a silhouette must fill; otherwise the drawing is open."""
 CRUMB: Final = 0.01
-"""Least share of a region for a part of its own; smaller ones are left over where a stroke grazes the outline."""
+"""Least share of a region for a part of its own;
+smaller ones are left over where a stroke grazes the outline.
+"""
 HELD: Final = 2.0
-"""Least length of stroke, in pixel sides, for a part of its own; less is a stroke that ends a little beyond an outline."""
+"""Least length of stroke, in pixel sides, for a part of its own;
+less is a stroke that ends a little beyond an outline.
+"""
 
 
 def silhouette(strokes: Bools) -> Bools:
     """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
 
-    The narrowest of GAPS for which the drawing encloses something decides; an open drawing, which encloses next to
-    nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
+    The narrowest of GAPS for which the drawing encloses something decides; an open drawing, which encloses
+    next to nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
     """
     hull = _hull_area(strokes)
     for gap in GAPS:
@@ -35,8 +41,9 @@ def silhouette(strokes: Bools) -> Bools:
 def parts_with(region: Bools, weight: Floats) -> Bools:
     """The 4-connected parts of a region that curvature lines run through: nothing is known of the others.
 
-    weight: float [height, width], w of the stroke pixels and 0 elsewhere. A part needs strokes of HELD in all, and must be no
-    crumb: at least CRUMB of the region and four pixels. The part with most strokes is always kept.
+    weight: float [height, width], w of the stroke pixels and 0 elsewhere. A part needs strokes of HELD in
+    all, and must be no crumb: at least CRUMB of the region and four pixels. The part with most strokes is
+    always kept.
     """
     from scipy import ndimage
 

@@ -1,7 +1,8 @@
 """The outlines of SVG shapes: path data, point lists and basic shapes as straight lines and cubic Beziers.
 
-svgelements knows the grammar of path data, the arcs and the basic shapes. Its own paths look back to the last move at each close, which takes
-time that grows with the square of their length; so its lexer draws on an outline here, in one pass.
+svgelements knows the grammar of path data, the arcs and the basic shapes. Its own paths look back to the last
+move at each close, which takes time that grows with the square of their length; so its lexer draws on an
+outline here, in one pass.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ Coordinates = tuple[float, float] | str
 def outline(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
     """Control points (k, 4, 2) of a shape in its own units. page: width and height that percentages are of.
 
-    Raises InputError, which does not name the shape, for damaged numbers and for more than MAX_CURVES segments.
+    Raises InputError, which does not name the shape, for damaged numbers and for more than MAX_CURVES
+    segments.
     """
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told where it is placed
@@ -115,7 +117,8 @@ def _readable(length: str) -> str | float:
 def too_many_curves() -> InputError:
     """The refusal of a drawing with more than MAX_CURVES segments."""
     return InputError(
-        f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; simplify the drawing"
+        f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; "
+        "simplify the drawing"
     )
 
 
@@ -131,7 +134,8 @@ class _Point:
 class _Outline:
     """What svgelements' lexer draws on: straight lines and cubics as points of the complex plane.
 
-    The lexer gives absolute points and says beside them what they were; only `horizontal` and `vertical` are left to do.
+    The lexer gives absolute points and says beside them what they were; only `horizontal` and `vertical` are
+    left to do.
 
     smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
     """
@@ -233,7 +237,9 @@ class _Outline:
             raise too_many_curves()
 
     def _reflected(self, kind: int) -> complex:
-        """The first control point of a smooth curve: the last one reflected, after a curve of the same kind."""
+        """The first control point of a smooth curve: the last one reflected,
+        after a curve of the same kind.
+        """
         return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
 
     def _at(self, point: Coordinates) -> complex:

@@ -1,7 +1,7 @@
 """From a sketch to an instance: SVG, bitmap or .scap, with or without a mask.
 
-Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the field, so their pixels
-leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
+Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
+field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations
@@ -34,12 +34,14 @@ MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
 LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w carry no direction worth a constraint: a corner that is barely touched, a crossing."""
+"""Stroke pixels with a smaller w carry no direction worth a constraint: a corner that is barely touched,
+a crossing.
+"""
 CUT: Final = 0.5 - 1e-9
 """Length in pixel sides from which another stroke (silhouette, crease) takes a pixel out of the mask.
 
-A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at most: so one half
-is the greatest threshold that never leaves a gap between 4-neighbours.
+A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at
+most: so one half is the greatest threshold that never leaves a gap between 4-neighbours.
 """
 _PICTURE: Final = re.compile(rb"\x89PNG|\xff\xd8\xff|RIFF|II\*\0|MM\0\*|BM|GIF8|P[1-6]\s", re.DOTALL)
 _FLATNESS: Final = 0.02  # of a pixel
@@ -68,15 +70,17 @@ def read_sketch(
 ) -> Instance:
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
-    size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin of 4 %, at least
-    one pixel, and the field is solved inside the drawing's outline (`silhouette`), in the parts that curvature lines run through;
-    an open drawing gets the whole rectangle.
-    mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches (viewBox; the declared
-    size of a .scap): white = solve. The grid is then the white part; a pixel counts from half its area on.
+    size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
+    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`silhouette`), in the
+    parts that curvature lines run through; an open drawing gets the whole rectangle.
+    mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
+    (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
+    from half its area on.
     gauge: as in Instance. name: the instance's name; by default made from the file name.
 
-    Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the length of the mean
-    double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry none. Raises InputError, with the file, for anything that cannot be used.
+    Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
+    length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
+    none. Raises InputError, with the file, for anything that cannot be used.
     """
     path = Path(path)
     check_size(size)
@@ -95,7 +99,10 @@ def read_sketch(
 def instance_of(
     data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
 ) -> Instance:
-    """The instance of a sketch that is given as the bytes of a file; otherwise as read_sketch. Raises InputError."""
+    """The instance of a sketch that is given as the bytes of a file; otherwise as read_sketch.
+
+    Raises InputError.
+    """
     sketch = _sketch(data, size, Path(source).suffix.lower())
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
@@ -121,17 +128,22 @@ def instance_of(
 
 
 def name_from(text: str) -> str:
-    """An instance name made from any text: lower case, runs of other characters as `_`, a letter first, at most 32 long."""
+    """An instance name made from any text: lower case, runs of other characters as `_`, a letter first,
+    at most 32 long.
+    """
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
 
 
 def check_memory(pixels: int, available: int | None) -> None:
-    """Nothing, or InputError when a grid of so many pixels needs more bytes than are available (None: not known)."""
+    """Nothing, or InputError when a grid of so many pixels needs more bytes than
+    are available (None: not known).
+    """
     needed = pixels * BYTES_PER_PIXEL
     if available is not None and needed > available:
         raise InputError(
-            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, but {available / 1e9:.1f} GB are free; choose a smaller size"
+            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
+            f"but {available / 1e9:.1f} GB are free; choose a smaller size"
         )
 
 
@@ -210,7 +222,10 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 
 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask file, and the mask on it. Raises InputError about the mask's file."""
+    """The frame round the white part of a mask file, and the mask on it.
+
+    Raises InputError about the mask's file.
+    """
     try:
         white = read_white(_bytes_of(path))
         return _mask_on_grid(white, page, size)
@@ -227,7 +242,8 @@ def _mask_on_grid(
     wanted = (round(width), round(height))
     if white.shape[::-1] != wanted:
         raise InputError(
-            f"the mask has {white.shape[1]} x {white.shape[0]} pixels, but the sketch {wanted[0]} x {wanted[1]}; make them equal"
+            f"the mask has {white.shape[1]} x {white.shape[0]} pixels, "
+            f"but the sketch {wanted[0]} x {wanted[1]}; make them equal"
         )
     if not white.any():
         raise InputError("the mask is black all over; paint white what shall be solved")

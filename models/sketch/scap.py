@@ -1,8 +1,9 @@
 """Reading .scap, the text format of StrokeStrip and StripMaker for over-sketched pen strokes.
 
-Line 1 `#width height`, then optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally `@thickness`,
-one sample `x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards. The declared size need not
-bound the samples. Strokes of one cluster are meant as one curve; here each counts on its own.
+Line 1 `#width height`, then optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally
+`@thickness`, one sample `x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards.
+The declared size need not bound the samples. Strokes of one cluster are meant as one curve; here each counts
+on its own.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ def read_scap(data: bytes) -> Curves:
         if line == "{":
             if opened:
                 raise InputError(
-                    f"line {number}: a stroke starts inside the stroke of line {opened}; close that one with }}"
+                    f"line {number}: a stroke starts inside the stroke of line {opened}; "
+                    "close that one with }"
                 )
             samples, opened = [], number
         elif line == "}":
@@ -69,7 +71,8 @@ def _canvas(line: str) -> tuple[float, float, float, float]:
         raise InputError(f"line 1: expected '#width height', found {line.strip()[:30]!r}") from error
     if not (min(width, height) >= LEAST_LENGTH and max(width, height) <= _GREATEST):
         raise InputError(
-            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to {_GREATEST:g}"
+            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to "
+            f"{_GREATEST:g}"
         )
     return 0.0, 0.0, width, height
 

@@ -1,7 +1,8 @@
 """Style sheets of SVG drawings: which properties they give to an element.
 
-tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and what these make together. Selectors that
-look at other elements are left out, because matching them takes time that grows without bound in the depth of a drawing.
+tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and what
+these make together. Selectors that look at other elements are left out, because matching them takes time that
+grows without bound in the depth of a drawing.
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ class StyleSheet:
     def properties(self, tag: str, identifier: str, classes: str) -> Mapping[str, str]:
         """The properties of an element: the most specific rule decides, and of equal ones the last.
 
-        Raises InputError when rules and elements are so many that looking takes more than MAX_RULE_CHECKS comparisons.
+        Raises InputError when rules and elements are so many that looking takes more than MAX_RULE_CHECKS
+        comparisons.
         """
         asked = (tag, identifier if f"#{identifier}" in self.rules else "", classes)
         if asked not in self._known:
@@ -87,7 +89,8 @@ class StyleSheet:
         self.checks += more
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
-                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons of rules with elements; export it without style sheets"
+                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons of rules with elements; "
+                "export it without style sheets"
             )
 
     def add(self, selector: _Selector, properties: Mapping[str, str], place: int) -> None:

@@ -1,12 +1,14 @@
 """Reading SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements knows the grammars of path data, transforms, lengths and colours, tinycss2 that of style sheets. The document itself is walked here:
-what it leaves to a browser (style sheets at any place, `use` of symbols, invisible parts) decides which strokes there are. Each element is parsed
-once, however often it is used, and the work is bounded by the limits of `input_limits`. The bytes first pass defusedxml, which refuses entities; nothing outside the file is ever loaded: pictures and `use` of other files are left
-out. Clip paths, masks, dashes and text are not looked at.
+svgelements knows the grammars of path data, transforms, lengths and colours, tinycss2 that of style sheets.
+The document itself is walked here: what it leaves to a browser (style sheets at any place, `use` of symbols,
+invisible parts) decides which strokes there are. Each element is parsed once, however often it is used, and
+the work is bounded by the limits of `input_limits`. The bytes first pass defusedxml, which refuses entities;
+nothing outside the file is ever loaded: pictures and `use` of other files are left out. Clip paths, masks,
+dashes and text are not looked at.
 
-What counts as a stroke: the path of every shape with a visible `stroke`; and the outline of a shape that is only filled, since drawing programs
-export strokes as filled outlines. White (paper) counts as invisible.
+What counts as a stroke: the path of every shape with a visible `stroke`; and the outline of a shape that is
+only filled, since drawing programs export strokes as filled outlines. White (paper) counts as invisible.
 """
 
 from __future__ import annotations
@@ -68,7 +70,8 @@ class _Place:
 def read_svg(data: bytes) -> Curves:
     """The strokes of an SVG drawing in the units of its viewBox.
 
-    Raises InputError for malformed or unsafe XML, damaged path data, too many elements, and when nothing is drawn.
+    Raises InputError for malformed or unsafe XML, damaged path data, too many elements, and when nothing is
+    drawn.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
@@ -125,7 +128,9 @@ class _Walk:
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
-        """The style of every visible shape and its control points in the units of the root, in drawing order."""
+        """The style of every visible shape and its control points in the units of the root,
+        in drawing order.
+        """
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -175,7 +180,8 @@ class _Walk:
             return []
         if len(place.uses) == MAX_USE_DEPTH:
             raise InputError(
-                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; expand them in the drawing program"
+                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; "
+                "expand them in the drawing program"
             )
         moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
         uses = (*place.uses, link)
@@ -234,7 +240,8 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
         return None
     if len(text) > MAX_TRANSFORM:
         raise InputError(
-            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; export the drawing again"
+            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; "
+            "export the drawing again"
         )
     try:
         return Matrix(text)
@@ -243,7 +250,9 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
 
 
 def _view(place: _Place, element: Element) -> Any:
-    """The transform inside an inner svg or a symbol: its viewBox fitted into its width and height, centred."""
+    """The transform inside an inner svg or a symbol: its viewBox fitted into its width and height,
+    centred.
+    """
     from svgelements import Matrix
 
     if _tag(element) not in ("svg", "symbol"):
@@ -271,7 +280,9 @@ def _painted(style: Mapping[str, str]) -> bool:
 
 
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
-    """Red, green, blue in [0, 1] of the stroke, or of the fill when there is no stroke; white when there is neither."""
+    """Red, green, blue in [0, 1] of the stroke, or of the fill when there is no stroke;
+    white when there is neither.
+    """
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour

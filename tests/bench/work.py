@@ -1,7 +1,8 @@
-"""One measurement in its own process: `python work.py JSON` prints seconds, CPU seconds, bytes and peak memory as JSON.
+"""One measurement in its own process: `python work.py JSON` prints seconds, CPU seconds,
+bytes and peak memory as JSON.
 
-A task is a function that prepares what is not measured and gives the function that is. The same small model goes through it first,
-so that imports and compiled expressions, which a process pays once, count for nobody.
+A task is a function that prepares what is not measured and gives the function that is. The same small model
+goes through it first, so that imports and compiled expressions, which a process pays once, count for nobody.
 """
 
 from __future__ import annotations
@@ -82,7 +83,9 @@ def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Meas
 
 
 def linopy(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """linopy: building the model from whole arrays, and its LP writer or, for MPS, that of HiGHS behind it."""
+    """linopy: building the model from whole arrays, and its LP writer or, for MPS,
+    that of HiGHS behind it.
+    """
     import linopy as lib
     import xarray as xr
 
@@ -221,7 +224,9 @@ TITLES = {
 
 
 def sections(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """Seconds and bytes of each section, as its chunks come; preparation counts for the section that needs it first."""
+    """Seconds and bytes of each section, as its chunks come;
+    preparation counts for the section that needs it first.
+    """
 
     def run() -> dict[str, Any]:
         found: dict[str, list[float]] = {}
@@ -336,7 +341,9 @@ def peak_memory() -> int:
 
 
 def measured(task: str, size: int, folder: str, *, once: bool = False, **given: Any) -> dict[str, Any]:
-    """What a task took: after the small model, and after what is not measured. Median of three, or one run when it is long.
+    """What a task took: after the small model, and after what is not measured.
+
+    Median of three, or one run when it is long.
 
     once: one run, and no small model first.
     """
@@ -354,7 +361,9 @@ def measured(task: str, size: int, folder: str, *, once: bool = False, **given: 
 
 
 def remove_written(path: Path) -> None:
-    """Every run writes new files: to replace one, a file system may send the new blocks to the disk at once, as ext4 does."""
+    """Every run writes new files: to replace one, a file system may send the new blocks to the disk at once,
+    as ext4 does.
+    """
     for old in (path, path.with_suffix(".row"), path.with_suffix(".col"), path.with_name("copy")):
         old.unlink(missing_ok=True)
     shutil.rmtree(path.with_name("set"), ignore_errors=True)

@@ -1,4 +1,6 @@
-"""The same instances on every kind of processor: other kernels of OpenBLAS, NumPy without its faster loops, a C library without FMA."""
+"""The same instances on every kind of processor: other kernels of OpenBLAS, NumPy without its faster loops,
+a C library without FMA.
+"""
 
 import json
 import os
@@ -13,7 +15,8 @@ HASHES = """
 import json
 import crossfield as cf
 from crossfield.models.sketch.samples import SAMPLES
-print(json.dumps({name: cf.sample(name, 10).sha256 for name in SAMPLES if name not in {"skew", "saddle", "singular"}}))
+names = [name for name in SAMPLES if name not in {"skew", "saddle", "singular"}]
+print(json.dumps({name: cf.sample(name, 10).sha256 for name in names}))
 """
 PLAIN = {
     "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),

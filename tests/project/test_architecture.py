@@ -72,7 +72,8 @@ def test_imports_of_all_kinds_are_seen(rooms, tmp_path):
         "models/field/angles.py": "from . import other\nfrom ..grid.cells import at\n",
         "export/__init__.py": "",
         "export/cli/__init__.py": "",
-        "export/cli/app.py": "def late():\n    from ...models import grid, field\n    from ...templates import x\n",
+        "export/cli/app.py": "def late():\n    from ...models import grid, field\n"
+        "    from ...templates import x\n",
         "templates/__init__.py": "",
     }
     for name, text in files.items():

@@ -1,4 +1,6 @@
-"""What comments, docstrings and pages cite is there: rules, sections, tests, files and links; and every page is reached from the index."""
+"""What comments, docstrings and pages cite is there: rules, sections, tests, files and links;
+and every page is reached from the index.
+"""
 
 from __future__ import annotations
 
@@ -135,13 +137,16 @@ def test_links_lead_to_files_and_headings():
 
 
 def test_paths_that_pages_and_comments_name_are_there():
-    """Words like `export/formats/lp.py` or `models/search/`, with NAME for any name, and modules by their dotted name."""
+    """Words like `export/formats/lp.py` or `models/search/`, with NAME for any name,
+    and modules by their dotted name.
+    """
     path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
     missing = []
     for path in [*PAGES, *modules()]:
         for found in path_like.findall(said(path)):
             if path.suffix == ".j2" or (path.suffix == ".py" and "." not in found.rpartition("/")[2]):
-                continue  # layouts name each other from their own folder, and in code words with a / may be anything
+                # layouts name each other from their own folder, and in code words with a / may be anything
+                continue
             if not any(ROOT.glob(found.rstrip("/").replace("NAME", "*"))):
                 missing.append((place(path), found))
         for dotted in re.findall(

@@ -1,4 +1,6 @@
-"""The spellings that our writers use are read alike by every program; docs/format-rules.md tells of the others."""
+"""The spellings that our writers use are read alike by every program;
+docs/format-rules.md tells of the others.
+"""
 
 from __future__ import annotations
 

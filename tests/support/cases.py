@@ -21,10 +21,17 @@ MASKS = {
     "far": ["." * 98 + "###"],
     "full": ["####"] * 3,
 }
-"""Shapes by name: with a hole, of several parts (one of them a single pixel), lines, one pixel, three-digit columns, 3 x 4."""
+"""Shapes by name: with a hole, of several parts (one of them a single pixel), lines, one pixel,
+three-digit columns, 3 x 4.
+"""
 
 _VARIANTS: list[tuple[str, dict[str, Any]]] = [
-    *((name, {"shape": shape}) for name in ("minlp-quartic", "milp-mccormick", "qp-fixed") for shape in MASKS if shape != "hole"),
+    *(
+        (name, {"shape": shape})
+        for name in ("minlp-quartic", "milp-mccormick", "qp-fixed")
+        for shape in MASKS
+        if shape != "hole"
+    ),
     ("minlp-parity", {"shape": "pixel"}),
     ("miqcp-bilinear", {"shape": "parts"}),
     ("miqcp-bilinear-l1", {"shape": "pixel"}),
@@ -44,7 +51,7 @@ _VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("milp-mccormick", {"stroke_norm": 2, "beta_norm": 2}),
     *((name, {"pinned": True}) for name in FORMULATIONS if name != "qp-fixed"),
     *((name, {"pinned": "outside"}) for name in FORMULATIONS),
-]  # fmt: skip
+]
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     " ".join([name, *(f"{key}={value}" for key, value in given.items())]): (name, given)

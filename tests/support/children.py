@@ -1,4 +1,6 @@
-"""Processes of the tests' own: programs that are interrupted, as by Ctrl-C on a terminal, and who is left of whom."""
+"""Processes of the tests' own: programs that are interrupted, as by Ctrl-C on a terminal,
+and who is left of whom.
+"""
 
 import os
 import signal
@@ -10,7 +12,9 @@ from pathlib import Path
 
 
 def interrupted(program: str) -> list[str]:
-    """The words of the last line that a Python program prints when Ctrl-C comes after its first line, a number; it must end well."""
+    """The words of the last line that a Python program prints when Ctrl-C comes after its first line,
+    a number; it must end well.
+    """
     child = subprocess.Popen(
         [sys.executable, "-c", program],
         stdout=subprocess.PIPE,
@@ -26,7 +30,9 @@ def interrupted(program: str) -> list[str]:
 
 
 def running() -> dict[int, tuple[int, int]]:
-    """The parent and the group of every process that runs; those that have ended and were not waited for are left out."""
+    """The parent and the group of every process that runs;
+    those that have ended and were not waited for are left out.
+    """
     found = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):  # it has ended meanwhile

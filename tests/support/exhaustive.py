@@ -1,4 +1,6 @@
-"""Small instances, and their least energy over all jumps by dense least squares: a second opinion on greedy fields and searches."""
+"""Small instances, and their least energy over all jumps by dense least squares:
+a second opinion on greedy fields and searches.
+"""
 
 import numpy as np
 from crossfield.models.instance.instance import HALF, Instance
@@ -24,7 +26,9 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
 
 
 def exact(instance):
-    """The least energy over all jumps in the bounds, with the windows of alpha and beta left out: a lower bound."""
+    """The least energy over all jumps in the bounds, with the windows of alpha and beta left out:
+    a lower bound.
+    """
     ranges = [np.arange(low, high + 1) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
     jumps = (
         np.stack([axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij")], axis=1)
@@ -38,7 +42,9 @@ def exact(instance):
 
 
 def least_energy(instance, jumps):
-    """The least energy for each row of jumps, all of one parity, by dense least squares on the residuals; no windows."""
+    """The least energy for each row of jumps, all of one parity, by dense least squares on the residuals;
+    no windows.
+    """
     grid, size = instance.grid, instance.grid.size
     pairs, strokes = np.arange(len(grid.first)), np.arange(len(instance.theta))
     a, b = np.zeros((2, len(pairs), 2 * size))

@@ -16,8 +16,9 @@ Test = Callable[..., None]
 def for_each(names: str, cases: Iterable[Any]) -> Callable[[Test], Test]:
     """A decorator like `pytest.mark.parametrize`, of which all cases are subtests of one test.
 
-    A case that fails is named and the others still run, but there is one test to collect, to send to a process and to report.
-    Two of them above one test are all pairs of cases. Each case has a `tmp_path` of its own.
+    A case that fails is named and the others still run, but there is one test to collect, to send to a
+    process and to report. Two of them above one test are all pairs of cases. Each case has a `tmp_path` of
+    its own.
     """
     keys = [name.strip() for name in names.split(",")]
     rows = [dict(zip(keys, row if len(keys) > 1 else (row,), strict=True)) for row in cases]

@@ -1,4 +1,6 @@
-"""Independent readers of LP, MPS and .nl files in this process, each giving what it read to be compared with a Problem."""
+"""Independent readers of LP, MPS and .nl files in this process,
+each giving what it read to be compared with a Problem.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,18 @@ from crossfield.export.verify.programs.reading import Meaning as Model
 from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.models.instance.grid import Floats
 
-__all__ = ["Model", "absence", "browser", "by_asl", "by_casadi", "by_gurobi", "by_highs", "by_scip", "of_problem", "scip_columns"]  # fmt: skip
+__all__ = [
+    "Model",
+    "absence",
+    "browser",
+    "by_asl",
+    "by_casadi",
+    "by_gurobi",
+    "by_highs",
+    "by_scip",
+    "of_problem",
+    "scip_columns",
+]
 
 by_highs = consumer_highs.read
 by_scip = consumer_scip.read
@@ -46,7 +59,9 @@ OTHERS = {
         "apt install chromium chromium-driver",
     ),
 }
-"""Programs that are no consumers of `verify`: a sign that they are here, their names, and what to do where they are not."""
+"""Programs that are no consumers of `verify`: a sign that they are here, their names,
+and what to do where they are not.
+"""
 
 
 def absence(program: str) -> str:

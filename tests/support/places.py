@@ -1,4 +1,6 @@
-"""Where things lie: the source tree, the data of the tests, and drawings that some machines have beside the checkout."""
+"""Where things lie: the source tree, the data of the tests,
+and drawings that some machines have beside the checkout.
+"""
 
 from pathlib import Path
 

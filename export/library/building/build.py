@@ -1,7 +1,8 @@
 """Building a library: what is missing is made, what is whole stays.
 
-Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written here and nowhere else, each
-file beside and renamed, the one that says "done" last. So a build that was stopped continues, whatever it was that stopped it.
+Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written
+here and nowhere else, each file beside and renamed, the one that says "done" last. So a build that was
+stopped continues, whatever it was that stopped it.
 """
 
 from __future__ import annotations
@@ -37,9 +38,10 @@ def build(
 ) -> Library:
     """The library of a specification, now in the folder.
 
-    jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead. progress: called with a line for each entry that
-    is made. Same specification and ledger, same bytes, with any number of processes; on another kind of processor, points may end in other
-    digits. Raises InputError, OutputError, BuildError.
+    jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
+    progress: called with a line for each entry that is made. Same specification and ledger, same bytes, with
+    any number of processes; on another kind of processor, points may end in other digits. Raises InputError,
+    OutputError, BuildError.
     """
     plans = plan(spec)
     folder, is_new = Path(folder), not Path(folder).exists()
@@ -63,7 +65,10 @@ def _built(
     scheduler: str | None,
     progress: Progress,
 ) -> Library:
-    """The library, by a caller who holds its lock. The ledger is written when all else is there: a build that is refused leaves none."""
+    """The library, by a caller who holds its lock.
+
+    The ledger is written when all else is there: a build that is refused leaves none.
+    """
     _sweep(folder)
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
@@ -94,7 +99,9 @@ def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = lambda _: None)
 
 
 def unmatched(library: Library) -> list[Record]:
-    """The records of a library's ledger that count for nothing: the problem of their entry has changed since."""
+    """The records of a library's ledger that count for nothing:
+    the problem of their entry has changed since.
+    """
     records = read_ledger(library.folder).records
     names = {record.entry for record in records} & set(library.document["entries"])
     problems = {name: library.entry(name)["problem_sha256"] for name in names}

@@ -1,7 +1,7 @@
 """The task of each entry: model files in every format, the best known point, and the sidecar.
 
-Like the task of an instance it is a function from values to the bytes of files; the sidecar comes last, so that an entry whose sidecar
-stands and fits is done.
+Like the task of an instance it is a function from values to the bytes of files; the sidecar comes last, so
+that an entry whose sidecar stands and fits is done.
 """
 
 from __future__ import annotations
@@ -36,16 +36,21 @@ from ..plan.recipe import EntryRecipe, digest
 from .instance_task import Files, Submitted
 
 REFERENCES = (
-    "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization: the formulations, whose equation numbers are in the names of the rows",
+    (
+        "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization: "
+        "the formulations, whose equation numbers are in the names of the rows"
+    ),
 )
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
 
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe, what is known of its instance, that instance's files, and what the ledger says.
+    """The task of an entry: its recipe, what is known of its instance, that instance's files,
+    and what the ledger says.
 
-    records and submitted: what the ledger has of all entries of the instance, records and kept fields; relatives: names of the entries that may be related.
+    records and submitted: what the ledger has of all entries of the instance, records and kept fields;
+    relatives: names of the entries that may be related.
     """
 
     recipe: EntryRecipe
@@ -129,7 +134,9 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the files of the best point that are now in the folder: MIPLIB's kind, and AMPL's where there is a .nl."""
+    """Facts of the files of the best point that are now in the folder: MIPLIB's kind,
+    and AMPL's where there is a .nl.
+    """
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -158,7 +165,9 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]:
-    """The best dual bound of each solver on this problem or one with the same optimum, as the ledger has them; and what follows from the point."""
+    """The best dual bound of each solver on this problem or one with the same optimum,
+    as the ledger has them; and what follows from the point.
+    """
     chosen: dict[str, Record] = {}
     for record in sorted(_records(task, best, instance), key=lambda each: _preference(each, task.name)):
         chosen.setdefault(record.solver, record)
@@ -170,11 +179,15 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
 
 
 def _within(told: dict[str, Any], best: Best, entry: str) -> float:
-    """A bound, cut to the objective of the best point. Raises InputError for one that the point contradicts."""
+    """A bound, cut to the objective of the best point.
+
+    Raises InputError for one that the point contradicts.
+    """
     bound = float(told["bound"])
     if contradicts(bound, best.objective):
         raise InputError(
-            f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, but {entry} has a feasible point of {best.objective!r}; "
+            f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, "
+            f"but {entry} has a feasible point of {best.objective!r}; "
             "that bound is wrong, take its record out",
             file=LEDGER,
         )

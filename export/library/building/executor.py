@@ -1,7 +1,8 @@
 """Where tasks run: in this process, in processes of this machine, or on the workers of a dask scheduler.
 
-All three are executors of `concurrent.futures`. A task is a function from values to values that writes nothing, so that a worker may die in
-the middle of it: it is then done again elsewhere, and its result is used once.
+All three are executors of `concurrent.futures`. A task is a function from values to values that writes
+nothing, so that a worker may die in the middle of it: it is then done again elsewhere, and its result is used
+once.
 """
 
 from __future__ import annotations
@@ -42,19 +43,24 @@ class _Here(Executor):
 
 
 def ahead(jobs: int, scheduler: str | None) -> int:
-    """How many tasks are handed out at once: what is handed out and not done is lost when a build is killed."""
+    """How many tasks are handed out at once:
+    what is handed out and not done is lost when a build is killed.
+    """
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
 
 
 @contextmanager
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Where tasks run. Raises InputError when no scheduler answers or dask is missing; BuildError when workers die."""
+    """Where tasks run. Raises InputError when no scheduler answers or dask is missing;
+    BuildError when workers die.
+    """
     try:
         with _cluster(scheduler) if scheduler else _local(jobs) as chosen:
             yield chosen
     except BrokenProcessPool as error:
         raise BuildError(
-            "a process ended before its work was done, for want of memory most likely; build again with fewer --jobs, what is whole is kept"
+            "a process ended before its work was done, for want of memory most likely; "
+            "build again with fewer --jobs, what is whole is kept"
         ) from error
 
 
@@ -99,16 +105,20 @@ def _cluster(address: str) -> Iterator[Executor]:
             "--scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
         ) from error
     try:
-        client: Any = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
+        client: Any = distributed.Client(  # type: ignore[no-untyped-call]
+            address, timeout=_PATIENCE, set_as_default=False
+        )
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"no scheduler answers at {address[:100]}; start one with `dask scheduler`, and give its address, say tcp://host:8786"
+            f"no scheduler answers at {address[:100]}; start one with `dask scheduler`, "
+            "and give its address, say tcp://host:8786"
         ) from error
     try:
         yield client.get_executor(pure=False, retries=_TRIES)
     except distributed.KilledWorker as error:
         raise BuildError(
-            "a task ended several workers, for want of memory most likely; see their logs and build again, what is whole is kept"
+            "a task ended several workers, for want of memory most likely; see their logs and build again, "
+            "what is whole is kept"
         ) from error
     except (CancelledError, distributed.comm.core.CommClosedError) as error:
         raise BuildError(
@@ -119,7 +129,9 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 class Tasks:
-    """Tasks under way, at most so many at once: each is a function, its value, and what is done here with its result."""
+    """Tasks under way, at most so many at once: each is a function, its value,
+    and what is done here with its result.
+    """
 
     def __init__(self, chosen: Executor, most: int) -> None:
         self._executor, self._most = chosen, most
@@ -127,7 +139,9 @@ class Tasks:
         self._running: dict[Future[Any], Callable[[Any], None]] = {}
 
     def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
-        """Have the function called with the value somewhere, and `finish` here with its result; `finish` may add more, which goes first."""
+        """Have the function called with the value somewhere, and `finish` here with its result;
+        `finish` may add more, which goes first.
+        """
         self._waiting.append((function, value, finish))
 
     def run(self) -> None:

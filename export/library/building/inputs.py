@@ -1,4 +1,6 @@
-"""From what each file of a library is made: its tasks, put together from specification and ledger, for building and for verifying alike."""
+"""From what each file of a library is made: its tasks, put together from specification and ledger,
+for building and for verifying alike.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,10 @@ class Inputs:
         return Preparation(each.recipe, self._submitted(each))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
-        """The tasks of its entries, once its files are in a folder. Raises as `preparation`, InputError for a file that is missing."""
+        """The tasks of its entries, once its files are in a folder.
+
+        Raises as `preparation`, InputError for a file that is missing.
+        """
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
         relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
         records = self._records(each)

@@ -1,6 +1,7 @@
 """The first task of each instance: the instance itself and the fields that are known of it, as files.
 
-A task is a function from values to the bytes of files, so that it runs in any process on any machine; who started it writes the files.
+A task is a function from values to the bytes of files, so that it runs in any process on any machine; who
+started it writes the files.
 """
 
 from __future__ import annotations
@@ -70,7 +71,10 @@ def about_file(instance: str) -> str:
 
 
 def prepare(task: Preparation) -> Files:
-    """The files of an instance: itself, its fields, and last what is known of it. Raises InputError for a sketch that gives none."""
+    """The files of an instance: itself, its fields, and last what is known of it.
+
+    Raises InputError for a sketch that gives none.
+    """
     instance = instance_from(task.recipe)
     chosen = _chosen(instance, task)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
@@ -94,7 +98,9 @@ def field_bytes(field: CrossField) -> bytes:
 
 
 def _chosen(instance: Instance, task: Preparation) -> dict[str, Known]:
-    """The field of each role. The baseline never depends on the ledger: the jumps of `qp-fixed` are part of an instance."""
+    """The field of each role. The baseline never depends on the ledger:
+    the jumps of `qp-fixed` are part of an instance.
+    """
     baseline, searched = baseline_field(instance), searched_field(instance)
     found = better_in_1norm(searched.field, task.recipe.rung)
     staged = [Known(fitted(each.field), ours("two stages")) for each in found]

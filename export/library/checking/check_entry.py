@@ -1,7 +1,9 @@
-"""Checking an entry of a library against its problem, formulated again from the instance: facts, model files, points, bounds.
+"""Checking an entry of a library against its problem, formulated again from the instance: facts, model files,
+points, bounds.
 
-The entry is made again from what it was made of, and compared with what is in the library, model files unpacked; the best known point is read by the readers of solution
-files and evaluated, and, by the checker that ships with every library, against the .mps and the instance without any rounding.
+The entry is made again from what it was made of, and compared with what is in the library, model files
+unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
+that ships with every library, against the .mps and the instance without any rounding.
 """
 
 from __future__ import annotations
@@ -78,7 +80,9 @@ def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Fin
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """The files of the best known point can be read and have the objective and the violations that the sidecar tells."""
+    """The files of the best known point can be read and have the objective and the
+    violations that the sidecar tells.
+    """
     best, listed = sidecar["best"], {file["name"] for file in sidecar["files"]}
     for key in ("point", "nl_point"):
         name = best[key]
@@ -112,11 +116,16 @@ def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
     ):
         yield "has other violations than its sidecar tells"
     if not close(solution.field.energy().total, best["energy_2norm"]):
-        yield f"is of a field of energy {solution.field.energy().total!r}, but its sidecar tells {best['energy_2norm']!r}"
+        yield (
+            f"is of a field of energy {solution.field.energy().total!r}, "
+            f"but its sidecar tells {best['energy_2norm']!r}"
+        )
 
 
 def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
-    """The checker finds the same without rounding: against the .mps, and where jumps are variables against the instance."""
+    """The checker finds the same without rounding: against the .mps,
+    and where jumps are variables against the instance.
+    """
     best, point = sidecar["best"], folder / sidecar["best"]["point"]
     models = [(file["name"], best["objective"]) for file in sidecar["files"] if file["format"] == "mps"]
     if sidecar["jumps"] is None:

@@ -1,4 +1,5 @@
-"""Checking a library as a whole: every file whole and accounted for, every document to its schema, every entry as its sidecar says.
+"""Checking a library as a whole: every file whole and accounted for, every document to its schema,
+every entry as its sidecar says.
 
 Nothing that a file says is believed: problems are formulated again from their instances (`verify_entry`).
 """
@@ -51,7 +52,9 @@ def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lamb
 
 
 class _Verification:
-    """A verification under way: which files are there, which are not as SHA256SUMS says, and which belong to something."""
+    """A verification under way: which files are there, which are not as SHA256SUMS says,
+    and which belong to something.
+    """
 
     def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
         self.folder, self.progress = folder, progress
@@ -118,7 +121,9 @@ class _Verification:
             yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
 
     def _index(self, library: Library) -> Iterator[Finding]:
-        """The index names its sidecars, and they are those of its specification; texts and checker are there."""
+        """The index names its sidecars, and they are those of its specification;
+        texts and checker are there.
+        """
         document = library.document
         names = document["entries"]
         if sorted(document["sha256"]) != sorted(names):
@@ -175,7 +180,9 @@ class _Verification:
             yield from self._texts(library, sidecars)
 
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
-        """What the library was made of; nothing, when its specification is damaged, which is told with the index."""
+        """What the library was made of; nothing, when its specification is damaged,
+        which is told with the index.
+        """
         try:
             return Inputs(ledger, plan(library.spec))
         except CrossfieldError:
@@ -244,7 +251,9 @@ class _Verification:
                     yield of_error(error, record.point)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
-        """Every instance with its fields is as its own document says, and as the sidecars of its entries do."""
+        """Every instance with its fields is as its own document says,
+        and as the sidecars of its entries do.
+        """
         self.progress("instances")
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
         for file, instance in sorted(wanted.items()):
@@ -275,7 +284,9 @@ class _Verification:
             yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """Every field is on its instance and has the energies that are told of it; the least ones are least."""
+        """Every field is on its instance and has the energies that are told of it;
+        the least ones are least.
+        """
         fields = about["fields"]
         for role, facts in fields.items():
             try:

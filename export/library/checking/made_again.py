@@ -1,6 +1,8 @@
-"""What a library should say, made again from specification, instances, fields and ledger, and compared with what it says.
+"""What a library should say, made again from specification, instances, fields and ledger,
+and compared with what it says.
 
-Only what was searched for is taken from the library: the fields of each instance, and the records of the ledger. All else follows from these.
+Only what was searched for is taken from the library: the fields of each instance, and the records of the
+ledger. All else follows from these.
 """
 
 from __future__ import annotations
@@ -21,11 +23,16 @@ from ..ledger.points import Provenance, ours
 from .finding import BUILD, Finding, close
 
 _FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
-"""Keys of a sidecar that are compared elsewhere: with the points that were read, with each other, and file by file."""
+"""Keys of a sidecar that are compared elsewhere: with the points that were read, with each other,
+and file by file.
+"""
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """In what the files of an entry differ from those that its task makes today. Raises CrossfieldError when it makes none."""
+    """In what the files of an entry differ from those that its task makes today.
+
+    Raises CrossfieldError when it makes none.
+    """
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
@@ -96,7 +103,9 @@ def _known(task: Entry) -> set[Provenance]:
 
 
 def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
-    """In what is said of an instance differs from its recipe: everything but the fields, and who found those."""
+    """In what is said of an instance differs from its recipe: everything but the fields,
+    and who found those.
+    """
     recipe = task.recipe
     instance = read_instance(folder / about["instance"]["file"])
     expected = {

@@ -1,7 +1,9 @@
-"""Taking a solver's solution into a library: checked, compared with the best known point, kept in the ledger when it is better.
+"""Taking a solver's solution into a library: checked, compared with the best known point,
+kept in the ledger when it is better.
 
-The ledger comes first and the rest of the library follows from it by a rebuild, which SHA256SUMS ends. So a submission that was stopped can be
-told by the checksum of ledger.json, and the next submission or build brings it to its end.
+The ledger comes first and the rest of the library follows from it by a rebuild, which SHA256SUMS ends. So a
+submission that was stopped can be told by the checksum of ledger.json, and the next submission or build
+brings it to its end.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Submission:
-    """What happened to a point: entry, the objective it was compared with and its own, and whether it was better and is now kept."""
+    """What happened to a point: entry, the objective it was compared with and its own,
+    and whether it was better and is now kept.
+    """
 
     entry: str
     known: float
@@ -49,7 +53,10 @@ class Submission:
     def __str__(self) -> str:
         """One line."""
         if self.better:
-            return f"{self.entry}: better, and now the best known point: {self.objective!r}, before {self.known!r}"
+            return (
+                f"{self.entry}: better, and now the best known point: {self.objective!r}, "
+                f"before {self.known!r}"
+            )
         return f"{self.entry}: not better: {self.objective!r}, and {self.known!r} is known"
 
 
@@ -66,9 +73,11 @@ def submit_point(
 ) -> Submission:
     """What happened to the point in a solution file of any kind that is read.
 
-    entry: name of the entry; by default the one with which the file's name begins, or the only one whose columns the file has. solver, version,
-    seconds, by: who found it, as the ledger keeps it. Angles and jumps are taken as they are, integers rounded, and all else computed again. Raises InputError, SolutionError for a
-    point of another entry, one that is not feasible to within 1e-8, and one that a dual bound of the library contradicts.
+    entry: name of the entry; by default the one with which the file's name begins, or the only one whose
+    columns the file has. solver, version, seconds, by: who found it, as the ledger keeps it. Angles and jumps
+    are taken as they are, integers rounded, and all else computed again. Raises InputError, SolutionError for
+    a point of another entry, one that is not feasible to within 1e-8, and one that a dual bound of the
+    library contradicts.
     """
     file = Path(file)
     texts = {"solver": solver or UNKNOWN, "version": version or UNKNOWN, "by": by or UNKNOWN}
@@ -146,7 +155,8 @@ def _found(file: Path, library: Library, entry: str | None) -> tuple[dict[str, A
     solution = read_solution(file, problem)
     if solution.unknown:
         raise SolutionError(
-            f"{solution.unknown} of its names are not in {name}; it is a point of another entry, give --entry NAME",
+            f"{solution.unknown} of its names are not in {name}; it is a point of another entry, "
+            "give --entry NAME",
             file=file,
         )
     return sidecar, problem, solution
@@ -170,7 +180,9 @@ def _by_columns(file: Path, raw: RawSolution, library: Library) -> str:
 
 
 def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Library) -> bool:
-    """Whether a file may be of an entry: it has all its columns, as one of its model files has them, and no other."""
+    """Whether a file may be of an entry: it has all its columns, as one of its model files has them,
+    and no other.
+    """
     if raw.names is None:
         return False
     counts, pairs = sidecar["counts"], sidecar["instance"]["pairs"]
@@ -190,21 +202,25 @@ def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Librar
 def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
     """Nothing, when angles and jumps are feasible. Raises SolutionError with the worst violations.
 
-    Every other column follows from them and is computed again, so that a solver's tolerance in those rows does not count.
+    Every other column follows from them and is computed again, so that a solver's tolerance in those rows
+    does not count.
     """
     found = _violation(problem, solution)
     if found.worst <= FEASIBLE:
         return
     worst = f" (family {found.worst_family})" if found.rows > FEASIBLE else ""
     raise SolutionError(
-        f"is not a feasible point of {entry}: violations of rows {found.rows:.3g}{worst}, bounds {found.bounds:.3g}, integrality "
+        f"is not a feasible point of {entry}: violations of rows {found.rows:.3g}{worst}, "
+        f"bounds {found.bounds:.3g}, integrality "
         f"{found.integrality:.3g}, and {FEASIBLE:g} is allowed; let the solver use tighter tolerances",
         file=file,
     )
 
 
 def _violation(problem: Problem, solution: Solution) -> Violation:
-    """The worst violations of angles and jumps as the file has them, with every other column at the value that follows from them."""
+    """The worst violations of angles and jumps as the file has them,
+    with every other column at the value that follows from them.
+    """
     assert solution.point is not None
     assert solution.violation is not None
     completed = problem.violation(complete_point(problem, solution.field))
@@ -216,7 +232,8 @@ def _check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
     bound = sidecar["bound"]
     if bound is not None and contradicts(bound, objective):
         raise SolutionError(
-            f"is feasible with objective {objective!r}, but the library has the dual bound {bound!r} of {sidecar['name']}; "
+            f"is feasible with objective {objective!r}, "
+            f"but the library has the dual bound {bound!r} of {sidecar['name']}; "
             f"that bound is wrong, take its record out of {LEDGER} first",
             file=file,
         )

@@ -3,16 +3,18 @@
 One file, Python 3.9 or newer, nothing to install, no solver.
 
 MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
-POINT   names and values, one pair a line: a MIPLIB .sol (`=obj=` first), a .sol of Gurobi or SCIP, or a plain list; also .gz.
-        A column that is left out is 0, or what it is fixed to.
+POINT   names and values, one pair a line: a MIPLIB .sol (`=obj=` first), a .sol of Gurobi or SCIP, or a plain
+        list; also .gz. A column that is left out is 0, or what it is fixed to.
 
-Against an MPS file the objective and the violations of bounds, rows and integrality are exact: every number is the decimal that stands in
-the files, and decimals are added and multiplied without rounding (Python's decimal, which would raise an error at the first rounding).
-Against an instance the energies of its cross field are computed from their definition; there the numbers are the doubles nearest to the
-decimals of the instance, and pi has 60 digits.
+Against an MPS file the objective and the violations of bounds, rows and integrality are exact: every number
+is the decimal that stands in the files, and decimals are added and multiplied without rounding (Python's
+decimal, which would raise an error at the first rounding). Against an instance the energies of its cross
+field are computed from their definition; there the numbers are the doubles nearest to the decimals of the
+instance, and pi has 60 digits.
 
-Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong usage or a file that cannot be
-used. An objective that a file claims is compared with that of an MPS file, to 1e-5 of its size, or of 1: solvers tell what they have to about 1e-6.
+Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong
+usage or a file that cannot be used. An objective that a file claims is compared with that of an MPS file, to
+1e-5 of its size, or of 1: solvers tell what they have to about 1e-6.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ from typing import NoReturn, Optional, TypeVar
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
 EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
-"""Arithmetic that raises an error rather than round; the longest sum of products of three numbers has some 3,000 digits."""
+"""Arithmetic that raises an error rather than round;
+the longest sum of products of three numbers has some 3,000 digits.
+"""
 
 INFINITE = Decimal("1e20")  # bounds from here on are none, as in all solvers
 
@@ -57,7 +61,8 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
 MARK = "\ufeff"  # a byte order mark, which some editors put before a text
 ADDED = re.compile(
-    r"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
+    r"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|"
+    r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
@@ -150,8 +155,8 @@ class Model:
 class Finding:
     """What was found of a point.
 
-    Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and whether the file's own
-    point has the objective that it claims, if it claims one that can be compared.
+    Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and
+    whether the file's own point has the objective that it claims, if it claims one that can be compared.
     """
 
     def __init__(
@@ -173,7 +178,7 @@ class Finding:
         return max(value for value, _ in self.violations.values())
 
 
-# ------------------------------------------------------------------------------------------------------ reading
+# ---------------------------------------------------------------------------------------------------- reading
 
 
 def number(text: str) -> Decimal:
@@ -213,7 +218,9 @@ def lines_of(path: str) -> Iterator[tuple[int, str]]:
 
 
 class MpsReader:
-    """Reads free MPS, section by section: NAME, OBJSENSE, ROWS, COLUMNS, RHS, RANGES, BOUNDS, quadratic sections, ENDATA."""
+    """Reads free MPS, section by section: NAME, OBJSENSE, ROWS, COLUMNS, RHS, RANGES, BOUNDS,
+    quadratic sections, ENDATA.
+    """
 
     def __init__(self) -> None:
         self.model = Model()
@@ -395,7 +402,9 @@ def _pairs(words: list[str], start: int) -> Iterator[tuple[str, str]]:
 
 
 def _products(section: str, matrix: Matrix) -> list[Product]:
-    """The monomials of a matrix: QUADOBJ and QSECTION hold one triangle, the others both; only QCMATRIX has no one-half."""
+    """The monomials of a matrix: QUADOBJ and QSECTION hold one triangle, the others both;
+    only QCMATRIX has no one-half.
+    """
     triangle = section in ("QUADOBJ", "QSECTION")
     for (i, j), value in matrix.items():
         fits = i == j or ((j, i) not in matrix if triangle else matrix.get((j, i)) == value)
@@ -457,7 +466,7 @@ def _value(point: Point, words: list[str]) -> None:
     point.values[words[0]] = number(words[1])
 
 
-# ------------------------------------------------------------------------------------------------- MPS against point
+# ------------------------------------------------------------------------------------------ MPS against point
 
 
 def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
@@ -521,7 +530,7 @@ def _worst(violations: Iterable[Place]) -> Place:
     return max(violations, key=lambda violation: violation[0], default=(ZERO, ""))
 
 
-# -------------------------------------------------------------------------------------------- instance against point
+# ------------------------------------------------------------------------------------- instance against point
 
 
 class Pixel:
@@ -604,7 +613,9 @@ def _instance(document: dict[str, object]) -> Instance:
 
 
 class Field:
-    """The cross field of a point: angles of the pixels, and of each pair the jump and the factor (-1)^p of its first skew."""
+    """The cross field of a point: angles of the pixels,
+    and of each pair the jump and the factor (-1)^p of its first skew.
+    """
 
     def __init__(self, instance: Instance, point: Point) -> None:
         self.instance = instance
@@ -620,7 +631,9 @@ class Field:
             self.p = [odd + TWO * even for odd, even in zip(self.p1, self.p2)]
 
     def as_given(self) -> Iterator[Jump]:
-        """Jump and factor of each pair; a parity p1 that is not whole counts as it stands, of p the cosine of pi p."""
+        """Jump and factor of each pair; a parity p1 that is not whole counts as it stands,
+        of p the cosine of pi p.
+        """
         if not self.whole:
             yield from ((p, ONE - TWO * odd) for p, odd in zip(self.p, self.p1))
             return
@@ -650,7 +663,9 @@ class Field:
         return self.alpha[i] - self.alpha[j] + PI / 2 * jump[0], jump[1] * self.beta[i] - self.beta[j]
 
     def energy(self, norm: int, jumps: Iterable[Jump]) -> Decimal:
-        """The energy with squares (2) or absolute values (1): 2 sum (A, B) + w_strokes sum w R + w_beta sum beta."""
+        """The energy with squares (2) or absolute values (1):
+        2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
+        """
 
         def size(value: Decimal) -> Decimal:
             return abs(value) if norm == 1 else value * value
@@ -713,7 +728,7 @@ def _is_of(name: str, places: tuple[set[str], set[str]]) -> bool:
     return (tag in ON_PIXELS and place in places[0]) or (tag in ON_PAIRS and place in places[1])
 
 
-# ------------------------------------------------------------------------------------------------------------ report
+# ----------------------------------------------------------------------------------------------------- report
 
 
 def _shown(value: Decimal) -> str:

@@ -1,6 +1,7 @@
 """Sidecars: one JSON document for each entry, and the index of the library. Written, read, checked.
 
-Schemas: library-entry.schema.json, library-instance.schema.json and library-index.schema.json beside this module.
+Schemas: library-entry.schema.json, library-instance.schema.json and library-index.schema.json beside this
+module.
 """
 
 from __future__ import annotations
@@ -41,7 +42,10 @@ class Library:
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
-        """The sidecars of all entries, in order. Raises InputError, InstanceError when one is missing or damaged."""
+        """The sidecars of all entries, in order.
+
+        Raises InputError, InstanceError when one is missing or damaged.
+        """
         return tuple(map(self.entry, self.document["entries"]))
 
     def entry(self, name: str) -> dict[str, Any]:
@@ -57,7 +61,10 @@ class Library:
 
 
 def read_library(folder: str | Path) -> Library:
-    """The library in a folder. Raises InputError when there is none, InstanceError when its index is damaged."""
+    """The library in a folder.
+
+    Raises InputError when there is none, InstanceError when its index is damaged.
+    """
     path = Path(folder) / INDEX
     if not path.is_file():
         raise InputError(
@@ -67,7 +74,9 @@ def read_library(folder: str | Path) -> Library:
 
 
 def read_sidecar(path: str | Path) -> dict[str, Any]:
-    """The sidecar in a file. Raises InputError when it cannot be read, InstanceError with the place when it breaks its schema."""
+    """The sidecar in a file. Raises InputError when it cannot be read,
+    InstanceError with the place when it breaks its schema.
+    """
     return _read(Path(path), FORMAT, "library-entry")
 
 
@@ -95,7 +104,8 @@ def as_bytes(document: dict[str, Any]) -> bytes:
 def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Problem:
     """The problem of an entry, from its instance's file and its sidecar.
 
-    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar names.
+    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
+    names.
     """
     folder = library.folder if isinstance(library, Library) else Path(library)
     path = folder / document["instance"]["file"]
@@ -113,7 +123,9 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def problem_from(
     instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
 ) -> Problem:
-    """The problem of a formulation with options, and with jumps where they are data: [pair, jump] of those that are not zero."""
+    """The problem of a formulation with options, and with jumps where they are data: [pair,
+    jump] of those that are not zero.
+    """
     jumps: Ints | None = None
     if FORMULATIONS[formulation].fixed:
         jumps = np.zeros(len(instance.grid.first), dtype=np.int32)

@@ -1,7 +1,8 @@
 """One change of a library at a time: a lock on its folder, which ends with the process that holds it.
 
-The lock is a file `.lock` in the folder that the system locks for its holder (filelock: flock, on Windows msvcrt), so that a crash leaves no lock
-behind; the file tells who holds it. It is removed by the holder, and a file that a crash has left is taken over by the next one.
+The lock is a file `.lock` in the folder that the system locks for its holder (filelock: flock, on Windows
+msvcrt), so that a crash leaves no lock behind; the file tells who holds it. It is removed by the holder, and
+a file that a crash has left is taken over by the next one.
 """
 
 from __future__ import annotations
@@ -27,9 +28,11 @@ Progress = Callable[[str], None]
 
 @contextmanager
 def changing(folder: Path, action: str, progress: Progress = lambda _: None) -> Iterator[None]:
-    """Nothing; meanwhile no other process changes the library in a folder. action: what is done, for others that wait.
+    """Nothing; meanwhile no other process changes the library in a folder. action: what is done,
+    for others that wait.
 
-    Raises OutputError when another change does not end within PATIENCE seconds, or the folder cannot be written.
+    Raises OutputError when another change does not end within PATIENCE seconds, or the folder cannot be
+    written.
     """
     path = folder / FILE
     lock = FileLock(path, timeout=PATIENCE, poll_interval=_TICK)
@@ -41,7 +44,8 @@ def changing(folder: Path, action: str, progress: Progress = lambda _: None) -> 
             lock.acquire()
     except Timeout as error:
         raise OutputError(
-            f"is being changed by {_holder(path)}; {action} waited {PATIENCE:g} s for it: run it again when that has ended",
+            f"is being changed by {_holder(path)}; {action} waited {PATIENCE:g} s for it: "
+            "run it again when that has ended",
             file=folder,
         ) from error
     except OSError as error:

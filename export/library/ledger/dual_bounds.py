@@ -1,7 +1,7 @@
 """Dual bounds beside a feasible point: one rule for building, verifying and submitting.
 
-A solver's bound is good to its tolerances, and may lie a little above the objective of a point that is feasible to 1e-16. So far, it is cut
-to that objective; further, it contradicts the point and is no bound.
+A solver's bound is good to its tolerances, and may lie a little above the objective of a point that is
+feasible to 1e-16. So far, it is cut to that objective; further, it contradicts the point and is no bound.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 from typing import Final
 
 PROVEN: Final = (1e-6, 1e-9)
-"""A point is optimal when it is no further above a dual bound than this: relative to its objective, plus this much."""
+"""A point is optimal when it is no further above a dual bound than this: relative to its objective,
+plus this much.
+"""
 
 
 def slack(objective: float) -> float:
@@ -33,5 +35,7 @@ def is_proven(objective: float, bound: float) -> bool:
 
 
 def relative_gap(objective: float, bound: float) -> float:
-    """Objective minus bound over the objective's size, at least 0; 1 is the most that is told of an objective near 0."""
+    """Objective minus bound over the objective's size, at least 0;
+    1 is the most that is told of an objective near 0.
+    """
     return min(max(objective - bound, 0.0) / max(abs(objective), PROVEN[1]), 1.0)

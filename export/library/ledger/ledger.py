@@ -1,7 +1,7 @@
 """The ledger: what solvers found, measured once and kept. An input of every build, never made by one.
 
-ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A record carries the SHA-256
-of the problem it is about, and counts for that problem alone.
+ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A
+record carries the SHA-256 of the problem it is about, and counts for that problem alone.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ Ending = Literal["optimal", "feasible", "limit", "no point"]
 class Record:
     """One run of a solver on an entry, or one submitted point.
 
-    problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound; seconds, threads and time_limit as
-    measured; by: who ran it; point: the field's file beside the ledger, with its SHA-256, or None.
+    problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound;
+    seconds, threads and time_limit as measured; by: who ran it; point: the field's file beside the ledger,
+    with its SHA-256, or None.
     """
 
     entry: str
@@ -56,7 +57,9 @@ class Record:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Records in order, and the folder where the files of their fields lie, or are to lie: elsewhere says where those lie that are not there yet."""
+    """Records in order, and the folder where the files of their fields lie, or are to lie:
+    elsewhere says where those lie that are not there yet.
+    """
 
     folder: Path
     records: tuple[Record, ...] = ()
@@ -76,7 +79,9 @@ class Ledger:
         return self.elsewhere.get(str(record.point), self.folder / str(record.point))
 
     def field(self, record: Record) -> CrossField:
-        """The field of a record. Raises InputError, InstanceError when the file is missing, damaged or another one."""
+        """The field of a record. Raises InputError, InstanceError when the file is missing,
+        damaged or another one.
+        """
         path = self.path(record)
         if path.is_file() and sha256_of(path) != record.point_sha256:
             raise InstanceError(
@@ -118,10 +123,12 @@ def write_ledger(ledger: Ledger) -> Path:
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
-    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry, that is from now on the kept one.
+    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry,
+    that is from now on the kept one.
 
-    The caller holds the lock of the library. The field's file is written first, so that the ledger never names what is not there. Records of the same entry that named the file before lose
-    their field, which is not there any more. Raises OutputError.
+    The caller holds the lock of the library. The field's file is written first, so that the ledger never
+    names what is not there. Records of the same entry that named the file before lose their field, which is
+    not there any more. Raises OutputError.
     """
     ledger = read_ledger(folder)
     records = list(ledger.records)
@@ -135,7 +142,9 @@ def add_record(folder: str | Path, record: Record, field: CrossField | None = No
 
 
 def _is_better(record: Record, kept: Record | None) -> bool:
-    """Whether the field of a record is to be kept in place of another one, which may have come while it was looked for."""
+    """Whether the field of a record is to be kept in place of another one,
+    which may have come while it was looked for.
+    """
     if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
         return True
     return record.primal is None or record.primal < kept.primal
@@ -146,7 +155,8 @@ def _without_point(record: Record) -> Record:
 
 
 def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
-    """The ledger of a folder with the records of another one about these entries and their fields; nothing is written yet.
+    """The ledger of a folder with the records of another one about these entries and their fields;
+    nothing is written yet.
 
     A field that the folder has for an entry already stays.
     """

@@ -1,6 +1,7 @@
 """Fields that are known, and the complete points of every formulation that they give.
 
-A point of any formulation comes from a field (angles and jumps): every other column then has its best value, without solver tolerances.
+A point of any formulation comes from a field (angles and jumps): every other column then has its best value,
+without solver tolerances.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ _ROUNDS: Final = 8
 
 @dataclass(frozen=True)
 class Provenance:
-    """Who found a field: solver and version; seconds and the person where somebody measured and submitted it."""
+    """Who found a field: solver and version; seconds and the person where
+    somebody measured and submitted it.
+    """
 
     solver: str
     version: str
@@ -47,7 +50,9 @@ def ours(method: str) -> Provenance:
 
 
 def baseline_field(instance: Instance) -> Known:
-    """The greedy field, whose jumps are the data of `qp-fixed`: they are part of an instance, so that no search may change them."""
+    """The greedy field, whose jumps are the data of `qp-fixed`: they are part of an instance,
+    so that no search may change them.
+    """
     return Known(greedy(instance), ours("greedy"))
 
 
@@ -64,7 +69,8 @@ def least_energy(known: Sequence[Known], norm: int) -> Known:
 def complete_point(problem: Problem, found: CrossField) -> Floats:
     """The best point of a problem (columns,) with the angles and jumps of a field.
 
-    As `Problem.point`; with the facet as printed, z is free in an interval, and takes the value there that makes t least.
+    As `Problem.point`; with the facet as printed, z is free in an interval, and takes the value there that
+    makes t least.
     """
     point = problem.point(found)
     if problem.formulation.options.facet == "printed" and {"z", "t"} <= problem.blocks.keys():

@@ -1,4 +1,5 @@
-"""What is to be made: every instance and every entry (an instance in one formulation) of a specification, with their names.
+"""What is to be made: every instance and every entry (an instance in one formulation) of a specification,
+with their names.
 
 cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
 instance[_printed]_TOKEN              an entry: facet and formulation
@@ -44,7 +45,9 @@ class InstanceRecipe:
 
 @dataclass(frozen=True)
 class EntryRecipe:
-    """How an entry is made: the name of its instance, formulation, facet, formats, and whether files are compressed."""
+    """How an entry is made: the name of its instance, formulation, facet, formats,
+    and whether files are compressed.
+    """
 
     name: str
     instance: str
@@ -68,7 +71,10 @@ def entry_name(instance: str, formulation: str, facet: str) -> str:
 
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:
-    """Every instance of a specification with its entries: by sketch, size, seed and gauge. Raises InputError for a name that is too long."""
+    """Every instance of a specification with its entries: by sketch, size, seed and gauge.
+
+    Raises InputError for a name that is too long.
+    """
     found = tuple(
         InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
         for sketch in spec.sketches
@@ -79,7 +85,8 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
     for entry in (entry for each in found for entry in each.entries):
         if len(entry.name) > LONGEST:
             raise InputError(
-                f"the name {entry.name} has {len(entry.name)} characters; shorten the sketch's name until it has {LONGEST}"
+                f"the name {entry.name} has {len(entry.name)} characters; "
+                f"shorten the sketch's name until it has {LONGEST}"
             )
     return found
 

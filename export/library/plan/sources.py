@@ -60,8 +60,8 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
 def random_instance(recipe: InstanceRecipe) -> Instance:
     """The instance of a size and a seed: strokes in random directions on a fifth of the pixels.
 
-    Drawn with NumPy's PCG64 in this order: the mask when it is ragged, the order of the pixels (the first fifth, at least one, are strokes),
-    theta uniform in [0, pi), w uniform in [0.1, 1].
+    Drawn with NumPy's PCG64 in this order: the mask when it is ragged, the order of the pixels (the first
+    fifth, at least one, are strokes), theta uniform in [0, pi), w uniform in [0.1, 1].
     """
     rng = np.random.Generator(np.random.PCG64(recipe.seed))
     mask = np.ones((recipe.size, recipe.size), dtype=bool)

@@ -1,4 +1,6 @@
-"""The specification of a library: which sketches, sizes, gauges, seeds, formulations and formats. Read from TOML and checked.
+"""The specification of a library: which sketches, sizes, gauges, seeds, formulations and formats.
+
+Read from TOML and checked.
 
     format = "crossfield-library-spec"
     version = 1
@@ -14,7 +16,8 @@
 
     [[sketches]]
     name = "bend"                      lower case and digits, part of every name
-    sample = "cylinder_bend"           or file = "drawing.svg" (with mask = "mask.png" if need be), or random = "full" | "ragged"
+    sample = "cylinder_bend"           or file = "drawing.svg" (with mask = "mask.png" if need be),
+                                       or random = "full" | "ragged"
     seeds = [1, 2]                     of a random one
     rungs = ["tiny"]                   all by default
     sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
@@ -76,9 +79,11 @@ class Rung:
 
 @dataclass(frozen=True)
 class Sketch:
-    """Where instances come from: a sample, a file (its bytes, with those of a mask), or random strokes of some seeds.
+    """Where instances come from: a sample, a file (its bytes, with those of a mask),
+    or random strokes of some seeds.
 
-    name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the file's own name, or the shape of a random mask.
+    name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
+    file's own name, or the shape of a random mask.
     """
 
     name: str
@@ -163,7 +168,10 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """The specification that a document describes, whose files are found beside `path`. Raises InputError, naming `path`."""
+    """The specification that a document describes, whose files are found beside `path`.
+
+    Raises InputError, naming `path`.
+    """
     try:
         return _spec(_Table(document, ""), path.parent)
     except InputError as error:
@@ -308,7 +316,8 @@ def _sketch(table: _Table, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     name = table.text("name")
     if not _NAME.fullmatch(name):
         raise InputError(
-            f"{table.at('name')}: {name[:40]!r} is not allowed; use a lower-case letter, then at most 15 lower-case letters and digits, no path"
+            f"{table.at('name')}: {name[:40]!r} is not allowed; use a lower-case letter, "
+            "then at most 15 lower-case letters and digits, no path"
         )
     wanted = table.chosen("rungs", [rung.name for rung in rungs])
     sizes = _sizes(table, wanted)
@@ -321,7 +330,8 @@ def _sketch(table: _Table, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     for size in every:
         if every.count(size) > 1:
             raise InputError(
-                f"{table.place}: {name} has size {size} on two rungs; keep it on one, because names carry the size alone"
+                f"{table.place}: {name} has size {size} on two rungs; keep it on one, "
+                "because names carry the size alone"
             )
     return sketch
 

@@ -1,8 +1,10 @@
-"""A library as a static site: a table of all entries, a page for each instance and each entry, pictures, and every file.
+"""A library as a static site: a table of all entries, a page for each instance and each entry, pictures,
+and every file.
 
-Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/, files/ (the library itself).
-Links are relative, nothing is asked of any other place, and without JavaScript everything is there but sorting and filtering.
-The templates are templates/site/*.html.j2; every text that comes from a file is escaped by them.
+Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/,
+files/ (the library itself). Links are relative, nothing is asked of any other place, and without JavaScript
+everything is there but sorting and filtering. The templates are templates/site/*.html.j2; every text that
+comes from a file is escaped by them.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ _ROLES: Final = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A field of an instance as it is shown. roles: keys of _ROLES; facts: who found it; told: its singularities."""
+    """A field of an instance as it is shown. roles: keys of _ROLES; facts: who found it; told:
+    its singularities.
+    """
 
     roles: tuple[str, ...]
     facts: dict[str, Any]
@@ -82,17 +86,20 @@ class Shown:
         return str(self.about["name"])
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
-        """The field that is shown with an entry: best for the norm that the entry minimises, or the one whose jumps are its data."""
+        """The field that is shown with an entry: best for the norm that the entry minimises,
+        or the one whose jumps are its data.
+        """
         meaning = FORMULATIONS[entry["formulation"]].minimises
         role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
         return next(each for each in self.pictures if role in each.roles)
 
 
 def write_site(folder: str | Path, output: str | Path, progress: Progress = lambda _: None) -> list[Path]:
-    """The pages of the site about the library in `folder`, written to `output`, where an earlier site is replaced as a whole.
+    """The pages of the site about the library in `folder`, written to `output`,
+    where an earlier site is replaced as a whole.
 
-    Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and OutputError when `output`
-    cannot be written or holds something other than a site.
+    Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
+    OutputError when `output` cannot be written or holds something other than a site.
     """
     library = read_library(folder)
     if Path(output).resolve().is_relative_to(library.folder.resolve()):
@@ -155,13 +162,17 @@ def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) ->
         for file in document["files"]:
             if sums.get(file["name"]) != file["sha256"]:
                 raise InstanceError(
-                    f"SHA256SUMS and {document['name']} disagree about {file['name']}; build the library again",
+                    f"SHA256SUMS and {document['name']} disagree about {file['name']}; "
+                    "build the library again",
                     file=library.folder,
                 )
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
-    """Link every file of the library into a folder, or copy where links cannot be. Raises InputError when one differs from its checksum."""
+    """Link every file of the library into a folder, or copy where links cannot be.
+
+    Raises InputError when one differs from its checksum.
+    """
     for name, expected in sums.items():
         if not (folder / name).is_file() or sha256_of(folder / name) != expected:
             raise InputError(
@@ -304,7 +315,8 @@ def size(number: int) -> str:
 
 @contextmanager
 def _replacing_folder(output: Path) -> Iterator[Path]:
-    """An empty neighbour of a folder that takes its place on success; on failure it is removed and what stood there stays.
+    """An empty neighbour of a folder that takes its place on success;
+    on failure it is removed and what stood there stays.
 
     Raises OutputError when the folder holds something other than a site, or nothing can be written beside it.
     """
@@ -344,7 +356,9 @@ def _check_replaceable(output: Path) -> None:
 
 
 def _take_place(stage: Path, output: Path) -> None:
-    """Rename the new folder to the old one's name; the old one goes only after that, and comes back if it fails."""
+    """Rename the new folder to the old one's name; the old one goes only after that,
+    and comes back if it fails.
+    """
     old = stage.with_suffix(".old")
     if output.exists():
         output.rename(old)

@@ -1,4 +1,6 @@
-"""The standalone checker: against our own evaluation, against real solvers, against calculation by hand, and bad input."""
+"""The standalone checker: against our own evaluation, against real solvers, against calculation by hand,
+and bad input.
+"""
 
 import ast
 import gzip
@@ -190,9 +192,24 @@ def test_highs_says_the_same_of_its_own_point(name, tmp_path):
 
 
 BOUNDS = [
-    "", "UP B x 4", "UP B x 0", "LO B x -2", "LO B x -2\n UP B x 7.5", "MI B x\n UP B x -3", "FR B x", "FX B x 2.5",
-    "PL B x", "LO B x 1\n PL B x", "MI B x", "BV B x", "LI B x 2", "UI B x 9", "LI B x -4\n UI B x 4", "LO B x -1e30", "UP B x inf",
-]  # fmt: skip
+    "",
+    "UP B x 4",
+    "UP B x 0",
+    "LO B x -2",
+    "LO B x -2\n UP B x 7.5",
+    "MI B x\n UP B x -3",
+    "FR B x",
+    "FX B x 2.5",
+    "PL B x",
+    "LO B x 1\n PL B x",
+    "MI B x",
+    "BV B x",
+    "LI B x 2",
+    "UI B x 9",
+    "LI B x -4\n UI B x 4",
+    "LO B x -1e30",
+    "UP B x inf",
+]
 
 
 @for_each("integer", [False, True])
@@ -221,7 +238,8 @@ def test_bounds_mean_what_they_mean_to_highs(bounds, integer, tmp_path):
 def test_ranges_mean_what_they_mean_to_highs(sense, length, tmp_path):
     highspy = pytest.importorskip("highspy")
     (tmp_path / "m.mps").write_text(
-        f"NAME m\nROWS\n N obj\n {sense} c\nCOLUMNS\n x obj 1 c 1\nRHS\n R c 2\nRANGES\n G c {length}\nBOUNDS\n FR B x\nENDATA\n"
+        f"NAME m\nROWS\n N obj\n {sense} c\nCOLUMNS\n x obj 1 c 1\nRHS\n R c 2\nRANGES\n G c "
+        f"{length}\nBOUNDS\n FR B x\nENDATA\n"
     )
     highs = highspy.Highs()
     highs.setOptionValue("output_flag", False)
@@ -241,7 +259,9 @@ BY_HAND = "alpha_00_00 0.1\nalpha_00_01 0.3\nbeta_00_00 0.2\nbeta_00_01 -0.1\np1
 
 
 def test_two_pixels_by_hand(tmp_path):
-    """A = 0.1 - 0.3 - pi/2, B = -0.2 + 0.1, R = 0.1 + 0.2; weights 2 (pair), 2 x 0.25 (stroke), 0.5 (skew)."""
+    """A = 0.1 - 0.3 - pi/2, B = -0.2 + 0.1, R = 0.1 + 0.2; weights 2 (pair), 2 x 0.25 (stroke),
+    0.5 (skew).
+    """
     (tmp_path / "i.json").write_text(json.dumps(PAIR))
     (tmp_path / "p.sol").write_text(BY_HAND)
     found = check(str(tmp_path / "i.json"), str(tmp_path / "p.sol"))
@@ -287,7 +307,9 @@ ENDATA
 
 
 def test_every_section_by_hand_with_the_exact_fraction(tmp_path, capsys):
-    """At x = 0.5, k = 2.25, y = -0.1: 0.05 - 6.75 + 7 + 2/4 - 0.5/20 = 0.775; c1 = 0.5 - 0.02 + 0.25 - 0.025 = 0.705."""
+    """At x = 0.5, k = 2.25, y = -0.1: 0.05 - 6.75 + 7 + 2/4 - 0.5/20 = 0.775;
+    c1 = 0.5 - 0.02 + 0.25 - 0.025 = 0.705.
+    """
     (tmp_path / "m.mps").write_text(EVERYTHING)
     (tmp_path / "p.sol").write_text("=obj= 0.775\nx 0.5\nk 2.25\ny -0.1\n")
     code, out, err = called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--fraction")
@@ -479,7 +501,19 @@ def test_the_good_ones_are_good(tmp_path):
         assert check(str(tmp_path / "m"), str(tmp_path / "p")).worst == 0
 
 
-@for_each("arguments", [(), ("m",), ("m", "p", "q"), ("m", "p", "--tolerance", "x"), ("m", "p", "--tolerance", "-1"), ("m", "p", "--nothing"), ("absent", "p"), (".", "p")])  # fmt: skip
+@for_each(
+    "arguments",
+    [
+        (),
+        ("m",),
+        ("m", "p", "q"),
+        ("m", "p", "--tolerance", "x"),
+        ("m", "p", "--tolerance", "-1"),
+        ("m", "p", "--nothing"),
+        ("absent", "p"),
+        (".", "p"),
+    ],
+)
 def test_wrong_usage_is_one_line(arguments, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m").write_text(linear())

@@ -1,4 +1,6 @@
-"""The instance library: what a build makes of a specification, that it is true, and that it is the same however it is made."""
+"""The instance library: what a build makes of a specification, that it is true,
+and that it is the same however it is made.
+"""
 
 import gzip
 import hashlib
@@ -136,34 +138,91 @@ GOOD_SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
 BAD = {
     "no TOML": ("[[[", "not valid TOML"),
     "another kind": ('format = "x"\n', "format: must be 'crossfield-library-spec'"),
-    "unknown key": (HEAD + 'colour = "red"\n' + GOOD_RUNG + GOOD_SKETCH, "colour: is unknown; the keys here are format"),
+    "unknown key": (
+        HEAD + 'colour = "red"\n' + GOOD_RUNG + GOOD_SKETCH,
+        "colour: is unknown; the keys here are format",
+    ),
     "unknown key of a rung": (HEAD + GOOD_RUNG + "speed = 1\n" + GOOD_SKETCH, "rungs.tiny.speed: is unknown"),
-    "unknown rung": (HEAD + "[rungs.huge]\nsizes = [4]\n" + GOOD_SKETCH, "rungs.huge: is unknown; the keys here are tiny"),
+    "unknown rung": (
+        HEAD + "[rungs.huge]\nsizes = [4]\n" + GOOD_SKETCH,
+        "rungs.huge: is unknown; the keys here are tiny",
+    ),
     "no rung": (HEAD + GOOD_SKETCH, "rungs: there is none"),
     "no sketch": (HEAD + GOOD_RUNG, "sketches: there is none"),
-    "size zero": (HEAD + "[rungs.tiny]\nsizes = [0]\n" + GOOD_SKETCH, "rungs.tiny.sizes: 0 is out of range; choose 1 to 999"),
+    "size zero": (
+        HEAD + "[rungs.tiny]\nsizes = [0]\n" + GOOD_SKETCH,
+        "rungs.tiny.sizes: 0 is out of range; choose 1 to 999",
+    ),
     "size too large": (HEAD + "[rungs.tiny]\nsizes = [1000]\n" + GOOD_SKETCH, "1000 is out of range"),
     "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + GOOD_SKETCH, "must be a list of whole numbers"),
-    "size as truth": (HEAD + "[rungs.tiny]\nsizes = [true]\n" + GOOD_SKETCH, "must be a list of whole numbers"),
-    "size twice": (HEAD + GOOD_RUNG + "[rungs.small]\nsizes = [4]\n" + GOOD_SKETCH, "a has size 4 on two rungs"),
-    "unknown format": (HEAD + GOOD_RUNG + 'formats = ["docx"]\n' + GOOD_SKETCH, "there is no 'docx'; choose from nl"),
-    "unknown formulation": (HEAD + 'formulations = ["lp"]\n' + GOOD_RUNG + GOOD_SKETCH, "formulations: there is no 'lp'"),
-    "formulation twice": (HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + GOOD_RUNG + GOOD_SKETCH, "'qp-fixed' is listed twice"),
-    "duplicate name": (HEAD + GOOD_RUNG + GOOD_SKETCH + GOOD_SKETCH, "sketches[1].name: 'a' is the name of two sketches"),
-    "name with a path": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"../a"'), "sketches[0].name: '../a' is not allowed"),
+    "size as truth": (
+        HEAD + "[rungs.tiny]\nsizes = [true]\n" + GOOD_SKETCH,
+        "must be a list of whole numbers",
+    ),
+    "size twice": (
+        HEAD + GOOD_RUNG + "[rungs.small]\nsizes = [4]\n" + GOOD_SKETCH,
+        "a has size 4 on two rungs",
+    ),
+    "unknown format": (
+        HEAD + GOOD_RUNG + 'formats = ["docx"]\n' + GOOD_SKETCH,
+        "there is no 'docx'; choose from nl",
+    ),
+    "unknown formulation": (
+        HEAD + 'formulations = ["lp"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        "formulations: there is no 'lp'",
+    ),
+    "formulation twice": (
+        HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        "'qp-fixed' is listed twice",
+    ),
+    "duplicate name": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + GOOD_SKETCH,
+        "sketches[1].name: 'a' is the name of two sketches",
+    ),
+    "name with a path": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"../a"'),
+        "sketches[0].name: '../a' is not allowed",
+    ),
     "name in capitals": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
-    "name too long": (HEAD + GOOD_RUNG + 'facets = ["printed"]\ngauges = ["box"]\n' + GOOD_SKETCH.replace('"a"', '"abcdefghijklmn"'), "has 39 characters; shorten"),
+    "name too long": (
+        HEAD
+        + GOOD_RUNG
+        + 'facets = ["printed"]\ngauges = ["box"]\n'
+        + GOOD_SKETCH.replace('"a"', '"abcdefghijklmn"'),
+        "has 39 characters; shorten",
+    ),
     "unknown sample": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),
-    "missing file": (HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n', "sketches[0].file: there is no file"),
-    "missing mask": (HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n', "sketches[0].mask: there is no file"),
-    "no source": (HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\n', "needs exactly one of sample, file, random"),
+    "missing file": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n',
+        "sketches[0].file: there is no file",
+    ),
+    "missing mask": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n',
+        "sketches[0].mask: there is no file",
+    ),
+    "no source": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\n',
+        "needs exactly one of sample, file, random",
+    ),
     "two sources": (HEAD + GOOD_RUNG + GOOD_SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
-    "random without seeds": (HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n', "sketches[0].seeds: must be a list"),
-    "sizes on a rung that is not": (HEAD + GOOD_RUNG + GOOD_SKETCH + "sizes = { large = [9] }\n", "sketches[0].sizes.large: is unknown"),
+    "random without seeds": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
+        "sketches[0].seeds: must be a list",
+    ),
+    "sizes on a rung that is not": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + "sizes = { large = [9] }\n",
+        "sketches[0].sizes.large: is unknown",
+    ),
     "seeds of a sample": (HEAD + GOOD_RUNG + GOOD_SKETCH + "seeds = [1]\n", "sketches[0].seeds: is unknown"),
-    "missing ledger": (HEAD + 'ledger = "gone.json"\n' + GOOD_RUNG + GOOD_SKETCH, "ledger: there is no file gone.json"),
-    "a drawing without strokes": (HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n', "cf_a_n004"),
-}  # fmt: skip
+    "missing ledger": (
+        HEAD + 'ledger = "gone.json"\n' + GOOD_RUNG + GOOD_SKETCH,
+        "ledger: there is no file gone.json",
+    ),
+    "a drawing without strokes": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n',
+        "cf_a_n004",
+    ),
+}
 
 
 @for_each("case", BAD)
@@ -678,7 +737,9 @@ def test_a_damaged_ledger_is_one_line(copy, capfd):
 
 
 def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothing():
-    """Every record is about the very problem that is built today, no bound is above a point, and every kept field has the objective told."""
+    """Every record is about the very problem that is built today, no bound is above a point,
+    and every kept field has the objective told.
+    """
     spec = default_spec()
     ledger = read_ledger(spec.ledger.parent)
     recipes = {entry.name: (each.recipe, entry) for each in plan(spec) for entry in each.entries}

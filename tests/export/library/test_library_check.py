@@ -102,9 +102,14 @@ OUTSIDE = ["../evil", "lib/../../evil", "/tmp/evil", "..", "C:\\evil", "lib\\..\
 SPECIAL = [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE, tarfile.FIFOTYPE]
 TRAPS = {
     **{f"tar {name!r}": lambda name=name: tar_of([*INSIDE.items(), (name, b"x")]) for name in OUTSIDE},
-    **{f"tar.gz {name!r}": lambda name=name: gzip.compress(tar_of([*INSIDE.items(), (name, b"x")])) for name in OUTSIDE},
+    **{
+        f"tar.gz {name!r}": lambda name=name: gzip.compress(tar_of([*INSIDE.items(), (name, b"x")]))
+        for name in OUTSIDE
+    },
     **{f"zip {name!r}": lambda name=name: zip_of([*INSIDE.items(), (name, b"x")]) for name in OUTSIDE},
-    **{f"tar {kind!r}": lambda kind=kind: tar_of([*INSIDE.items(), (special(kind), b"")]) for kind in SPECIAL},
+    **{
+        f"tar {kind!r}": lambda kind=kind: tar_of([*INSIDE.items(), (special(kind), b"")]) for kind in SPECIAL
+    },
     "tar link inside": lambda: tar_of([*INSIDE.items(), (special(tarfile.SYMTYPE, "README.md"), b"")]),
     "zip link": lambda: zip_of([*INSIDE.items(), (linked(), b"/etc/passwd")]),
     "tar twice": lambda: tar_of([*INSIDE.items(), *INSIDE.items()]),
@@ -112,11 +117,13 @@ TRAPS = {
     "cut tar.gz": lambda: gzip.compress(tar_of([("a", os.urandom(5000))]))[:-3000],
     "cut tar.xz": lambda: lzma.compress(tar_of([("a", os.urandom(5000))]))[:-3000],
     "cut zip": lambda: zip_of([("a", os.urandom(5000))])[:-200],
-    "damaged zip": lambda: zip_of([("a", b"abc" * 500)]).replace(b"\x4b\x4c", b"\x4b\x4d", 1)[:60] + b"PK" * 40,
+    "damaged zip": lambda: (
+        zip_of([("a", b"abc" * 500)]).replace(b"\x4b\x4c", b"\x4b\x4d", 1)[:60] + b"PK" * 40
+    ),
     "gz of text": lambda: gzip.compress(b"hello" * 1000),
     "text": lambda: b"hello" * 1000,
     "empty": lambda: b"",
-}  # fmt: skip
+}
 
 
 @for_each("what", TRAPS)
@@ -252,64 +259,218 @@ def bound_of(value):
 
 MILP, MIQP, QP = f"{STEM}_milp.json", f"{STEM}_miqp.json", f"{STEM}_qp.json"
 PLAIN = {
-    "a byte of a model": (lambda lib: rewrite(lib / f"{STEM}_milp.nl.gz", b"\x1f", b"\x1e"), f"{STEM}_milp.nl.gz", "another SHA-256"),
+    "a byte of a model": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.nl.gz", b"\x1f", b"\x1e"),
+        f"{STEM}_milp.nl.gz",
+        "another SHA-256",
+    ),
     "a byte of a text": (lambda lib: rewrite(lib / "README.md", b"e", b"E"), "README.md", "another SHA-256"),
     "a missing file": (lambda lib: (lib / f"{STEM}_qp.mps.gz").unlink(), f"{STEM}_qp.mps.gz", "is missing"),
     "a missing sidecar": (lambda lib: (lib / QP).unlink(), QP, "is missing"),
     "a missing list of checksums": (lambda lib: (lib / "SHA256SUMS").unlink(), "SHA256SUMS", "is missing"),
     "a missing index": (lambda lib: (lib / "library.json").unlink(), "library.json", "is missing"),
-    "a missing instance": (lambda lib: (lib / f"{STEM}.instance.json").unlink(), f"{STEM}.instance.json", "is missing"),
+    "a missing instance": (
+        lambda lib: (lib / f"{STEM}.instance.json").unlink(),
+        f"{STEM}.instance.json",
+        "is missing",
+    ),
     "an extra file": (lambda lib: (lib / "notes.txt").write_text("x"), "notes.txt", "not in SHA256SUMS"),
     "a folder": (lambda lib: (lib / "more").mkdir(), "more", "is a folder"),
     "a link": (link, "README.md", "is a link"),
-    "what a stopped build left": (lambda lib: (lib / ".a.mps.x.part").write_text(""), ".a.mps.x.part", "a build that was stopped"),
-    "a path upwards in the checksums": (lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  ../README.md"), "SHA256SUMS", "no plain file name"),
-    "an absolute path in the checksums": (lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  /etc/passwd"), "SHA256SUMS", "no plain file name"),
-    "a line that is no checksum": (lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b" README.md"), "SHA256SUMS", "no checksum"),
+    "what a stopped build left": (
+        lambda lib: (lib / ".a.mps.x.part").write_text(""),
+        ".a.mps.x.part",
+        "a build that was stopped",
+    ),
+    "a path upwards in the checksums": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  ../README.md"),
+        "SHA256SUMS",
+        "no plain file name",
+    ),
+    "an absolute path in the checksums": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  /etc/passwd"),
+        "SHA256SUMS",
+        "no plain file name",
+    ),
+    "a line that is no checksum": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b" README.md"),
+        "SHA256SUMS",
+        "no checksum",
+    ),
     "a damaged index": (lambda lib: (lib / "library.json").write_text("{"), "library.json", "not valid JSON"),
     "a damaged sidecar": (lambda lib: (lib / QP).write_bytes(b"\xff\xfe"), QP, "not JSON"),
-}  # fmt: skip
+}
 SEALED = {
-    "a coefficient of the .mps": (lambda lib: repack(lib / f"{STEM}_milp.mps.gz", b" 1.5707963267948966\n", b" 1.5707963267948968\n"), f"{STEM}_milp.mps.gz", "does not hold the problem"),
-    "a bound in the .nl": (lambda lib: repack(lib / f"{STEM}_qp.nl.gz", b"0.7853981633974483", b"0.7853981633974484"), f"{STEM}_qp.nl.gz", "does not hold the problem"),
-    "a name in the .col": (lambda lib: rewrite(lib / f"{STEM}_milp.col", b"alpha_00_00", b"alpha_00_09"), f"{STEM}_milp.col", "does not hold the problem"),
-    "a packed file that is cut off": (lambda lib: (lib / f"{STEM}_milp.mps.gz").write_bytes((lib / f"{STEM}_milp.mps.gz").read_bytes()[:-40]), f"{STEM}_milp.mps.gz", "does not hold the problem"),
-    "a file that nothing names": (lambda lib: (lib / "notes.txt").write_text("x"), "notes.txt", "belongs to nothing"),
-    "a path in a sidecar": (lambda lib: change(lib / MILP, files=lambda files: [*files, files[0] | {"name": "../../secret.mps"}]), MILP, "does not match"),
-    "a path to the instance": (lambda lib: change(lib / MILP, instance__file="../other.json"), MILP, "does not match"),
-    "a path in the ledger": (lambda lib: add_record(lib, point="../x.field.json"), "ledger.json", "does not match"),
-    "an unknown key": (lambda lib: change(lib / MILP, files=lambda files: [file | {"more": 1} for file in files]), MILP, "more"),
-    "a name that is too long": (lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_" + "a" * 30]), "library.json", "does not match"),
-    "an entry that is not there": (lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_more_n003_qp"]), "cf_more_n003_qp.json", "cannot be read"),
-    "other counts": (lambda lib: change(lib / MILP, counts__variables=lambda value: value + 1), MILP, "another counts"),
+    "a coefficient of the .mps": (
+        lambda lib: repack(lib / f"{STEM}_milp.mps.gz", b" 1.5707963267948966\n", b" 1.5707963267948968\n"),
+        f"{STEM}_milp.mps.gz",
+        "does not hold the problem",
+    ),
+    "a bound in the .nl": (
+        lambda lib: repack(lib / f"{STEM}_qp.nl.gz", b"0.7853981633974483", b"0.7853981633974484"),
+        f"{STEM}_qp.nl.gz",
+        "does not hold the problem",
+    ),
+    "a name in the .col": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.col", b"alpha_00_00", b"alpha_00_09"),
+        f"{STEM}_milp.col",
+        "does not hold the problem",
+    ),
+    "a packed file that is cut off": (
+        lambda lib: (lib / f"{STEM}_milp.mps.gz").write_bytes(
+            (lib / f"{STEM}_milp.mps.gz").read_bytes()[:-40]
+        ),
+        f"{STEM}_milp.mps.gz",
+        "does not hold the problem",
+    ),
+    "a file that nothing names": (
+        lambda lib: (lib / "notes.txt").write_text("x"),
+        "notes.txt",
+        "belongs to nothing",
+    ),
+    "a path in a sidecar": (
+        lambda lib: change(lib / MILP, files=lambda files: [*files, files[0] | {"name": "../../secret.mps"}]),
+        MILP,
+        "does not match",
+    ),
+    "a path to the instance": (
+        lambda lib: change(lib / MILP, instance__file="../other.json"),
+        MILP,
+        "does not match",
+    ),
+    "a path in the ledger": (
+        lambda lib: add_record(lib, point="../x.field.json"),
+        "ledger.json",
+        "does not match",
+    ),
+    "an unknown key": (
+        lambda lib: change(lib / MILP, files=lambda files: [file | {"more": 1} for file in files]),
+        MILP,
+        "more",
+    ),
+    "a name that is too long": (
+        lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_" + "a" * 30]),
+        "library.json",
+        "does not match",
+    ),
+    "an entry that is not there": (
+        lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_more_n003_qp"]),
+        "cf_more_n003_qp.json",
+        "cannot be read",
+    ),
+    "other counts": (
+        lambda lib: change(lib / MILP, counts__variables=lambda value: value + 1),
+        MILP,
+        "another counts",
+    ),
     "another class": (lambda lib: change(lib / MILP, **{"class": "MIQP"}), MILP, "another class"),
     "other ranges": (lambda lib: change(lib / MIQP, ranges__matrix=[1.0, 2.0]), MIQP, "another ranges"),
-    "other curvature": (lambda lib: change(lib / MIQP, curvature__objective="indefinite"), MIQP, "another curvature"),
-    "an unknown formulation": (lambda lib: change(lib / MILP, formulation="nothing"), MILP, "no entry can have"),
+    "other curvature": (
+        lambda lib: change(lib / MIQP, curvature__objective="indefinite"),
+        MIQP,
+        "another curvature",
+    ),
+    "an unknown formulation": (
+        lambda lib: change(lib / MILP, formulation="nothing"),
+        MILP,
+        "no entry can have",
+    ),
     "a jump beyond all numbers": (lambda lib: change(lib / QP, jumps=[[0, 10**30]]), QP, "no entry can have"),
     "a jump of no pair": (lambda lib: change(lib / QP, jumps=[[999, 1]]), QP, "does not have"),
-    "an objective beyond all numbers": (lambda lib: change(lib / QP, best__objective=10**400), f"{STEM}_qp.sol", "has objective"),
-    "an objective that is no number": (lambda lib: change(lib / QP, best__objective=float("nan")), f"{STEM}_qp.sol", "has objective"),
-    "a bound beyond all numbers": (lambda lib: change(lib / QP, **bound_of(10**400)), QP, "no entry can have"),
-    "another option": (lambda lib: change(lib / MILP, options__facet="printed"), f"{STEM}.instance.json", "is not the instance"),
-    "another objective": (lambda lib: change(lib / MIQP, best__objective=lambda value: value + 1e-7), f"{STEM}_miqp.sol", "has objective"),
-    "another energy": (lambda lib: change(lib / MIQP, best__energy_2norm=lambda value: value + 1e-7), f"{STEM}_miqp.sol", "of a field of energy"),
+    "an objective beyond all numbers": (
+        lambda lib: change(lib / QP, best__objective=10**400),
+        f"{STEM}_qp.sol",
+        "has objective",
+    ),
+    "an objective that is no number": (
+        lambda lib: change(lib / QP, best__objective=float("nan")),
+        f"{STEM}_qp.sol",
+        "has objective",
+    ),
+    "a bound beyond all numbers": (
+        lambda lib: change(lib / QP, **bound_of(10**400)),
+        QP,
+        "no entry can have",
+    ),
+    "another option": (
+        lambda lib: change(lib / MILP, options__facet="printed"),
+        f"{STEM}.instance.json",
+        "is not the instance",
+    ),
+    "another objective": (
+        lambda lib: change(lib / MIQP, best__objective=lambda value: value + 1e-7),
+        f"{STEM}_miqp.sol",
+        "has objective",
+    ),
+    "another energy": (
+        lambda lib: change(lib / MIQP, best__energy_2norm=lambda value: value + 1e-7),
+        f"{STEM}_miqp.sol",
+        "of a field of energy",
+    ),
     "the point of another entry": (swap, f"{STEM}_miqp.sol", "the checker refuses it"),
     "a point that is not feasible": (break_point, f"{STEM}_milp.sol", "is not feasible"),
-    "a claim that is not so": (lambda lib: rewrite(lib / f"{STEM}_milp.sol", b"=obj= ", b"=obj= 1"), f"{STEM}_milp.sol", "claims objective"),
-    "a damaged point": (lambda lib: rewrite(lib / f"{STEM}_milp.nl.sol", b"Options", b"Option"), f"{STEM}_milp.nl.sol", "no solution file of a known kind"),
+    "a claim that is not so": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.sol", b"=obj= ", b"=obj= 1"),
+        f"{STEM}_milp.sol",
+        "claims objective",
+    ),
+    "a damaged point": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.nl.sol", b"Options", b"Option"),
+        f"{STEM}_milp.nl.sol",
+        "no solution file of a known kind",
+    ),
     "a bound above a point": (lambda lib: change(lib / MIQP, **bound_of(1e3)), MIQP, "above the objective"),
-    "a status that does not follow": (lambda lib: change(lib / MIQP, **bound_of(-1.0)), MIQP, "another status or gap"),
-    "a bound that is none of the bounds": (lambda lib: change(lib / QP, bound=-5.0), QP, "the best of its bounds"),
-    "a fact in library.solu": (lambda lib: rewrite(lib / "library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()), "library.solu", "not what its sidecar says"),
-    "a line in library.solu": (lambda lib: rewrite(lib / "library.solu", b"=", b"~"), "library.solu", "no fact"),
-    "another checker": (lambda lib: rewrite(lib / "check_point.py", b"1e-8", b"1e-1"), "check_point.py", "is not the checker"),
-    "a field of another energy": (lambda lib: change(lib / f"{STEM}.about.json", fields__least_2__energy_2norm=0.0), f"{STEM}.about.json", "other energies"),
-    "another instance": (lambda lib: change(lib / f"{STEM}.instance.json", w_beta=0.5), f"{STEM}.instance.json", "is not the instance"),
-    "a record of nothing": (lambda lib: add_record(lib, entry="cf_more_n003_qp"), "ledger.json", "not in the library"),
-    "a record without its field": (lambda lib: add_record(lib, point=f"{STEM}_milp.field.json", point_sha256="0" * 64), f"{STEM}_milp.field.json", "cannot be read"),
-    "another program": (lambda lib: change(lib / MILP, generator="crossfield 0.0.1"), MILP, "was made by crossfield 0.0.1"),
-}  # fmt: skip
+    "a status that does not follow": (
+        lambda lib: change(lib / MIQP, **bound_of(-1.0)),
+        MIQP,
+        "another status or gap",
+    ),
+    "a bound that is none of the bounds": (
+        lambda lib: change(lib / QP, bound=-5.0),
+        QP,
+        "the best of its bounds",
+    ),
+    "a fact in library.solu": (
+        lambda lib: rewrite(lib / "library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
+        "library.solu",
+        "not what its sidecar says",
+    ),
+    "a line in library.solu": (
+        lambda lib: rewrite(lib / "library.solu", b"=", b"~"),
+        "library.solu",
+        "no fact",
+    ),
+    "another checker": (
+        lambda lib: rewrite(lib / "check_point.py", b"1e-8", b"1e-1"),
+        "check_point.py",
+        "is not the checker",
+    ),
+    "a field of another energy": (
+        lambda lib: change(lib / f"{STEM}.about.json", fields__least_2__energy_2norm=0.0),
+        f"{STEM}.about.json",
+        "other energies",
+    ),
+    "another instance": (
+        lambda lib: change(lib / f"{STEM}.instance.json", w_beta=0.5),
+        f"{STEM}.instance.json",
+        "is not the instance",
+    ),
+    "a record of nothing": (
+        lambda lib: add_record(lib, entry="cf_more_n003_qp"),
+        "ledger.json",
+        "not in the library",
+    ),
+    "a record without its field": (
+        lambda lib: add_record(lib, point=f"{STEM}_milp.field.json", point_sha256="0" * 64),
+        f"{STEM}_milp.field.json",
+        "cannot be read",
+    ),
+    "another program": (
+        lambda lib: change(lib / MILP, generator="crossfield 0.0.1"),
+        MILP,
+        "was made by crossfield 0.0.1",
+    ),
+}
 
 
 def told(folder, file, words):
@@ -367,7 +528,10 @@ def test_findings_are_one_line_each_and_the_exit_code_is_1(lib, capsys):
     assert invoke(["library", "verify", str(lib)]) == 1
     said = capsys.readouterr()
     assert said.err.splitlines() == [
-        "crossfield: README.md: has another SHA-256 than SHA256SUMS says; fetch it again, or build the library again",
+        (
+            "crossfield: README.md: has another SHA-256 than SHA256SUMS says; fetch it again, "
+            "or build the library again"
+        ),
         "crossfield: notes.txt: is not in SHA256SUMS; remove it, or build the library again",
     ]
     assert invoke(["library", "verify", str(lib), "--json"]) == 1
@@ -387,7 +551,9 @@ def test_what_is_no_library_is_one_line(path, tmp_path, capsys):
 
 
 def better_point(library, entry, path):
-    """A solution file as HiGHS writes it: the optimal angles of a convex entry for the jumps of the least 2-norm field."""
+    """A solution file as HiGHS writes it: the optimal angles of a convex entry for the
+    jumps of the least 2-norm field.
+    """
     highspy = pytest.importorskip("highspy")
     problem = problem_of(library, json.loads((library / f"{entry}.json").read_text()))
     write(with_integers_fixed(problem, read_field(library / f"{STEM}.field.json")), path.with_suffix(".mps"))
@@ -405,7 +571,9 @@ ENTRY = f"{STEM}_miqp"
 
 @pytest.fixture(scope="module")
 def solved(built, tmp_path_factory):
-    """HiGHS's better point of an entry, its objective, and the library after it was submitted; not to be changed."""
+    """HiGHS's better point of an entry, its objective, and the library after it was submitted;
+    not to be changed.
+    """
     folder = tmp_path_factory.mktemp("solved")
     objective = better_point(built, ENTRY, folder / "found.sol")
     lib = shutil.copytree(built, folder / "lib")
@@ -467,7 +635,9 @@ def test_the_entry_is_found_by_the_name_of_the_file_or_by_its_columns(built, sol
 
 
 def states(before, after):
-    """Folders as a submission may leave them when it is stopped: files are written one by one, checksums last."""
+    """Folders as a submission may leave them when it is stopped: files are written one by one,
+    checksums last.
+    """
     changed = [name for name in after if after[name] != before.get(name)]
     field, ledger, sums = f"{ENTRY}.field.json", "ledger.json", "SHA256SUMS"
     rest = sorted(set(changed) - {field, ledger, sums})
@@ -484,7 +654,17 @@ def states(before, after):
     }
 
 
-@pytest.mark.parametrize("state", ["field", "ledger", "half of the files", "all but the sidecars", "the sidecars too", "all but the checksums"])  # fmt: skip
+@pytest.mark.parametrize(
+    "state",
+    [
+        "field",
+        "ledger",
+        "half of the files",
+        "all but the sidecars",
+        "the sidecars too",
+        "all but the checksums",
+    ],
+)
 def test_a_submission_that_was_stopped_is_told_and_mended_by_the_next(state, built, solved, tmp_path):
     before, after = everything_below(built), everything_below(solved[2])
     lib = shutil.copytree(built, tmp_path / "lib")

@@ -1,4 +1,6 @@
-"""The library built on a cluster: a real scheduler and two real workers, one of which is killed in the middle."""
+"""The library built on a cluster: a real scheduler and two real workers,
+one of which is killed in the middle.
+"""
 
 import re
 import signal
@@ -37,7 +39,8 @@ sample = "skew"
 BUILD = """import sys
 from crossfield.export.library.building.build import build
 from crossfield.export.library.plan.spec import read_spec
-build(read_spec(sys.argv[1]), sys.argv[2], scheduler=sys.argv[3], progress=lambda line: print(line, flush=True))
+spec, folder, address = sys.argv[1:4]
+build(read_spec(spec), folder, scheduler=address, progress=lambda line: print(line, flush=True))
 """
 
 

@@ -1,4 +1,6 @@
-"""Every field of a library, forged in turn under new checksums, is found: nothing is believed that can be computed again."""
+"""Every field of a library, forged in turn under new checksums, is found:
+nothing is believed that can be computed again.
+"""
 
 import copy
 import json
@@ -44,8 +46,18 @@ def built(tmp_path_factory):
     bound = 0.5 * sidecar["best"]["objective"]
     add_record(
         library.folder,
-        Record(MILP, sidecar["problem_sha256"], "HiGHS", "1.0", "limit", bound=bound, seconds=1.5, threads=1, time_limit=2.0),
-    )  # fmt: skip
+        Record(
+            MILP,
+            sidecar["problem_sha256"],
+            "HiGHS",
+            "1.0",
+            "limit",
+            bound=bound,
+            seconds=1.5,
+            threads=1,
+            time_limit=2.0,
+        ),
+    )
     rebuild(library.folder)
     assert read_sidecar(library.folder / f"{MILP}.json")["bound"] == bound
     assert verify_library(library.folder) == []

@@ -1,4 +1,6 @@
-"""Changes of a library at the same time: each waits for the others, none is lost, and a crash locks nobody out."""
+"""Changes of a library at the same time: each waits for the others, none is lost,
+and a crash locks nobody out.
+"""
 
 import os
 import shutil
@@ -53,7 +55,9 @@ def copy(built, tmp_path):
 
 
 def better_points(library, folder):
-    """A solution file by HiGHS for each entry: the best angles for the jumps of its field, which is better than the library has."""
+    """A solution file by HiGHS for each entry: the best angles for the jumps of its field,
+    which is better than the library has.
+    """
     highspy = pytest.importorskip("highspy")
     for document in library.entries:
         name = document["name"]

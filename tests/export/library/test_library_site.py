@@ -278,7 +278,8 @@ def test_checksums_and_sizes_on_the_pages_are_those_of_the_files(library, site, 
         if "/" not in name:
             continue
         rows = re.findall(
-            r'href="\.\./files/([^"]+)" download>\1</a></th>(?:\s*<td>[^<]*</td>)?\s*<td class="number">([^<]+)</td>\s*'
+            r'href="\.\./files/([^"]+)" download>\1</a></th>(?:\s*<td>[^<]*</td>)?\s*<td '
+            r'class="number">([^<]+)</td>\s*'
             r'<td><code class="sum">([0-9a-f]{64})</code>',
             (site / name).read_text(),
         )
@@ -482,7 +483,10 @@ def press(browser, *keys):
 
 def choose(browser, name, option):
     """Choose as a person does, without the list that a headless browser has no window for."""
-    script = "const [name, value] = arguments, field = document.querySelector(`[name=${name}]`); field.value = value;"
+    script = (
+        "const [name, value] = arguments, field = document.querySelector(`[name=${name}]`); "
+        "field.value = value;"
+    )
     browser.execute_script(
         f"{script} field.dispatchEvent(new Event('input', {{ bubbles: true }}))", name, option
     )
@@ -505,9 +509,21 @@ def head(browser, title):
 
 
 COLUMNS = (
-    "Name", "Sketch", "Size", "Formulation", "Class", "Type", "Variables", "Integer", "Constraints", "Nonzeros",
-    "Best objective", "Best bound", "Gap", "Status",
-)  # fmt: skip
+    "Name",
+    "Sketch",
+    "Size",
+    "Formulation",
+    "Class",
+    "Type",
+    "Variables",
+    "Integer",
+    "Constraints",
+    "Nonzeros",
+    "Best objective",
+    "Best bound",
+    "Gap",
+    "Status",
+)
 
 
 def test_no_page_complains_or_asks_anything_of_another_place(browser, address):
@@ -656,7 +672,8 @@ def test_a_phone_never_scrolls_sideways(browser, address, page, width):
         width,
     ]
     wide = browser.execute_script(
-        "return [...document.querySelectorAll('main *')].filter(each => each.getBoundingClientRect().right > innerWidth + 1"
+        "return [...document.querySelectorAll('main *')].filter(each => each.getBoundingClientRect().right "
+        "> innerWidth + 1"
         " && !each.closest('.scroll, .model, pre, .hidden')).map(each => each.outerHTML.slice(0, 80))"
     )
     assert wide == []
@@ -671,7 +688,8 @@ const behind = each => { for (; each; each = each.parentElement) {
   if (colour.length === 3 || colour[3] === 1) return colour; } return [255, 255, 255]; };
 const found = [];
 for (const each of document.querySelectorAll('body *')) {
-  if (![...each.childNodes].some(node => node.nodeType === 3 && node.data.trim()) || !each.getClientRects().length) continue;
+  if (![...each.childNodes].some(node => node.nodeType === 3 && node.data.trim())) continue;
+  if (!each.getClientRects().length) continue;
   const [a, b] = [light(parse(getComputedStyle(each).color)), light(behind(each))];
   found.push([(Math.max(a, b) + .05) / (Math.min(a, b) + .05), each.outerHTML.slice(0, 80)]);
 }
@@ -729,7 +747,8 @@ def test_the_formulation_is_rendered_as_mathematics(browser, address):
 
     browser.get(f"{address}/entry/{ENTRY}.html")
     boxes = browser.execute_script(
-        "return [...document.querySelectorAll('.model mfrac')].map(each => [...each.children].map(part => part.getBoundingClientRect().top))"
+        "return [...document.querySelectorAll('.model mfrac')].map(each => [...each.children].map(part => "
+        "part.getBoundingClientRect().top))"
     )
     assert len(boxes) >= 5
     assert all(over < under for over, under in boxes)
@@ -757,7 +776,9 @@ def test_a_thousand_rows_are_sorted_by_moving_each_once(browser, site, tmp_path)
       const field = document.querySelector('[name=q]'), observer = new MutationObserver(() => {});
       observer.observe(document.querySelector('tbody'), { childList: true });
       document.querySelectorAll('thead button').forEach(button => button.click());
-      for (const text of ['c', 'cf', 'cf_m', 'milp']) { field.value = text; field.dispatchEvent(new Event('input', { bubbles: true })); }
+      for (const text of ['c', 'cf', 'cf_m', 'milp']) {
+        field.value = text; field.dispatchEvent(new Event('input', { bubbles: true }));
+      }
       const moved = observer.takeRecords().reduce((sum, each) => sum + each.addedNodes.length, 0);
       return [moved, document.querySelector('#told').textContent];
     """)

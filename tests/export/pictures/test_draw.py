@@ -79,7 +79,8 @@ def test_the_rest_of_matplotlib_is_left_alone(tmp_path):
     code = "import sys, crossfield.export.pictures.draw; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
     code = (
-        "import sys, numpy as np; from crossfield.export.pictures.draw import draw; from crossfield.models.instance.instance import Instance;"
+        "import sys, numpy as np; from crossfield.export.pictures.draw import draw; "
+        "from crossfield.models.instance.instance import Instance;"
         "i = Instance('a', np.ones((2, 2)), np.array([[0, 0]]), np.zeros(1), np.ones(1));"
         "draw(i, sys.argv[1], kind='instance'); sys.exit('matplotlib.pyplot' in sys.modules)"
     )

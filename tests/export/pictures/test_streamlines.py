@@ -14,7 +14,9 @@ pytestmark = pytest.mark.numeric
 
 
 def field_of(mask, line, skew, stroke=0):
-    """The field with line u at angle line(x, y) and beta = skew(x, y); x, y from the middle of the grid, y up, in pixels."""
+    """The field with line u at angle line(x, y) and beta = skew(x, y); x, y from the middle of the grid,
+    y up, in pixels.
+    """
     mask = np.asarray(mask, dtype=bool)
     row, column = np.nonzero(mask)
     x, y = column - (mask.shape[1] - 1) / 2, (mask.shape[0] - 1) / 2 - row

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from crossfield.models.errors import InstanceError
-from crossfield.models.field.field import DEGENERATE, CrossField, best_jumps, relabelled
+from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,7 +46,9 @@ def random_field(instance, seed):
 
 
 def lines(field):
-    """Both lines of each pixel as a set that knows neither order nor sign: sum and product of exp(2i angle)."""
+    """Both lines of each pixel as a set that knows neither order nor sign:
+    sum and product of exp(2i angle).
+    """
     first, second = (
         np.exp(2j * angle) for angle in (field.alpha + field.beta, field.alpha + HALF - field.beta)
     )

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import CrossfieldError, InputError, InstanceError, OutputError
-from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.field.field import CrossField
 from crossfield.models.field.file import read_field, write_field
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from hypothesis import HealthCheck, given, settings

@@ -1,4 +1,6 @@
-"""The mathematics of the formulations: the paper's formulas, their equivalence, and optima that are known by hand."""
+"""The mathematics of the formulations: the paper's formulas, their equivalence,
+and optima that are known by hand.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def test_parity_is_8_for_whole_jumps():
 
 
 def test_hull_facets_force_the_product_and_the_printed_one_does_not():
-    """By (26)-(29) at a binary p1 the interval left to z is the product; as printed, p1 = 0 leaves one open."""
+    """By (26)-(29) at a binary p1 the interval left to z is the product; as printed,
+    p1 = 0 leaves one open.
+    """
     for facet in ("hull", "printed"):
         rows = [
             f
@@ -159,7 +163,9 @@ def one_pixel(gauge, w_beta):
 @pytest.mark.parametrize("solver", ["highs", "ipopt"])
 @pytest.mark.parametrize("gauge, alpha, beta", [("box", HALF, np.pi / 6), ("strokes", 2 * np.pi / 3, 0.0)])
 def test_one_pixel_solved(gauge, alpha, beta, solver):
-    """A stroke at 120 degrees: the box ends at 90, so that the skew makes up for the rest, less what its weight takes."""
+    """A stroke at 120 degrees: the box ends at 90, so that the skew makes up for the rest,
+    less what its weight takes.
+    """
     weight = 1e-2
     found = solve(formulate(one_pixel(gauge, weight), "qp-fixed", p=[]), solver)
     assert found.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
@@ -183,7 +189,9 @@ def test_two_pixels_solved():
 
 @pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
 def test_parallel_strokes_and_two_families_cost_nothing(degrees):
-    """Strokes of one direction, or of two at any angle, are met by one constant cross; the hint of skew costs w_beta."""
+    """Strokes of one direction, or of two at any angle, are met by one constant cross;
+    the hint of skew costs w_beta.
+    """
     pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
     theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
     instance = Instance("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))

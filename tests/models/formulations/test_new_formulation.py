@@ -1,4 +1,6 @@
-"""A tenth formulation is one function: declared here, and then listed, written, read, solved and verified like the nine."""
+"""A tenth formulation is one function: declared here, and then listed, written, read,
+solved and verified like the nine.
+"""
 
 import crossfield as cf
 import numpy as np
@@ -16,7 +18,9 @@ from crossfield.models.formulations.symbols import A, s
 
 @pytest.fixture
 def toy():
-    """The declaration of a formulation that smooths directions alone, in the table as long as the test runs."""
+    """The declaration of a formulation that smooths directions alone,
+    in the table as long as the test runs.
+    """
 
     @formulation(
         "toy", paper="a test", kind="MILP", short="toy", minimises="changes of direction", how="alone"

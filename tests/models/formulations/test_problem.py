@@ -1,4 +1,6 @@
-"""Problems: columns and bounds, terms against values, points against fields, violations, what identifies a problem."""
+"""Problems: columns and bounds, terms against values, points against fields, violations,
+what identifies a problem.
+"""
 
 from __future__ import annotations
 
@@ -142,7 +144,9 @@ def test_lifted_problems_are_exact(name):
 
 
 def test_convex_means_convex():
-    """The Hessian of a quadratic objective is positive semidefinite where the problem says so, and only there."""
+    """The Hessian of a quadratic objective is positive semidefinite where the problem says so,
+    and only there.
+    """
     for label in LOW_DEGREE:
         problem = carried(problem_of(label), FORMATS["lp"])
         if problem.row_degree > 1:

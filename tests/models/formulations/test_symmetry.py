@@ -1,4 +1,6 @@
-"""Turning or mirroring a sketch does not change its optimum under the gauge `strokes`; every sample, solved to optimality."""
+"""Turning or mirroring a sketch does not change its optimum under the gauge `strokes`; every sample,
+solved to optimality.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ pytestmark = pytest.mark.numeric
 
 
 def smallest(name):
-    """The sample on the coarsest grid that still shows three stroke pixels: small enough to be solved to optimality."""
+    """The sample on the coarsest grid that still shows three stroke pixels:
+    small enough to be solved to optimality.
+    """
     for size in range(5, 24):
         try:
             instance = cf.sample(name, size)

@@ -1,4 +1,6 @@
-"""Instances: every rule has its message, windows and jump bounds hold what docs/mathematics.md promises, symmetries are symmetries."""
+"""Instances: every rule has its message, windows and jump bounds hold what docs/mathematics.md promises,
+symmetries are symmetries.
+"""
 
 from dataclasses import replace
 
@@ -137,7 +139,8 @@ def test_jumps_between_boxes_are_minus_one_to_one():
 
 
 def test_jump_bounds_by_hand():
-    # Pair (0, 1): alpha_0 in [0, 90], alpha_1 in [105, 195] degrees, so d in [-195, -15], -d/90 in [0.17, 2.17].
+    # Pair (0, 1): alpha_0 in [0, 90], alpha_1 in [105, 195] degrees, so d in [-195, -15], -d/90 in [0.17,
+    # 2.17].
     instance = Instance("two", np.ones((1, 2), bool), [[0, 1]], [np.radians(150)], [1.0])
     assert (instance.p_min.tolist(), instance.p_max.tolist()) == ([0], [3])
 

@@ -24,7 +24,7 @@ report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.
 
 @contextmanager
 def started(command, first=None):
-    """A process that has printed a line which begins so; afterwards neither it nor any that it has started is left."""
+    """A process that has printed a line which begins so; afterwards none that it has started is left."""
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:

@@ -54,7 +54,9 @@ def gradient(field):
 
 
 def assert_optimal(field):
-    """The conditions of Karush, Kuhn and Tucker, which suffice for a convex problem; the number of active bounds comes back."""
+    """The conditions of Karush, Kuhn and Tucker, which suffice for a convex problem;
+    the number of active bounds comes back.
+    """
     instance, quarter = field.instance, np.full(len(field.beta), QUARTER)
     x = np.stack([field.alpha, field.beta])
     lower, upper = np.stack([instance.alpha_lower, -quarter]), np.stack([instance.alpha_upper, quarter])

@@ -1,4 +1,6 @@
-"""The greedy baseline and the power field: exact cases, symmetries, bounds, and brute force over the jumps."""
+"""The greedy baseline and the power field: exact cases, symmetries, bounds,
+and brute force over the jumps.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,6 @@
-"""Walks over jumps on odd instances: whatever updates lose, energies are those of their definition, and every walk ends."""
+"""Walks over jumps on odd instances: whatever updates lose, energies are those of their definition,
+and every walk ends.
+"""
 
 from dataclasses import replace
 
@@ -30,7 +32,9 @@ def one_thread():
 
 
 def odd_instance(seed):
-    """Any size up to 12 x 12, holes, parts without strokes, parallel or random strokes, weights of any magnitude."""
+    """Any size up to 12 x 12, holes, parts without strokes, parallel or random strokes,
+    weights of any magnitude.
+    """
     rng = np.random.default_rng(seed)
     mask = rng.random(rng.integers(1, 13, 2)) < rng.choice([0.5, 0.8, 1.0])
     mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True

@@ -1,4 +1,6 @@
-"""The search: its formulas against dense least squares, its answers against all jumps, and what it promises."""
+"""The search: its formulas against dense least squares, its answers against all jumps,
+and what it promises.
+"""
 
 import pickle
 
@@ -268,7 +270,8 @@ def test_limits_that_cannot_be_are_refused(given):
 CHILD = """
 import crossfield as cf
 if True:
-    found = cf.search(cf.sample("mouse", 16), jobs=2, progress=lambda rounds, energy: print(rounds, flush=True))
+    instance = cf.sample("mouse", 16)
+    found = cf.search(instance, jobs=2, progress=lambda rounds, energy: print(rounds, flush=True))
     print(found.ended, found.field.energy().total)
 """
 

@@ -1,9 +1,12 @@
-"""Analytic instances: their exact fields against finite differences, and how well the strokes determine them."""
+"""Analytic instances: their exact fields against finite differences,
+and how well the strokes determine them.
+"""
 
 import numpy as np
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField, best_jumps
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.read import LEAST_WEIGHT
 from crossfield.models.sketch.surfaces import SURFACES, _frame, _parameters, analytic
@@ -17,7 +20,9 @@ NAMES = sorted(SURFACES)
 
 
 def principal_directions(surface, s, t, h=1e-4):
-    """Projected principal directions by central differences of the position alone: (n, 2) angles, and (n, 2) curvatures."""
+    """Projected principal directions by central differences of the position alone: (n, 2) angles,
+    and (n, 2) curvatures.
+    """
 
     def at(ds, dt):
         return surface.point(s + ds * h, t + dt * h)
@@ -94,7 +99,8 @@ def test_rulings_of_the_cylinder_are_parallel_and_its_circles_are_ellipses():
     made = analytic("tilted_cylinder", 32)
     assert np.ptp(made.v_angle) < 1e-12
     assert np.degrees(made.v_angle[0]) == pytest.approx(110)  # upright, spun by 20 degrees
-    # Where the cylinder faces the viewer sideways the circle is seen at its full slope: tangent (-sin s, sin(tilt) cos s).
+    # Where the cylinder faces the viewer sideways the circle is seen at its full slope: tangent (-sin s,
+    # sin(tilt) cos s).
     surface = SURFACES["tilted_cylinder"]
     s, _, _ = _parameters(surface, _frame(surface, 32))
     slope = np.radians(20) + np.arctan2(np.sin(np.radians(35)) * np.cos(s), -np.sin(s))
@@ -127,7 +133,9 @@ def exact_field(made):
 
 
 def extrapolated(instance, rounds=30):
-    """A field by turns of least squares and best jumps from the nearest stroke's direction: no formulation, no solver."""
+    """A field by turns of least squares and best jumps from the nearest stroke's direction: no formulation,
+    no solver.
+    """
     grid, n = instance.grid, instance.grid.size
     with_stroke = np.full(instance.mask.shape, np.nan)
     with_stroke[tuple(instance.stroke_pixels.T)] = instance.theta

@@ -102,7 +102,9 @@ def test_the_skewed_sheet_has_a_constant_answer_without_energy(size):
 
 
 def power_field(instance):
-    """exp(4 i angle) spread from the strokes by a Laplace equation: a cross at every pixel, on the mask as a picture."""
+    """exp(4 i angle) spread from the strokes by a Laplace equation: a cross at every pixel,
+    on the mask as a picture.
+    """
     grid = instance.grid
     n = grid.size
     pair = coo_matrix((np.ones(len(grid.first)), (grid.first, grid.second)), (n, n))

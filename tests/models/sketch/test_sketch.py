@@ -33,7 +33,10 @@ LINE = f'<path d="M10 10 L90 90" {BLACK}/>'
 
 
 def svg(body, head='viewBox="0 0 100 100"'):
-    return f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" {head}>{body}</svg>'.encode()
+    return (
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f"{head}>{body}</svg>"
+    ).encode()
 
 
 def read(data, size=24, source="a.svg", **options):
@@ -61,7 +64,7 @@ def assert_same(first, second, angle=1e-6, weight=1e-6):
     assert np.abs(first.w - second.w).max() < weight
 
 
-# --- lines on the grid -------------------------------------------------------------------------------------------
+# --- lines on the grid --------------------------------------------------------------------------------------
 
 
 def test_a_falling_line_has_135_degrees_and_covers_the_diagonal():
@@ -151,7 +154,7 @@ def test_block_means_are_exact_areas():
     assert total == pytest.approx(image.sum())
 
 
-# --- SVG ---------------------------------------------------------------------------------------------------------
+# --- SVG ----------------------------------------------------------------------------------------------------
 
 SAME_LINE = {
     "line": f'<line x1="10" y1="10" x2="90" y2="90" {BLACK}/>',
@@ -159,24 +162,56 @@ SAME_LINE = {
     "compact": f'<path d="m10 10l40 40 40,40" {BLACK}/>',
     "style": '<path d="M10,10L90,90" style="fill:none;stroke:#000"/>',
     "class": '<style>.st0{fill:none;stroke:#000000;}</style><path class="st0" d="M10 10L90 90"/>',
-    "class in defs": '<defs><style type="text/css"><![CDATA[ .a, .st0 { stroke : #000000 } ]]></style></defs><path fill="none" class="x st0" d="M10 10L90 90"/>',
-    "class after use": '<path class="st0" d="M10 10L90 90"/><style>/* late */ @import url(http://x.y/z.css); .st0{fill:none;stroke:#000000}</style>',
+    "class in defs": (
+        '<defs><style type="text/css"><![CDATA[ .a, .st0 { stroke : #000000 } ]]></style></defs>'
+        '<path fill="none" class="x st0" d="M10 10L90 90"/>'
+    ),
+    "class after use": (
+        '<path class="st0" d="M10 10L90 90"/><style>/* late */ @import url(http://x.y/z.css); '
+        ".st0{fill:none;stroke:#000000}</style>"
+    ),
     "id": '<style>path{stroke:none} #p{stroke:black}</style><path id="p" fill="none" d="M10 10L90 90"/>',
-    "media": '<style>@media print { .p { stroke: none } } path.p{stroke:black !important}</style><path class="p" fill="none" d="M10 10L90 90"/>',
+    "media": (
+        "<style>@media print { .p { stroke: none } } path.p{stroke:black !important}</style>"
+        '<path class="p" fill="none" d="M10 10L90 90"/>'
+    ),
     "group": '<g stroke="black"><g fill="none"><path d="M10 10L90 90"/></g></g>',
     "current colour": '<g color="black" stroke="currentColor"><path fill="none" d="M10 10L90 90"/></g>',
-    "transforms": f'<g transform="translate(5 5)"><g transform="scale(2) rotate(90)"><path d="M2.5 -2.5L42.5 -42.5" {BLACK}/></g></g>',
-    "use": f'<defs><path id="l" d="M0 0L80 80" {BLACK}/></defs><use xlink:href="#l" x="5" y="5" transform="translate(5 5)"/>',
-    "symbol": f'<symbol id="s" viewBox="0 0 10 10"><path d="M0 0L10 10" {BLACK}/></symbol><use href="#s" x="10" y="10" width="80" height="80"/>',
-    "inner svg": f'<svg x="10" y="10" width="80" height="80" viewBox="0 0 8 8"><path d="M0 0L8 8" {BLACK}/></svg>',
+    "transforms": (
+        '<g transform="translate(5 5)"><g transform="scale(2) rotate(90)">'
+        f'<path d="M2.5 -2.5L42.5 -42.5" {BLACK}/></g></g>'
+    ),
+    "use": (
+        f'<defs><path id="l" d="M0 0L80 80" {BLACK}/></defs>'
+        '<use xlink:href="#l" x="5" y="5" transform="translate(5 5)"/>'
+    ),
+    "symbol": (
+        f'<symbol id="s" viewBox="0 0 10 10"><path d="M0 0L10 10" {BLACK}/></symbol>'
+        '<use href="#s" x="10" y="10" width="80" height="80"/>'
+    ),
+    "inner svg": (
+        f'<svg x="10" y="10" width="80" height="80" viewBox="0 0 8 8"><path d="M0 0L8 8" {BLACK}/></svg>'
+    ),
     "straight cubic": f'<path d="M10 10C40 40 60 60 90 90" {BLACK}/>',
     "straight quadratic": f'<path d="M10 10Q50 50 90 90" {BLACK}/>',
     "unused things": LINE
-    + f'<defs>{LINE.replace("10 10", "0 50")}</defs><clipPath><path d="M0 0H100" {BLACK}/></clipPath><symbol><path d="M0 0H100" {BLACK}/></symbol>',
+    + (
+        f'<defs>{LINE.replace("10 10", "0 50")}</defs><clipPath><path d="M0 0H100" {BLACK}/>'
+        f'</clipPath><symbol><path d="M0 0H100" {BLACK}/></symbol>'
+    ),
     "invisible things": LINE
-    + '<g display="none"><path d="M0 0H100" stroke="black"/></g><path visibility="hidden" d="M0 0H100" stroke="black"/>'
-    + '<rect width="100%" height="100%" fill="#fff"/><path d="M0 0H100" stroke="white"/><path d="M0 0H100" style="opacity:0" stroke="black"/>'
-    + '<path d="M0 0H100" fill="none" stroke="black" stroke-width="0"/><path d="M0 0H100V9" fill-opacity="0"/><g style="display:none"><circle r="9"/></g>',
+    + (
+        '<g display="none"><path d="M0 0H100" stroke="black"/></g>'
+        '<path visibility="hidden" d="M0 0H100" stroke="black"/>'
+    )
+    + (
+        '<rect width="100%" height="100%" fill="#fff"/><path d="M0 0H100" stroke="white"/>'
+        '<path d="M0 0H100" style="opacity:0" stroke="black"/>'
+    )
+    + (
+        '<path d="M0 0H100" fill="none" stroke="black" stroke-width="0"/>'
+        '<path d="M0 0H100V9" fill-opacity="0"/><g style="display:none"><circle r="9"/></g>'
+    ),
     "outside things": LINE
     + '<image href="http://a.b/c.png" width="100" height="3"/><use href="other.svg#x"/><text>hello</text>',
     "itself": f'<g id="g">{LINE}<use href="#g"/></g>',
@@ -191,8 +226,8 @@ def test_all_ways_to_draw_a_line_give_the_same_instance(name):
 @pytest.mark.parametrize(
     "data",
     [
-        b'<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">'
-        + svg(LINE),
+        b'<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" '
+        b'"http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">' + svg(LINE),
         svg(LINE).decode().encode("utf-16"),
         b"\xef\xbb\xbf\n" + svg(LINE),
         svg(LINE, 'width="100mm" height="80mm"'),
@@ -238,7 +273,7 @@ def test_the_control_points_of_a_curve_do_not_widen_its_box():
     np.testing.assert_allclose(bounding_box(curve), (0, 0, 40, 30), atol=0.01)
 
 
-# --- turning and mirroring ---------------------------------------------------------------------------------------
+# --- turning and mirroring ----------------------------------------------------------------------------------
 
 
 def moved(body, matrix):
@@ -273,7 +308,7 @@ def test_moving_a_bitmap_moves_its_instance(size):
         assert_same(read(png(image.transpose(move)), size, "a.png"), expected, angle=1e-3, weight=1e-4)
 
 
-# --- bitmaps -----------------------------------------------------------------------------------------------------
+# --- bitmaps ------------------------------------------------------------------------------------------------
 
 
 def drawn(side, width=3, colour=0, mode="L", paper=255):
@@ -404,7 +439,7 @@ def test_a_fine_grid_of_a_large_bitmap_is_read():
     assert instance.grid.parts == 1
 
 
-# --- colours and masks -------------------------------------------------------------------------------------------
+# --- colours and masks --------------------------------------------------------------------------------------
 
 TWO_COLOURS = f'<circle cx="50" cy="50" r="40" {BLACK}/><path d="M20 50H80M50 20V80" {RED}/>'
 
@@ -429,7 +464,8 @@ def test_a_sketch_in_one_colour_is_all_curvature_lines(colour):
 def test_a_black_line_across_cuts_the_field_in_two():
     instance = read(
         svg(
-            f'<rect x="10" y="10" width="80" height="80" {BLACK}/><path d="M50 10V90" {BLACK}/><path d="M20 50H80" {RED}/>'
+            f'<rect x="10" y="10" width="80" height="80" {BLACK}/><path d="M50 10V90" {BLACK}/><path '
+            f'd="M20 50H80" {RED}/>'
         ),
         40,
     )
@@ -437,7 +473,10 @@ def test_a_black_line_across_cuts_the_field_in_two():
 
 
 def test_a_part_without_a_curvature_line_is_left_out():
-    ring = f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/><circle cx="50" cy="50" r="28" {RED}/>'
+    ring = (
+        f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/>'
+        f'<circle cx="50" cy="50" r="28" {RED}/>'
+    )
     instance = read(svg(ring), 60)
     assert not instance.mask[30, 30]
     assert instance.grid.parts == 1
@@ -456,12 +495,16 @@ def test_a_cutting_line_leaves_no_gap(slope):
     rise = 40 * slope / max(1, slope)
     run = rise / slope
     line = f'<path d="M{50 - run} {50 + rise}L{50 + run} {50 - rise}" {BLACK}/>'
-    body = f'<rect x="10" y="10" width="80" height="80" {BLACK}/>{line}<path d="M20 30L80 70M30 20L70 80" {RED}/>'
+    body = (
+        f'<rect x="10" y="10" width="80" height="80" {BLACK}/>{line}<path d="M20 30L80 70M30 '
+        f'20L70 80" {RED}/>'
+    )
     assert read(svg(body), 50).grid.parts == 2
 
 
 def test_two_lines_in_one_pixel_do_not_make_a_third_direction():
-    # Half and half at 65 degrees the mean is 32.5 degrees off both lines; then no direction is better than that one.
+    # Half and half at 65 degrees the mean is 32.5 degrees off both lines; then no direction is better than
+    # that one.
     for angle in (65, 90):
         c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         body = f'<path d="M10 50H90M{50 - 40 * c} {50 + 40 * s}L{50 + 40 * c} {50 - 40 * s}" {BLACK}/>'
@@ -574,7 +617,7 @@ def test_masks_that_do_not_fit_are_refused_with_both_sizes(tmp_path):
         read_sketch(drawing, mask=tmp_path / "none.png")
 
 
-# --- .scap -------------------------------------------------------------------------------------------------------
+# --- .scap --------------------------------------------------------------------------------------------------
 
 
 def test_scap_takes_the_box_from_the_samples_and_all_strokes():
@@ -609,7 +652,7 @@ def test_broken_scap_files_are_refused_with_the_line(text):
     assert SCAP_ERRORS[text] in str(caught.value)
 
 
-# --- what is refused ---------------------------------------------------------------------------------------------
+# --- what is refused ----------------------------------------------------------------------------------------
 
 
 def declared(width, height):
@@ -722,7 +765,7 @@ def test_no_bytes_at_all_give_anything_but_a_typed_error(data, source):
             read(start + data, 8, source)
 
 
-# --- names -------------------------------------------------------------------------------------------------------
+# --- names --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -763,7 +806,7 @@ def test_the_content_decides_what_a_file_is(tmp_path):
         assert len(read_sketch(tmp_path / name, size=12).theta) > 5
 
 
-# --- the developers' sketches ------------------------------------------------------------------------------------
+# --- the developers' sketches -------------------------------------------------------------------------------
 
 
 @needs_shared
