@@ -37,6 +37,7 @@ from ...models.processes.side_by_side import checked
 from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
 from ..solvers_table import smallest, takers
+from ..writing.canonical import Canonical
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -291,10 +292,7 @@ def _document(
     problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
 ) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
-    integer = {name: block for name, block in problem.blocks.items() if block.integer}
-    binary = sum(
-        block.count for block in integer.values() if (block.lower == 0).all() and (block.upper == 1).all()
-    )
+    form = Canonical(problem)
     files = [
         {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
         for entry in written
@@ -317,8 +315,8 @@ def _document(
         "convex": problem.convex,
         "counts": {
             "columns": problem.columns,
-            "binary": binary,
-            "integer": sum(block.count for block in integer.values()) - binary,
+            "binary": sum(block.count for block in form.blocks("binary")),
+            "integer": sum(block.count for block in form.blocks("integer")),
             "rows": problem.row_count,
             "pixels": instance.grid.size,
             "pairs": len(instance.grid.first),

@@ -17,11 +17,8 @@ from ...models.errors import SolutionError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
-from ..formats.lp import needs_one
-from ..formats.nl import Layout
-from ..writing.names import column_names
+from ..writing.canonical import Canonical
 from .contradictions import TOLERANCE, Claims, contradictions
-from .readers.glpk_order import glpk_order
 from .readers.registry import read_raw
 from .readers.text import RawSolution, Status, values_for, values_in_order
 
@@ -148,37 +145,26 @@ def _check_range(point: Floats, problem: Problem) -> None:
         raise SolutionError("holds values that are not finite numbers; let the solver write it again")
     at = int(np.argmax(np.abs(point)))
     if abs(point[at]) > LARGEST:
-        name = _names(problem)[at].decode()
+        name = Canonical(problem).column_names[at].decode()
         raise SolutionError(
             f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
         )
 
 
 def _by_position(raw: RawSolution, problem: Problem) -> Floats:
-    if raw.order == "nl":
-        point = np.empty(problem.columns)
-        point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
-        return point
-    if raw.order == "mod":
-        return _of_model(raw, problem)
-    one = int(needs_one(problem))  # a model without rows has the row c_ONE in LP and MPS
-    point = values_in_order(problem.columns + one, max(problem.row_count, 1), raw)
-    return point[one:] if raw.order == "lp" else point[: problem.columns]
-
-
-def _of_model(raw: RawSolution, problem: Problem) -> Floats:
-    """The point of a .mod that GLPK solved: its objective is one more row, and a column in no term, which it leaves out, may be anything."""
-    order = glpk_order(problem)
-    point: Floats = np.clip(0.0, problem.lower, problem.upper)
-    point[order] = values_in_order(len(order), problem.row_count + 1, raw)
-    return point
+    """The point of a file without names; a column that the solver's model lacks, for it stands in no term, may be anything."""
+    form = Canonical(problem)
+    order = form.order(raw.order)
+    point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
+    point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
+    return point[: problem.columns]
 
 
 def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
-    held = values_for(_names(problem), raw)
+    held = values_for(Canonical(problem).column_names, raw)
     if held.unknown and "p1" in problem.blocks and "z" not in problem.blocks:
         other = lifted(problem)
-        with_products = values_for(_names(other), raw)
+        with_products = values_for(Canonical(other).column_names, raw)
         if with_products.unknown < held.unknown:
             problem, held = other, with_products
     if held.missing:
@@ -191,11 +177,6 @@ def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
             f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
         )
     return problem, held.values, held.unknown
-
-
-def _names(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
-    matrix = np.ascontiguousarray(column_names(problem))
-    return matrix.view(f"S{matrix.shape[1]}").ravel()
 
 
 def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:
