@@ -6,6 +6,7 @@ they contradict is not passed on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,10 +14,11 @@ from typing import Final
 
 import numpy as np
 
-from ...models.errors import SolutionError
+from ...models.errors import SolutionError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
+from ..formats.registry import FORMATS, carried
 from ..writing.canonical import Canonical
 from .contradictions import TOLERANCE, Claims, contradictions
 from .readers.registry import read_raw
@@ -95,11 +97,19 @@ class Solution:
         return self.problem.field(self.point)
 
 
-def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLERANCE) -> Solution:
+def read_solution(
+    path: str | Path,
+    problem: Problem,
+    *,
+    held: Mapping[str, Problem] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Solution:
     """The solution that a file holds for the problem; the format is found by content.
 
-    Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
-    by the column order of the .nl, LP or MPS file. A file without a point gives a Solution without one.
+    Named values are mapped by name, positional ones by the column order of the .nl, LP or MPS file. A file without a point gives a
+    Solution without one.
+    held: by format, the problem as the file that the solver was given holds it, with its products lifted or not: `Manifest.held`.
+    Without it, positional values are taken to follow a file as it is written today, and names of lifted products tell that they were.
     tolerance: how far the point may be off, in units of a column, before its status is no longer what the file claims.
     Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
     Raises SolutionError, naming the file, when it is malformed or of another problem.
@@ -114,17 +124,33 @@ def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLE
     if not raw.has_point:
         return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
     try:
-        return replace(_mapped(raw, problem), tolerance=tolerance)
+        return replace(_mapped(raw, _form(raw, problem, held or {})), tolerance=tolerance)
     except SolutionError as error:
         raise SolutionError(str(error), file=path) from error
 
 
-def _mapped(raw: RawSolution, problem: Problem) -> Solution:
-    unknown = 0
+def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
+    """What the solver was given; where there are names and no manifest says it, those of lifted products tell."""
     if raw.names is None:
-        point = _by_position(raw, problem)
-    else:
-        problem, point, unknown = _by_name(raw, problem)
+        return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
+    forms = {each.sha256: each for each in held.values()}
+    if len(forms) == 1:
+        return Canonical(*forms.values())
+    liftable = "p1" in problem.blocks and "z" not in problem.blocks
+    named = liftable and np.strings.startswith(raw.names, b"z_").any()
+    return Canonical(lifted(problem) if named else problem)
+
+
+def _carried(problem: Problem, name: str) -> Problem:
+    try:
+        return carried(problem, FORMATS[name])
+    except UnsupportedByFormatError as error:
+        raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
+
+
+def _mapped(raw: RawSolution, form: Canonical) -> Solution:
+    problem = form.problem
+    point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
     return Solution(
@@ -151,32 +177,26 @@ def _check_range(point: Floats, problem: Problem) -> None:
         )
 
 
-def _by_position(raw: RawSolution, problem: Problem) -> Floats:
+def _by_position(raw: RawSolution, form: Canonical) -> Floats:
     """The point of a file without names; a column that the solver's model lacks, for it stands in no term, may be anything."""
-    form = Canonical(problem)
-    order = form.order(raw.order)
+    problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
     point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
     return point[: problem.columns]
 
 
-def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
-    held = values_for(Canonical(problem).column_names, raw)
-    if held.unknown and "p1" in problem.blocks and "z" not in problem.blocks:
-        other = lifted(problem)
-        with_products = values_for(Canonical(other).column_names, raw)
-        if with_products.unknown < held.unknown:
-            problem, held = other, with_products
-    if held.missing:
+def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
+    problem, found = form.problem, values_for(form.column_names, raw)
+    if found.missing:
         raise SolutionError(
-            f"{held.missing} of {problem.columns} columns of {problem.name} are missing and {held.unknown} names are unknown; "
+            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} names are unknown; "
             "it is of another instance, formulation or option"
         )
-    if held.unknown > len(raw.values) // 2:
+    if found.unknown > len(raw.values) // 2:
         raise SolutionError(
-            f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+            f"{found.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
         )
-    return problem, held.values, held.unknown
+    return found.values, found.unknown
 
 
 def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:
