@@ -28,7 +28,7 @@ from ...models.errors import (
 )
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
-from ...models.formulations.problem import Problem, formulate
+from ...models.formulations.problem import Problem, formulate, lifted
 from ...models.input_limits import MAX_BYTES
 from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
 from ...models.instance.grid import Ints
@@ -37,6 +37,7 @@ from ...models.processes.side_by_side import checked
 from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
 from ..solvers_table import smallest, takers
+from ..writing.canonical import Canonical
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -84,7 +85,17 @@ class Manifest:
             raise InstanceError(
                 "does not fit its own instance, options and jumps; export again", file=self.path
             )
+        if self.document["columns"] != _columns(problem):
+            raise InstanceError(
+                "lists columns in another order than they have today; export again", file=self.path
+            )
         return problem
+
+    def held(self, problem: Problem) -> dict[str, Problem]:
+        """By format, the problem as the files hold it: itself, or with its products lifted."""
+        return {
+            file["format"]: lifted(problem) if file["lifted"] else problem for file in self.document["files"]
+        }
 
     def _jumps(self, instance: Instance) -> Ints | None:
         if self.document["jumps"] is None:
@@ -296,10 +307,7 @@ def _document(
     problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
 ) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
-    integer = {name: block for name, block in problem.blocks.items() if block.integer}
-    binary = sum(
-        block.count for block in integer.values() if (block.lower == 0).all() and (block.upper == 1).all()
-    )
+    form = Canonical(problem)
     files = [
         {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
         for entry in written
@@ -322,17 +330,14 @@ def _document(
         "convex": problem.convex,
         "counts": {
             "columns": problem.columns,
-            "binary": binary,
-            "integer": sum(block.count for block in integer.values()) - binary,
+            "binary": sum(block.count for block in form.blocks("binary")),
+            "integer": sum(block.count for block in form.blocks("integer")),
             "rows": problem.row_count,
             "pixels": instance.grid.size,
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),
         },
-        "columns": [
-            {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
-            for block in problem.blocks.values()
-        ],
+        "columns": _columns(problem),
         "rows": [
             {
                 "name": family.family.tag,
@@ -348,6 +353,14 @@ def _document(
         "refused": refused,
         "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
     }
+
+
+def _columns(problem: Problem) -> list[dict[str, Any]]:
+    """Blocks of columns in order."""
+    return [
+        {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
+        for block in problem.blocks.values()
+    ]
 
 
 def _nonzero(problem: Problem) -> list[list[int]] | None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 from xml.sax.saxutils import quoteattr
@@ -26,10 +27,10 @@ from ...models.errors import InputError, UnsupportedByFormatError, UnsupportedBy
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
-from ..formats.lp import needs_one
 from ..formats.registry import FORMATS, carried
 from ..solvers_table import takes
-from ..writing.names import ONE, Names
+from ..writing.canonical import Canonical
+from ..writing.names import ONE
 from ..writing.records import Decimals, Pieces, number, render, words
 from ..writing.sink import save
 
@@ -41,34 +42,29 @@ class Start:
     problem: Problem
     point: Floats
 
+    @cached_property
+    def form(self) -> Canonical:
+        """The columns and rows of LP and MPS."""
+        return Canonical(self.problem)
+
     @property
     def objective(self) -> float:
         """The objective, recomputed."""
         return self.problem.objective_value(self.point)
 
-    @property
-    def columns(self) -> int:
-        """Number of columns, ONE included."""
-        return self.problem.columns + needs_one(self.problem)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows, the one that LP and MPS have where there is none included."""
-        return self.problem.row_count or 1
-
     def lines(self, before: bytes = b"", *, zeros: bool = True) -> Iterator[bytes]:
         """A line `name value` for every column, shortest round trip; zeros: for those at 0 too."""
-        names, values = Names(self.problem).all, self.point
+        names, values = self.form.names.all, self.point
         if not zeros:
             at = np.nonzero(values)[0]
             names, values = names.at(at), values[at]
         yield from render([before, names, b" ", words(values), b"\n"], len(values))
-        if needs_one(self.problem):
+        if self.form.has_one:
             yield before + ONE + b" 1\n"
 
     def activities(self) -> Iterator[bytes]:
         """A line `name value` for every row, constants on its right side."""
-        names = Names(self.problem)
+        names = self.form.names
         for family in self.problem.rows:
             values = words(family.values(self.point) + family.limit)
             yield from render([names.row(family), b" ", values, b"\n"], family.count)
@@ -91,19 +87,19 @@ def _cplex(start: Start) -> Iterator[bytes]:
         "<variables>\n"
     ).encode()
     count = start.problem.columns
-    names, index, values = Names(start.problem).all, Decimals(np.arange(count)), words(start.point)
+    names, index, values = start.form.names.all, Decimals(np.arange(count)), words(start.point)
     parts: Pieces = [b'<variable name="', names, b'" index="', index, b'" value="', values, b'"/>\n']
     yield from render(parts, count)
-    if needs_one(start.problem):
+    if start.form.has_one:
         yield b'<variable name="%b" index="%d" value="1"/>\n' % (ONE, count)
     yield b"</variables>\n</CPLEXSolution>\n</CPLEXSolutions>\n"
 
 
 def _highs(start: Start) -> Iterator[bytes]:
     yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
-    yield f"Objective {number(start.objective)}\n# Columns {start.columns}\n".encode()
+    yield f"Objective {number(start.objective)}\n# Columns {start.form.column_count}\n".encode()
     yield from start.lines()
-    yield b"# Rows %d\n" % start.rows
+    yield b"# Rows %d\n" % start.form.row_count("mps")
     yield from start.activities()
 
 
@@ -123,8 +119,7 @@ def _objective_variables(start: Start) -> dict[str, float]:
     found = {"nlobjvar": curved}
     if problem.objective_degree == 2:
         index, cost = problem.merged_objective(1)
-        constant = float(problem.merged_objective(0)[1][0])
-        squares = start.objective - float(point[index[:, 0]] @ cost) - constant
+        squares = start.objective - float(point[index[:, 0]] @ cost) - start.form.constant
         found |= {"quadobjvar": squares, "qmatrixvar": squares}
     return found
 

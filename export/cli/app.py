@@ -276,7 +276,9 @@ def read_command(
     _require_suffix(output, (".npz", ".json", ".rawfield"))
     with progress(quiet=quiet) as show:
         show("reading the solution")
-        found = read_solution(solution, read_manifest(manifest).problem(), tolerance=tolerance)
+        described = read_manifest(manifest)
+        problem = described.problem()
+        found = read_solution(solution, problem, held=described.held(problem), tolerance=tolerance)
         if found.point is None:
             raise InputError(
                 f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution

@@ -30,6 +30,7 @@ from ...models.formulations.symbols import SCALARS, SLOTS, VARIABLES, IndexSet, 
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
+from ..writing.canonical import Canonical
 from ..writing.expressions import Language, wrapped
 from ..writing.names import name_length
 from ..writing.records import Decimals, Piece, Pieces, Words, check_coefficients, number, render, table, words
@@ -48,11 +49,12 @@ SENSES: Final = {">=": " >= ", "<=": " <= ", "==": " = "}
 WIDTH: Final = 110
 
 
-def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .mod file. header: lines of comment, without the comment sign.
 
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
+    problem = form.problem
     _check(problem)
     context = {
         "header": header,

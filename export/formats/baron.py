@@ -18,32 +18,34 @@ No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections and g
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 
 from ...models.formulations.problem import Block, Bound, Problem, Term
 from ...models.instance.grid import Floats
+from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.expressions import wrapped
 from ..writing.names import Names
-from ..writing.records import Piece, Tagged, render, words
+from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
 from .gams_scalar import Scalar, declared
-from .lp import coefficient, is_binary, scalar_when_constant
 
 WIDTH = 160
 """Lines are broken about here."""
 
 
-def generate(problem: Problem, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .bar file, block by block. header: lines of comment. start: a point (columns,)."""
-    names = Names(problem)
+    problem, names = form.problem, form.names
     for line in header:
         yield f"// {line}\n".encode()
-    yield from _variables(problem, names)
+    yield from _variables(form)
     for title, low in ((b"LOWER", True), (b"UPPER", False)):
         yield title + b"_BOUNDS{\n"
         for block in problem.blocks.values():
-            yield from _bounds(block, names, low=low)
+            if form.kind(block) != "binary":
+                yield from _bounds(block, names, low=low)
         yield b"}\n"
     if problem.rows:
         yield from declared(b"EQUATIONS", [(names.row(family), family.count) for family in problem.rows])
@@ -54,21 +56,21 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
         yield from _start(problem, names, start)
 
 
-def _variables(problem: Problem, names: Names) -> Iterator[bytes]:
-    kinds: list[tuple[bytes, Callable[[Block], bool]]] = [
-        (b"BINARY_VARIABLES", lambda block: block.integer and is_binary(block)),
-        (b"INTEGER_VARIABLES", lambda block: block.integer and not is_binary(block)),
-        (b"VARIABLES", lambda block: not block.integer),
-    ]
-    for keyword, belongs in kinds:
-        chosen = [block for block in problem.blocks.values() if block.count and belongs(block)]
+_KEYWORDS: Final[dict[Kind, bytes]] = {
+    "binary": b"BINARY_VARIABLES",
+    "integer": b"INTEGER_VARIABLES",
+    "continuous": b"VARIABLES",
+}
+
+
+def _variables(form: Canonical) -> Iterator[bytes]:
+    for kind, keyword in _KEYWORDS.items():
+        chosen = form.blocks(kind)
         if chosen:
-            yield from declared(keyword, [(names.of(block), block.count) for block in chosen])
+            yield from declared(keyword, [(form.names.of(block), block.count) for block in chosen])
 
 
 def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
-    if block.integer and is_binary(block):
-        return
     values = block.lower if low else block.upper
     at = np.nonzero(np.isfinite(values))[0]
     yield from _assigned(names.of(block).at(at), values[at])
@@ -89,7 +91,7 @@ def _rows(family: Bound, names: Names) -> Iterator[bytes]:
 def _monomial(term: Term, names: Names) -> list[Piece]:
     """A signed term of a row, a coefficient of 1 left out."""
     assert term.degree in {1, 2}  # no declaration has other rows
-    lead: list[Piece] = [b" ", coefficient(term, term.family), b"*"]
+    lead: list[Piece] = [b" ", words(coefficient(term), signed), b"*"]
     if np.ndim(term.coefficient) == 0 and abs(term.coefficient) == 1:
         lead = [b" + " if term.coefficient == 1 else b" - "]
     first, *rest = (names.at(term.family, symbol) for symbol in term.symbols)

@@ -27,6 +27,7 @@ from ...models.formulations.symbols import SCALARS, SLOTS, VARIABLES, IndexSet
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...templates import stream
+from ..writing.canonical import Canonical
 from ..writing.expressions import Language, wrapped
 from ..writing.names import element_names
 from ..writing.records import Bytes, Piece, Words, check_coefficients, number, render, words
@@ -40,13 +41,13 @@ SECOND: Final = "r-north(side),c+east(side)"
 WIDTH: Final = 110
 
 
-def generate(problem: Problem, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file in indexed layout, block by block.
 
     header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
-    instance = problem.instance
+    problem, instance = form.problem, form.problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(
             "gms in indexed layout has no place for columns fixed one by one; write the scalar layout"

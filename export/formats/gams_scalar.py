@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from ...models.formulations.problem import Block, Bound, Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
+from ..writing.canonical import Canonical
 from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
 from ..writing.records import (
@@ -45,11 +46,11 @@ from ..writing.records import (
     number,
     numbers,
     render,
+    scalar_when_constant,
     table,
     words,
 )
 from ..writing.records import signed as with_sign
-from .lp import is_binary, scalar_when_constant
 
 MODEL_TYPES: Final = {
     "LP": "lp",
@@ -69,14 +70,14 @@ WIDTH: Final = 160
 """Lines are broken about here."""
 
 
-def generate(problem: Problem, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file in scalar layout, block by block.
 
     header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
     """
-    names = Names(problem)
+    problem, names = form.problem, form.names
     blocks = {
-        "variables": _variables(problem, names),
+        "variables": _variables(form),
         "equations": _equations(problem, names),
         "objective": _objective(problem, names),
         "rows": _rows(problem, names),
@@ -155,21 +156,22 @@ def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]
         start += count
 
 
-def _variables(problem: Problem, names: Names) -> Iterator[bytes]:
-    for block in problem.blocks.values():
+KEYWORDS: Final = {
+    "continuous": b"Variables",
+    "binary": b"Binary Variables",
+    "integer": b"Integer Variables",
+}
+
+
+def _variables(form: Canonical) -> Iterator[bytes]:
+    for block in form.problem.blocks.values():
         if block.count:
-            yield from declared(_keyword(block), [(names.of(block), block.count)])
+            yield from declared(KEYWORDS[form.kind(block)], [(form.names.of(block), block.count)])
 
 
 def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
     if problem.rows:
         yield from declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
-
-
-def _keyword(block: Block) -> bytes:
-    if not block.integer:
-        return b"Variables"
-    return b"Binary Variables" if is_binary(block) else b"Integer Variables"
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:

@@ -23,76 +23,53 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from ...models.formulations.problem import Block, Bound, Problem, Term
-from ...models.instance.grid import Floats
+from ...models.formulations.problem import Block, Bound
+from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names
-from ..writing.records import Piece, Pieces, Words, bounds, check_coefficients, render, signed, words
+from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
 
 
-def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
-    names = Names(problem)
-    constant = float(problem.merged_objective(0)[1][0])
-    has_one = needs_one(problem)
+    problem, names = form.problem, form.names
     for line in header:
         yield f"\\ {line}\n".encode()
     yield f"Minimize\n obj_{problem.stamp}:".encode()
-    yield from render([b" ", words(constant, signed), b" ONE\n"] if has_one else [b"\n"], 1)
-    yield from _objective(problem, names)
+    yield from render([b" ", words(form.constant, signed), b" ONE\n"] if form.has_one else [b"\n"], 1)
+    yield from _objective(form)
     yield b"Subject To\n"
     if not problem.rows:
         yield b" c_ONE: + 1 ONE = 1\n"
     for family in problem.rows:
         yield from _rows(family, names)
     yield b"Bounds\n"
-    if has_one:
+    if form.has_one:
         yield b" 1 <= ONE <= 1\n"
     for block in problem.blocks.values():
         yield from _bounds(block, names)
-    for title, wanted in ((b"Generals\n", False), (b"Binaries\n", True)):
-        integer = (block for block in problem.blocks.values() if block.integer and block.count)
-        chosen = [block for block in integer if is_binary(block) == wanted]
-        if chosen:
-            yield title
-        for block in chosen:
-            yield from render([b" ", names.of(block), b"\n"], block.count)
+    if form.blocks("integer"):
+        yield b"Generals\n"
+    for block in form.blocks("integer"):
+        yield from render([b" ", names.of(block), b"\n"], block.count)
+    if form.blocks("binary"):
+        yield b"Binaries\n"
+    for block in form.blocks("binary"):
+        yield from render([b" ", names.of(block), b"\n"], block.count)
     yield b"End\n"
 
 
-def needs_one(problem: Problem) -> bool:
-    """Whether the file has the column ONE: for a constant, or for a model without rows."""
-    return not problem.rows or float(problem.merged_objective(0)[1][0]) != 0
-
-
-def is_binary(block: Block) -> bool:
-    """Whether all columns of an integer block have exactly the bounds [0, 1]."""
-    return bool((block.lower == 0).all() and (block.upper == 1).all())
-
-
-def linear_costs(problem: Problem) -> Floats:
-    """Cost of every column, shape (columns,); zero where it has none. Raises UnsupportedByFormatError for an extreme one."""
-    index, coefficient = problem.merged_objective(1)
-    costs = np.zeros(problem.columns)
-    costs[index[:, 0]] = coefficient
-    check_coefficients(coefficient, "the objective")
-    return costs
-
-
-def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
-    costs = linear_costs(problem)
-    for block in problem.blocks.values():
-        cost = words(scalar_when_constant(costs[block.columns]), signed)
+def _objective(form: Canonical) -> Iterator[bytes]:
+    names = form.names
+    for block in form.problem.blocks.values():
+        cost = words(scalar_when_constant(form.costs[block.columns]), signed)
         yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
-    index, coefficient = problem.merged_objective(2)
-    if not len(coefficient):
+    index, factor = form.products()
+    if not len(factor):
         return
-    check_coefficients(coefficient, "the objective")
     square = index[:, 0] == index[:, 1]
     yield b" + [\n"
     for chosen in (square, ~square):
-        pair, value = index[chosen], words(2 * coefficient[chosen], signed)
+        pair, value = index[chosen], words(2 * factor[chosen], signed)
         tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
         yield from render([b" ", value, b" ", names.all.at(pair[:, 0]), *tail], len(pair))
     yield b" ] / 2\n"
@@ -101,14 +78,14 @@ def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
 def _rows(family: Bound, names: Names) -> Iterator[bytes]:
     parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
-        parts += [b" ", coefficient(term, family), b" ", names.at(family, term.symbols[0])]
+        parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]
     products = family.of_degree(2)
     if products:
         parts.append(b" + [")
         for term in products:
             parts += [
                 b" ",
-                coefficient(term, family),
+                words(coefficient(term), signed),
                 b" ",
                 names.at(family, term.symbols[0]),
                 b" * ",
@@ -118,17 +95,6 @@ def _rows(family: Bound, names: Names) -> Iterator[bytes]:
     sense = b" = " if family.family.sense == "==" else f" {family.family.sense} ".encode()
     parts += [sense, words(scalar_when_constant(family.limit)), b"\n"]
     yield from render(parts, family.count)
-
-
-def coefficient(term: Term, family: Bound) -> bytes | Words:
-    """The signed coefficient of a term of a row. Raises UnsupportedByFormatError for an extreme one."""
-    check_coefficients(term.coefficient, f"row family {family.family.tag}")
-    return words(term.coefficient, signed)
-
-
-def scalar_when_constant(values: Floats) -> Floats | float:
-    """The one number that all values are, or the values."""
-    return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
 
 
 def _bounds(block: Block, names: Names) -> Iterator[bytes]:

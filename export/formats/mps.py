@@ -22,16 +22,25 @@ import numpy as np
 from ...models.formulations.problem import Block, Bound, Problem, Term
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Grid, Ints
+from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names, problem_name
-from ..writing.records import OnlyWhere, Piece, Pieces, Tagged, check_coefficients, number, render, words
-from .lp import linear_costs, needs_one, scalar_when_constant
+from ..writing.records import (
+    OnlyWhere,
+    Piece,
+    Pieces,
+    Tagged,
+    number,
+    render,
+    scalar_when_constant,
+    words,
+)
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
 
 
-def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
-    names = Names(problem)
+    problem, names = form.problem, form.names
     for line in header:
         yield f"* {line}\n".encode()
     yield f"NAME {problem_name(problem)} FREE\nROWS\n N obj\n".encode()
@@ -40,30 +49,30 @@ def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
     for family in problem.rows:
         yield from render([b" " + _KIND[family.family.sense] + b" ", names.row(family), b"\n"], family.count)
     yield b"COLUMNS\n"
-    yield from _columns(problem, names)
+    yield from _columns(form)
     yield b"RHS\n"
     yield from _right_sides(problem, names)
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
         yield from _bounds(block, names)
-    if needs_one(problem):
+    if form.has_one:
         yield b" FX BND1 ONE 1\n"
-    yield from _objective_matrix(problem, names)
+    yield from _objective_matrix(form)
     for family in problem.rows:
         yield from _row_matrices(family, names)
     yield b"ENDATA\n"
 
 
-def _columns(problem: Problem, names: Names) -> Iterator[bytes]:
+def _columns(form: Canonical) -> Iterator[bytes]:
     """Matrix entries column by column; a record is a column with all its entries, the cost first, then by row."""
-    costs = linear_costs(problem)
+    problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
     markers = 0
     for integer, blocks in _runs(problem):
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
-            name, cost = names.of(block), words(scalar_when_constant(costs[block.columns]))
+            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.columns]))
             entries = [
                 entry
                 for family in problem.rows
@@ -73,9 +82,8 @@ def _columns(problem: Problem, names: Names) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
-    if needs_one(problem):
-        constant = float(problem.merged_objective(0)[1][0])
-        yield f" ONE obj {number(constant)}\n".encode()
+    if form.has_one:
+        yield f" ONE obj {number(form.constant)}\n".encode()
         if not problem.rows:
             yield b" ONE c_ONE 1\n"
 
@@ -85,8 +93,7 @@ def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterato
     chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
     lines = [line for term in chosen for line in _incident(family, term)]
     for _, row, term in sorted(lines, key=lambda line: line[0]):
-        check_coefficients(term.coefficient, f"row family {family.family.tag}")
-        value = words(term.coefficient)
+        value = words(coefficient(term))
         if row is None:
             line: Pieces = [b" ", name, b" ", rows, b" ", value, b"\n"]
             yield from line
@@ -170,12 +177,11 @@ def _bounds(block: Block, names: Names) -> Iterator[bytes]:
         yield from render(parts, len(at))
 
 
-def _objective_matrix(problem: Problem, names: Names) -> Iterator[bytes]:
-    index, coefficient = problem.merged_objective(2)
-    if not len(coefficient):
+def _objective_matrix(form: Canonical) -> Iterator[bytes]:
+    index, factor = form.products()
+    if not len(factor):
         return
-    check_coefficients(coefficient, "the objective")
-    hessian = np.where(index[:, 0] == index[:, 1], 2 * coefficient, coefficient)
+    hessian, names = np.where(index[:, 0] == index[:, 1], 2 * factor, factor), form.names
     yield b"QUADOBJ\n"
     yield from render(
         [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", words(hessian), b"\n"],
@@ -189,8 +195,7 @@ def _row_matrices(family: Bound, names: Names) -> Iterator[bytes]:
         return
     parts: list[Piece] = [b"QCMATRIX ", names.row(family), b"\n"]
     for term in products:
-        check_coefficients(term.coefficient, f"row family {family.family.tag}")
         first, second = (names.at(family, symbol) for symbol in term.symbols)
-        half = words(np.asarray(term.coefficient) / 2)
+        half = words(np.asarray(coefficient(term)) / 2)
         parts += [b" ", first, b" ", second, b" ", half, b"\n", b" ", second, b" ", first, b" ", half, b"\n"]
     yield from render(parts, family.count)

@@ -1,8 +1,6 @@
 """AMPL .nl, text and binary, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
 
-Order of variables: nine groups (docs/format-rules.md, N1, N2): nonlinear in objective and rows; in rows alone; in the objective alone; linear. The
-first three are split into continuous and integer, the last into continuous, binary and integer. Nonlinear rows come first.
-Header, line by line:
+The order of columns and rows is that of `writing.nl_layout`. Header, line by line (docs/format-rules.md):
 
     g3 1 1 0                           b3 1 1 0 for binary; the options come back in the .sol
     variables rows objectives ranges equations
@@ -23,20 +21,27 @@ of a nonlinear row the linear part stands in J and the constant in r. Binary: on
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
-from ...models.instance.grid import Bools, Floats, Ints
-from ..writing.names import OBJECTIVE, Names, name_length
-from ..writing.records import Decimals, Pieces, Raw, check_coefficients, render, words
-from .lp import scalar_when_constant
+from ...models.formulations.problem import Bound, Term
+from ...models.instance.grid import Floats, Ints
+from ..writing.canonical import Canonical, coefficient
+from ..writing.names import OBJECTIVE, name_length
+from ..writing.nl_layout import Layout, nonlinear_terms, runs
+from ..writing.records import (
+    Decimals,
+    Pieces,
+    Raw,
+    check_coefficients,
+    render,
+    scalar_when_constant,
+    words,
+)
+
+__all__ = ["Layout", "generate"]
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
 _FUNCTIONS: Final = {sp.cos: COSINE}
@@ -129,111 +134,9 @@ class Binary:
 Encoder = Text | Binary
 
 
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Order of columns and rows in a .nl file.
-
-    order: column of the problem at each place of the file; place: the inverse. rows: families in file order.
-    """
-
-    problem: Problem
-
-    @cached_property
-    def nonlinear_rows(self) -> tuple[Bound, ...]:
-        """Families of rows that are not linear."""
-        return tuple(family for family in self.problem.rows if family.degree > 1)
-
-    @cached_property
-    def rows(self) -> tuple[Bound, ...]:
-        """Families of rows, nonlinear ones first."""
-        return self.nonlinear_rows + tuple(family for family in self.problem.rows if family.degree <= 1)
-
-    @cached_property
-    def nonlinear_objective(self) -> tuple[Bound, ...]:
-        """Terms of the objective that are not linear."""
-        return tuple(family for family in self.problem.objective if family.degree > 1)
-
-    @cached_property
-    def in_objective(self) -> Bools:
-        """True for columns in nonlinear terms of the objective."""
-        found = np.zeros(self.problem.columns, dtype=bool)
-        for family in self.nonlinear_objective:
-            for symbol in family.variables:
-                found[family.columns(symbol)] = True
-        return found
-
-    @cached_property
-    def in_rows(self) -> Bools:
-        """True for columns in nonlinear terms of rows."""
-        found = np.zeros(self.problem.columns, dtype=bool)
-        for family in self.nonlinear_rows:
-            for term in nonlinear_terms(family):
-                for factor in term.factors:
-                    found[factor] = True
-        return found
-
-    @cached_property
-    def group(self) -> NDArray[np.int8]:
-        """Group 0..8 of each column; small integers are sorted by counting."""
-        problem, rows, objective = self.problem, self.in_rows, self.in_objective
-        binary = problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
-        nonlinear = np.where(rows & objective, 0, np.where(rows, 2, 4)) + problem.integer
-        linear = np.where(binary, 7, np.where(problem.integer, 8, 6))
-        return np.where(rows | objective, nonlinear, linear).astype(np.int8)
-
-    @cached_property
-    def order(self) -> Ints:
-        """Column of the problem at each place of the file."""
-        return np.argsort(self.group, kind="stable").astype(np.int32)
-
-    @cached_property
-    def place(self) -> Ints:
-        """Place in the file of each column of the problem."""
-        place = np.empty_like(self.order)
-        place[self.order] = np.arange(len(place), dtype=np.int32)
-        return place
-
-    @cached_property
-    def stretches(self) -> list[tuple[Block, slice]]:
-        """Runs of places that hold columns of one block, in file order."""
-        blocks = [block for block in self.problem.blocks.values() if block.count]
-        number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
-        return [(blocks[number[self.order[run.start]]], run) for run in _runs(number[self.order])]
-
-    def places(self, family: Bound, symbol: sp.Symbol) -> Ints:
-        """Place in the file of the symbol's column at each element of a family."""
-        places, inside = self.place[family.block(symbol).columns], family.inside(symbol)
-        return places if inside is None else places[inside]
-
-    def column_file(self) -> Iterator[bytes]:
-        """The bytes of the .col file: names of columns in file order, one a line."""
-        names = Names(self.problem)
-        for block, run in self.stretches:
-            inside = self.order[run] - block.offset
-            yield from render([names.of(block).at(inside), b"\n"], len(inside))
-
-    def row_file(self) -> Iterator[bytes]:
-        """The bytes of the .row file: names of rows in file order, then of the objective, one a line."""
-        names = Names(self.problem)
-        for family in self.rows:
-            yield from render([names.row(family), b"\n"], family.count)
-        yield OBJECTIVE + b"\n"
-
-
-def _runs(values: NDArray[Any]) -> list[slice]:
-    """Stretches of equal values."""
-    cuts = [0, *(np.nonzero(np.diff(values))[0] + 1).tolist(), len(values)]
-    return [slice(first, last) for first, last in pairwise(cuts)]
-
-
-def nonlinear_terms(family: Bound) -> tuple[Term, ...]:
-    """The monomials of degree two and more."""
-    return tuple(term for term in family.terms or () if term.degree > 1)
-
-
-def generate(problem: Problem, *, binary: bool = False, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: Canonical, *, binary: bool = False, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .nl file. start: a point (columns,) for the segment x."""
-    layout, code = Layout(problem), Binary() if binary else Text()
+    problem, layout, code = form.problem, form.layout, Binary() if binary else Text()
     yield _header(layout, code)
     first = 0
     for family in layout.rows:
@@ -332,8 +235,7 @@ def _sum(code: Encoder, summands: list[Pieces]) -> Pieces:
 
 
 def _monomial(layout: Layout, code: Encoder, term: Term) -> Pieces:
-    check_coefficients(term.coefficient, "a nonlinear row")
-    parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(term.coefficient)]
+    parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(coefficient(term))]
     *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
     for factor in others:
         parts += [*code.operator(MULTIPLY), *code.variable(factor)]
@@ -360,7 +262,7 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
         kind = np.select(
             [np.isfinite(lower) & np.isfinite(upper), np.isfinite(upper), np.isfinite(lower)], [0, 1, 2], 3
         )
-        for part in _runs(kind):
+        for part in runs(kind):
             low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
             values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
             yield from render(
@@ -370,7 +272,7 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
 
 def _entries(family: Bound) -> list[tuple[sp.Symbol, Floats | float]]:
     """Symbols and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
-    linear = {term.symbols[0]: term.coefficient for term in family.of_degree(1)}
+    linear = {term.symbols[0]: coefficient(term) for term in family.of_degree(1)}
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 
 
@@ -406,7 +308,6 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
     for family, entries in rows:
         parts = list(code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries)))
         for symbol, value in entries:
-            check_coefficients(value, f"row family {family.family.tag}")
             parts += code.entry(layout.places(family, symbol), value)
         yield from render(parts, family.count, padded=code.padded)
         first += family.count

@@ -21,12 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
+from typing import Final
 
 import numpy as np
 import sympy as sp
 
 from ...models.formulations.problem import Block, Bound, Problem
 from ...models.instance.grid import Floats, Ints
+from ..writing.canonical import Canonical, coefficient
 from ..writing.names import OBJECTIVE, Names
 from ..writing.records import (
     Decimals,
@@ -37,10 +39,10 @@ from ..writing.records import (
     number,
     numbers,
     render,
+    scalar_when_constant,
     words,
 )
 from ..writing.terms import terms
-from .lp import is_binary, scalar_when_constant
 
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <osil xmlns="os.optimizationservices.org" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
@@ -53,14 +55,14 @@ xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.
 """
 
 
-def generate(problem: Problem, header: list[str]) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the OSiL file, block by block. header: lines that say what it holds."""
-    names = Names(problem)
+    problem, names = form.problem, form.names
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
     yield f'<variables numberOfVariables="{problem.columns}">\n'.encode()
     for block in problem.blocks.values():
-        yield from _variables(block, names)
+        yield from _variables(block, names, _LETTER[form.kind(block)])
     yield b"</variables>\n"
     yield from _objective(problem)
     yield f'<constraints numberOfConstraints="{problem.row_count}">\n'.encode()
@@ -78,8 +80,10 @@ def ends(values: Floats) -> Texts:
     return np.where(np.isinf(values), np.where(values > 0, b"INF", b"-INF"), numbers(values))
 
 
-def _variables(block: Block, names: Names) -> Iterator[bytes]:
-    kind = "C" if not block.integer else "B" if is_binary(block) else "I"
+_LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
+
+
+def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
     lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
     parts: Pieces = [b'<var name="', names.of(block), f'" type="{kind}" lb="'.encode(), lower, b'" ub="', upper, b'"/>\n']  # fmt: skip
     yield from render(parts, block.count)
@@ -139,10 +143,7 @@ def _linear_rows(problem: Problem) -> Iterator[bytes]:
         yield from render(parts, family.count)
     yield b"</colIdx>\n<value>\n"
     for family in problem.rows:
-        parts = []
-        for term in family.of_degree(1):
-            check_coefficients(term.coefficient, f"row family {family.family.tag}")
-            parts += _element(words(term.coefficient))
+        parts = [piece for term in family.of_degree(1) for piece in _element(words(coefficient(term)))]
         yield from render(parts, family.count)
     yield b"</value>\n</linearConstraintCoefficients>\n"
 
@@ -163,9 +164,8 @@ def _quadratic(problem: Problem) -> Iterator[bytes]:
     for family in problem.rows:
         row = Decimals(np.arange(first, first + family.count))
         for term in family.of_degree(2):
-            check_coefficients(term.coefficient, f"row family {family.family.tag}")
             one, two = map(Decimals, term.factors)
-            yield from render(_product(row, one, two, words(term.coefficient)), family.count)
+            yield from render(_product(row, one, two, words(coefficient(term))), family.count)
         first += family.count
     yield b"</quadraticCoefficients>\n"
 

@@ -21,6 +21,7 @@ from ...models.formulations.problem import Block, Bound, Problem
 from ...models.formulations.symbols import IndexSet, pixel_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
+from ..writing.canonical import Canonical
 
 Place = tuple[Any, ...]
 """(row, column) of a pixel, (row, column, side) of a pair."""
@@ -42,8 +43,10 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
     point = None if start is None else problem.point(start)
+    form = Canonical(problem)
     for block in problem.blocks.values():
-        model.add_component(block.name, _variables(block, places(problem.instance, block.over), point))
+        index = places(problem.instance, block.over)
+        model.add_component(block.name, _variables(block, index, _domain(form, block), point))
     columns = [
         variable for block in problem.blocks.values() for variable in model.component(block.name).values()
     ]
@@ -64,7 +67,14 @@ def places(instance: Instance, over: IndexSet) -> list[Place]:
     return list(zip(*coordinates, strict=True))
 
 
-def _variables(block: Block, index: list[Place], point: Floats | None) -> pyo.Var:
+def _domain(form: Canonical, block: Block) -> Any:
+    """Pyomo's domain of a block; bounds are given beside it, so that a binary column fixed at 0 or 1 stays binary."""
+    if not block.integer:
+        return pyo.Reals
+    return pyo.Binary if form.layout.binary[block.columns].all() else pyo.Integers
+
+
+def _variables(block: Block, index: list[Place], domain: Any, point: Floats | None) -> pyo.Var:
     """The variables of a block of columns."""
     ends = (
         [value if math.isfinite(value) else None for value in bound.tolist()]
@@ -72,8 +82,6 @@ def _variables(block: Block, index: list[Place], point: Floats | None) -> pyo.Va
     )
     bounds = dict(zip(index, zip(*ends, strict=True), strict=True))
     values = {} if point is None else dict(zip(index, point[block.columns].tolist(), strict=True))
-    binary = bool((block.lower >= 0).all() and (block.upper <= 1).all())
-    domain = (pyo.Binary if binary else pyo.Integers) if block.integer else pyo.Reals
     return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
 
 

@@ -30,25 +30,26 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.problem import Bound, Problem
+from ...models.formulations.problem import Bound
 from ...models.instance.grid import Floats, Ints
-from ..writing.names import Names
-from ..writing.records import Decimals, check_coefficients, number, render, words
-from .lp import linear_costs
+from ..writing.canonical import Canonical, coefficient
+from ..writing.curvature import probtype
+from ..writing.records import Decimals, number, render, words
 
 INFINITY: Final = 1e20
 
 
-def generate(problem: Problem, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .qplib file, block by block. header: lines of comment. start: a point (columns,)."""
-    yield from _head(problem, header)
-    yield from _objective(problem)
+    problem = form.problem
+    yield from _head(form, header)
+    yield from _objective(form)
     if problem.rows:
-        yield from _rows(problem)
+        yield from _rows(form)
     yield _line(number(INFINITY), "infinity")
     if problem.rows:
-        for side, low in (("left", True), ("right", False)):
-            yield from _vector(_sides(problem, low=low), f"{side} side of a row")
+        yield from _vector(form.row_lower, "left side of a row")
+        yield from _vector(form.row_upper, "right side of a row")
     yield from _vector(problem.lower, "lower bound")
     yield from _vector(problem.upper, "upper bound")
     if problem.integer.any():
@@ -57,48 +58,16 @@ def generate(problem: Problem, header: list[str], *, start: Floats | None = None
     if problem.rows:
         yield from _vector(np.zeros(problem.row_count), "start of a row's dual")
     yield from _vector(np.zeros(problem.columns), "start of a bound's dual")
-    yield from _names(problem)
-
-
-def kind(problem: Problem) -> str:
-    """QPLIB's three letters: of objective, variables and rows. Angles are never integer and always bounded, so B, I and N do not occur."""
-    binary = problem.integer & (problem.lower == 0) & (problem.upper == 1)
-    variables = "C" if not problem.integer.any() else "M" if (binary == problem.integer).all() else "G"
-    return (
-        _curvature(problem) + variables + ("Q" if problem.row_degree == 2 else "L" if problem.rows else "B")
-    )
-
-
-def _curvature(problem: Problem) -> str:
-    """L, D, C or Q (any): convex where every summand, as declared, has a Hessian without negative eigenvalue."""
-    if problem.objective_degree < 2:
-        return "L"
-    if not all(_convex(family) for family in problem.objective):
-        return "Q"
-    index, _ = problem.merged_objective(2)
-    return "D" if (index[:, 0] == index[:, 1]).all() else "C"
-
-
-def _convex(family: Bound) -> bool:
-    size = len(family.variables)
-    products = family.of_degree(2)
-    values = np.stack([np.broadcast_to(term.coefficient, (family.count,)) for term in products], axis=1) if products else np.zeros((1, 0))  # fmt: skip
-    values = values[:1] if (values == values[0]).all() else values
-    hessian = np.zeros((len(values), size, size))
-    for term, value in zip(products, values.T, strict=True):
-        one, two = map(family.variables.index, term.symbols)
-        hessian[:, one, two] += value
-        hessian[:, two, one] += value
-    eigenvalues = np.linalg.eigvalsh(hessian)
-    return bool((eigenvalues >= -1e-12 * np.abs(hessian).max(axis=(1, 2), initial=0.0)[:, None]).all())
+    yield from _names(form)
 
 
 def _line(value: str, comment: str) -> bytes:
     return f"{value} # {comment}\n".encode()
 
 
-def _head(problem: Problem, header: list[str]) -> Iterator[bytes]:
-    values = [problem.instance.name, kind(problem), "minimize", str(problem.columns)]
+def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
+    problem = form.problem
+    values = [problem.instance.name, probtype(problem) or "", "minimize", str(problem.columns)]
     for value, comment in zip_longest(values, header[:3], fillvalue="number of variables"):
         yield _line(value, comment)
     if problem.rows:
@@ -116,14 +85,13 @@ def _vector(values: Floats, comment: str) -> Iterator[bytes]:
     yield from render([Decimals(at + 1), b" ", words(finite[at]), b"\n"], len(at))
 
 
-def _objective(problem: Problem) -> Iterator[bytes]:
-    if problem.objective_degree == 2:
-        index, value = problem.merged_objective(2)
-        check_coefficients(value, "the objective")
+def _objective(form: Canonical) -> Iterator[bytes]:
+    if form.problem.objective_degree == 2:
+        index, value = form.products()
         yield _line(str(len(value)), "quadratic terms of the objective")
         yield from _products([], index[:, 0], index[:, 1], 2 * value)
-    yield from _vector(linear_costs(problem), "linear coefficient of the objective")
-    yield _line(number(problem.merged_objective(0)[1][0]), "constant of the objective")
+    yield from _vector(form.costs, "linear coefficient of the objective")
+    yield _line(number(form.constant), "constant of the objective")
 
 
 def _products(before: list[Any], one: Ints, two: Ints, value: Floats | float) -> Iterator[bytes]:
@@ -133,8 +101,9 @@ def _products(before: list[Any], one: Ints, two: Ints, value: Floats | float) ->
     yield from render(parts, len(one))
 
 
-def _rows(problem: Problem) -> Iterator[bytes]:
+def _rows(form: Canonical) -> Iterator[bytes]:
     """Coefficients of the rows: products, when there are any, then linear terms."""
+    problem = form.problem
     for degree in (2, 1) if problem.row_degree == 2 else (1,):
         total = sum(family.count * len(family.of_degree(degree)) for family in problem.rows)
         yield _line(str(total), f"{'quadratic' if degree == 2 else 'linear'} terms of rows")
@@ -148,24 +117,17 @@ def _row_terms(family: Bound, degree: int, first: int) -> Iterator[bytes]:
     row = Decimals(np.arange(first, first + family.count))
     linear: list[Any] = []
     for term in family.of_degree(degree):
-        check_coefficients(term.coefficient, f"row family {family.family.tag}")
+        value = coefficient(term)
         if degree == 2:
             one, two = term.factors
-            yield from _products([row, b" "], one, two, 2 * np.asarray(term.coefficient))
+            yield from _products([row, b" "], one, two, 2 * np.asarray(value))
         else:
-            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", words(term.coefficient), b"\n"]
+            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", words(value), b"\n"]
     yield from render(linear, family.count)
 
 
-def _sides(problem: Problem, *, low: bool) -> Floats:
-    """Left or right sides of all rows, infinite where there is none."""
-    without, infinity = ("<=", -np.inf) if low else (">=", np.inf)
-    sides = [np.full(f.count, infinity) if f.family.sense == without else f.limit for f in problem.rows]
-    return np.concatenate(sides) + 0.0
-
-
-def _names(problem: Problem) -> Iterator[bytes]:
-    names = Names(problem)
+def _names(form: Canonical) -> Iterator[bytes]:
+    problem, names = form.problem, form.names
     yield _line(str(problem.columns), "names of variables")
     for block in problem.blocks.values():
         place = Decimals(np.arange(block.offset + 1, block.offset + block.count + 1))

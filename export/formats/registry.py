@@ -17,59 +17,60 @@ from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, lifted
 from ...models.instance.grid import Floats
+from ..writing.canonical import Canonical
 from ..writing.sink import save
 
 ANY_DEGREE: Final = 99
 
 
-def _nl(problem: Problem, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+def _nl(form: Canonical, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
     from . import nl
 
-    return nl.generate(problem, binary=dialect == "binary", start=start)
+    return nl.generate(form, binary=dialect == "binary", start=start)
 
 
-def _gms(problem: Problem, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+def _gms(form: Canonical, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
     from . import gams_indexed
     from . import gams_scalar as gams
 
     generate = gams.generate if dialect == "scalar" else gams_indexed.generate
-    return generate(problem, header, start=start)
+    return generate(form, header, start=start)
 
 
-def _lp(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _lp(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import lp
 
-    return lp.generate(problem, header)
+    return lp.generate(form, header)
 
 
-def _mps(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _mps(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import mps
 
-    return mps.generate(problem, header)
+    return mps.generate(form, header)
 
 
-def _mod(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _mod(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import ampl as mod
 
-    return mod.generate(problem, header)
+    return mod.generate(form, header)
 
 
-def _osil(problem: Problem, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _osil(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import osil
 
-    return osil.generate(problem, header)
+    return osil.generate(form, header)
 
 
-def _qplib(problem: Problem, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _qplib(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import qplib
 
-    return qplib.generate(problem, header, start=start)
+    return qplib.generate(form, header, start=start)
 
 
-def _bar(problem: Problem, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+def _bar(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
     from . import baron as bar
 
-    return bar.generate(problem, header, start=start)
+    return bar.generate(form, header, start=start)
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Format:
     name: str
     summary: str
     degree: int
-    generate: Callable[[Problem, list[str], Floats | None, str], Iterator[bytes]]
+    generate: Callable[[Canonical, list[str], Floats | None, str], Iterator[bytes]]
     dialects: tuple[str, ...] = ("",)
     starts: bool = False
     default: bool = True
@@ -202,27 +203,28 @@ def write(
             f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}"
         )
     held = carried(problem, entry)
+    form = Canonical(held)
     point = held.point(start) if start is not None and entry.starts else None
     written = Written(entry.name, chosen, held)
     lines = header(held)
-    written.files[path.name] = save(path, entry.generate(held, lines, point, chosen))
-    for beside, content in _companions(path, entry.name, held, lines):
+    written.files[path.name] = save(path, entry.generate(form, lines, point, chosen))
+    for beside, content in _companions(path, entry.name, form, lines):
         written.files[beside.name] = save(beside, content)
     return written
 
 
 def _companions(
-    path: Path, name: str, problem: Problem, lines: list[str]
+    path: Path, name: str, form: Canonical, lines: list[str]
 ) -> Iterator[tuple[Path, Iterator[bytes]]]:
     """The files beside one that is written: names of an .nl, never compressed, and data of a .mod, which are when it is."""
     stem = path.name.removesuffix(".gz").removesuffix(f".{name}")
     if name == "nl":
-        from . import nl
-
-        layout = nl.Layout(problem)
-        yield path.with_name(f"{stem}.row"), layout.row_file()
-        yield path.with_name(f"{stem}.col"), layout.column_file()
+        yield path.with_name(f"{stem}.row"), form.layout.row_file()
+        yield path.with_name(f"{stem}.col"), form.layout.column_file()
     if name == "mod":
         from . import ampl as mod
 
-        yield path.with_name(f"{stem}.dat{'.gz' if path.suffix == '.gz' else ''}"), mod.data(problem, lines)
+        yield (
+            path.with_name(f"{stem}.dat{'.gz' if path.suffix == '.gz' else ''}"),
+            mod.data(form.problem, lines),
+        )

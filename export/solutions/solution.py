@@ -6,6 +6,7 @@ they contradict is not passed on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,15 +14,13 @@ from typing import Final
 
 import numpy as np
 
-from ...models.errors import SolutionError
+from ...models.errors import SolutionError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
-from ..formats.lp import needs_one
-from ..formats.nl import Layout
-from ..writing.names import column_names
+from ..formats.registry import FORMATS, carried
+from ..writing.canonical import Canonical
 from .contradictions import TOLERANCE, Claims, contradictions
-from .readers.glpk_order import glpk_order
 from .readers.registry import read_raw
 from .readers.text import RawSolution, Status, values_for, values_in_order
 
@@ -98,12 +97,20 @@ class Solution:
         return self.problem.field(self.point)
 
 
-def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLERANCE) -> Solution:
+def read_solution(
+    path: str | Path,
+    problem: Problem,
+    *,
+    held: Mapping[str, Problem] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Solution:
     """The solution that a file holds for the problem; the format is found by content.
 
-    Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted),
-    positional ones by the column order of the .nl, LP or MPS file. A file without a point gives a Solution
-    without one.
+    Named values are mapped by name, positional ones by the column order of the .nl, LP or MPS file. A file
+    without a point gives a Solution without one.
+    held: by format, the problem as the file that the solver was given holds it, with its products lifted or
+    not: `Manifest.held`. Without it, positional values are taken to follow a file as it is written today, and
+    names of lifted products tell that they were.
     tolerance: how far the point may be off, in units of a column, before its status is no longer what the
     file claims.
     Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
@@ -120,17 +127,33 @@ def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLE
     if not raw.has_point:
         return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
     try:
-        return replace(_mapped(raw, problem), tolerance=tolerance)
+        return replace(_mapped(raw, _form(raw, problem, held or {})), tolerance=tolerance)
     except SolutionError as error:
         raise SolutionError(str(error), file=path) from error
 
 
-def _mapped(raw: RawSolution, problem: Problem) -> Solution:
-    unknown = 0
+def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
+    """What the solver was given; where there are names and no manifest says it, those of lifted products tell."""
     if raw.names is None:
-        point = _by_position(raw, problem)
-    else:
-        problem, point, unknown = _by_name(raw, problem)
+        return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
+    forms = {each.sha256: each for each in held.values()}
+    if len(forms) == 1:
+        return Canonical(*forms.values())
+    liftable = "p1" in problem.blocks and "z" not in problem.blocks
+    named = liftable and np.strings.startswith(raw.names, b"z_").any()
+    return Canonical(lifted(problem) if named else problem)
+
+
+def _carried(problem: Problem, name: str) -> Problem:
+    try:
+        return carried(problem, FORMATS[name])
+    except UnsupportedByFormatError as error:
+        raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
+
+
+def _mapped(raw: RawSolution, form: Canonical) -> Solution:
+    problem = form.problem
+    point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
     return Solution(
@@ -151,54 +174,32 @@ def _check_range(point: Floats, problem: Problem) -> None:
         raise SolutionError("holds values that are not finite numbers; let the solver write it again")
     at = int(np.argmax(np.abs(point)))
     if abs(point[at]) > LARGEST:
-        name = _names(problem)[at].decode()
+        name = Canonical(problem).column_names[at].decode()
         raise SolutionError(
             f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
         )
 
 
-def _by_position(raw: RawSolution, problem: Problem) -> Floats:
-    if raw.order == "nl":
-        point = np.empty(problem.columns)
-        point[Layout(problem).order] = values_in_order(problem.columns, problem.row_count, raw)
-        return point
-    if raw.order == "mod":
-        return _of_model(raw, problem)
-    one = int(needs_one(problem))  # a model without rows has the row c_ONE in LP and MPS
-    point = values_in_order(problem.columns + one, max(problem.row_count, 1), raw)
-    return point[one:] if raw.order == "lp" else point[: problem.columns]
+def _by_position(raw: RawSolution, form: Canonical) -> Floats:
+    """The point of a file without names; a column that the solver's model lacks, for it stands in no term, may be anything."""
+    problem, order = form.problem, form.order(raw.order)
+    point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
+    point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
+    return point[: problem.columns]
 
 
-def _of_model(raw: RawSolution, problem: Problem) -> Floats:
-    """The point of a .mod that GLPK solved: its objective is one more row, and a column in no term, which it leaves out, may be anything."""
-    order = glpk_order(problem)
-    point: Floats = np.clip(0.0, problem.lower, problem.upper)
-    point[order] = values_in_order(len(order), problem.row_count + 1, raw)
-    return point
-
-
-def _by_name(raw: RawSolution, problem: Problem) -> tuple[Problem, Floats, int]:
-    held = values_for(_names(problem), raw)
-    if held.unknown and "p1" in problem.blocks and "z" not in problem.blocks:
-        other = lifted(problem)
-        with_products = values_for(_names(other), raw)
-        if with_products.unknown < held.unknown:
-            problem, held = other, with_products
-    if held.missing:
+def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
+    problem, found = form.problem, values_for(form.column_names, raw)
+    if found.missing:
         raise SolutionError(
-            f"{held.missing} of {problem.columns} columns of {problem.name} are missing and {held.unknown} names are unknown; "
+            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} names are unknown; "
             "it is of another instance, formulation or option"
         )
-    if held.unknown > len(raw.values) // 2:
+    if found.unknown > len(raw.values) // 2:
         raise SolutionError(
-            f"{held.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+            f"{found.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
         )
-    return problem, held.values, held.unknown
-
-
-def _names(problem: Problem) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
-    matrix = np.ascontiguousarray(column_names(problem))
-    return matrix.view(f"S{matrix.shape[1]}").ravel()
+    return found.values, found.unknown
 
 
 def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:

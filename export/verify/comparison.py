@@ -9,7 +9,7 @@ import numpy as np
 
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
-from ..formats.lp import needs_one
+from ..writing.canonical import Canonical
 from ..writing.names import ONE, column_names, row_names
 from ..writing.terms import terms
 from .programs.reading import Evaluation, Meaning, Points, places
@@ -30,13 +30,9 @@ def names_of_rows(problem: Problem) -> list[str]:
 
 def of_problem(problem: Problem) -> Meaning:
     """What an LP or MPS file of the problem should mean, from the problem's arrays: ONE is its last column."""
-    one = [ONE.decode()] * needs_one(problem)
+    form = Canonical(problem)
+    one = [ONE.decode()] * form.has_one
     n, ones = problem.columns, np.ones(len(one))
-    index, cost = problem.merged_objective(1)
-    costs = np.zeros(n + len(one))
-    costs[index[:, 0]] = cost
-    costs[n:] = problem.merged_objective(0)[1][0]
-    low, high = _limits(problem)
     at, value = _of_degree(problem, 1)
     products, product = _of_degree(problem, 2)
     return Meaning.of(
@@ -45,20 +41,13 @@ def of_problem(problem: Problem) -> Meaning:
         lower=np.concatenate([problem.lower, ones]),
         upper=np.concatenate([problem.upper, ones]),
         integer=np.concatenate([problem.integer, ones == 0]),
-        costs=costs,
-        row_lower=low if problem.rows else ones,
-        row_upper=high if problem.rows else ones,
-        quadratic=terms(*problem.merged_objective(2), indices=2, products=2),
+        costs=np.concatenate([form.costs, form.constant * ones]),
+        row_lower=form.row_lower if problem.rows else ones,
+        row_upper=form.row_upper if problem.rows else ones,
+        quadratic=terms(*form.products(), indices=2, products=2),
         matrix=terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
         row_quadratic=terms(products, product, indices=3, products=2),
     )
-
-
-def _limits(problem: Problem) -> tuple[Floats, Floats]:
-    none = [np.zeros(0)]
-    lower = [np.full(f.count, -np.inf) if f.family.sense == "<=" else f.limit for f in problem.rows]
-    upper = [np.full(f.count, np.inf) if f.family.sense == ">=" else f.limit for f in problem.rows]
-    return np.concatenate(none + lower), np.concatenate(none + upper)
 
 
 def _of_degree(problem: Problem, degree: int) -> tuple[Ints, Floats]:
@@ -162,9 +151,13 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
         return "other columns are integer"
     if found.discrete is not None and found.discrete != problem.integer.sum():
         return f"{found.discrete} discrete columns instead of {problem.integer.sum()}"
-    limits = zip(("row_lower", "row_upper"), _limits(problem), strict=True)
-    bounds = [("lower", found.lower[c], problem.lower[at]), ("upper", found.upper[c], problem.upper[at])]
-    bounds += [(name, getattr(found, name)[r], value) for name, value in limits]
+    form = Canonical(problem)
+    bounds = [
+        ("lower", found.lower[c], problem.lower[at]),
+        ("upper", found.upper[c], problem.upper[at]),
+        ("row_lower", found.row_lower[r], form.row_lower),
+        ("row_upper", found.row_upper[r], form.row_upper),
+    ]
     for name, theirs, mine in bounds:
         wrong = np.nonzero(~_close(theirs, mine, found.rounding))[0]
         if len(wrong):

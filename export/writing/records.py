@@ -289,6 +289,11 @@ def of_texts(texts: Texts) -> Bytes:
     return np.ascontiguousarray(texts).view(np.uint8).reshape(len(texts), texts.itemsize)[:, :width]
 
 
+def of_bytes(matrix: Bytes) -> Texts:
+    """The texts in the rows of a matrix of bytes padded with NUL: the way back from `of_texts`."""
+    return np.ascontiguousarray(matrix).view(f"S{matrix.shape[1]}").ravel()
+
+
 def number(value: float) -> str:
     """The shortest text that reads back as exactly this double: 3, 0.1, 1e-06."""
     value = float(value)
@@ -323,6 +328,11 @@ def words(values: Floats | float, text: Callable[[Floats], Texts] = numbers) -> 
         return bytes(text(np.array([values], dtype=np.float64))[0])
     distinct, codes = _distinct(np.asarray(values, dtype=np.float64) + 0.0)
     return Words(of_texts(text(distinct)), codes)
+
+
+def scalar_when_constant(values: Floats) -> Floats | float:
+    """The one number that all values are, or the values."""
+    return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
 
 
 def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.export.writing.canonical import Canonical
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 
@@ -65,7 +66,7 @@ def rendered(instance: Instance, formulation: str, suffix: str, path: Path, dial
 def chunks_of(problem: Problem, suffix: str, dialect: str) -> Any:
     """The chunks of a file."""
     held = carried(problem, FORMATS[suffix])
-    return FORMATS[suffix].generate(held, [], None, dialect or FORMATS[suffix].dialects[0])
+    return FORMATS[suffix].generate(Canonical(held), [], None, dialect or FORMATS[suffix].dialects[0])
 
 
 def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:

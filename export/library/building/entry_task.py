@@ -24,9 +24,10 @@ from ...bundle.starts import Start, start_of
 from ...formats.nl import Layout
 from ...formats.registry import generator, write
 from ...solutions.readers.ampl import write_ampl_sol
+from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
-from ..documents.statistics import counts, curvature, probtype, ranges, tangent_bound
+from ..documents.statistics import counts, curvature, ranges, tangent_bound
 from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record

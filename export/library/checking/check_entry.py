@@ -16,10 +16,11 @@ from ....models.errors import CrossfieldError
 from ....models.formulations.problem import Problem
 from ...formats.registry import generator
 from ...solutions.solution import Solution, read_solution
+from ...writing.curvature import probtype
 from ..building.entry_task import Entry
 from ..documents.check_point import BadInputError, check
 from ..documents.documents import problem_of
-from ..documents.statistics import counts, curvature, probtype, ranges
+from ..documents.statistics import counts, curvature, ranges
 from ..ledger.dual_bounds import is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger

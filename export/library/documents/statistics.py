@@ -1,4 +1,4 @@
-"""What is counted of a problem: columns, rows and terms by kind, curvature, ranges of coefficients, and QPLIB's three letters.
+"""What is counted of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
 
 The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to the instance.
 """
@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 
 from ....models.formulations.problem import Bound, Problem
-from ....models.instance.grid import Bools, Floats
-from ...formats.nl import Layout
+from ....models.instance.grid import Floats
+from ...writing.canonical import Canonical
+from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
 
 MOST_EIGEN: Final = 600
 """Variables in the quadratic objective up to which eigenvalues are computed."""
-_ZERO: Final = 1e-9  # an eigenvalue this small beside the largest counts as zero
 
 
 def counts(problem: Problem) -> dict[str, int]:
@@ -24,9 +24,9 @@ def counts(problem: Problem) -> dict[str, int]:
 
 
 def _columns(problem: Problem) -> dict[str, int]:
-    layout = Layout(problem)
-    binary, integer = _binary(problem), problem.integer
-    nonlinear = layout.in_objective | layout.in_rows
+    form = Canonical(problem)
+    binary, integer = form.binary, problem.integer
+    nonlinear = form.layout.in_objective | form.layout.in_rows
     return {
         "variables": problem.columns,
         "continuous": int((~integer).sum()),
@@ -36,11 +36,6 @@ def _columns(problem: Problem) -> dict[str, int]:
         "nonlinear_binary": int((nonlinear & binary).sum()),
         "nonlinear_integer": int((nonlinear & integer & ~binary).sum()),
     }
-
-
-def _binary(problem: Problem) -> Bools:
-    found: Bools = problem.integer & (problem.lower == 0) & (problem.upper == 1)
-    return found
 
 
 def _rows(problem: Problem) -> dict[str, int]:
@@ -85,41 +80,14 @@ def _terms(problem: Problem) -> dict[str, int]:
 
 def curvature(problem: Problem) -> dict[str, Any]:
     """Curvature of objective and constraints; the signs of the eigenvalues of the objective's Hessian, or the reason for none."""
-    objective, reason = _of_objective(problem)
+    objective, reason = of_objective(problem)
     found = _eigenvalue_signs(problem) if problem.objective_degree == 2 else None
     return {
         "objective": objective,
-        "constraints": _of_rows(problem),
+        "constraints": of_rows(problem),
         "eigenvalues": found,
         "reason": None if found else reason,
     }
-
-
-def _of_objective(problem: Problem) -> tuple[str, str]:
-    degree = problem.objective_degree
-    if degree <= 1:
-        return "linear", "the objective is linear: its Hessian is zero"
-    if degree > 2:
-        kind = "a cosine of integers" if degree == 99 else f"products of p1 and skews, degree {degree}"
-        return "nonconvex", f"the objective holds {kind}: its Hessian is not constant"
-    if all(_is_convex(family) for family in problem.objective):
-        return (
-            "convex",
-            "a sum of squares of linear expressions with positive weights: no eigenvalue is negative",
-        )
-    return "indefinite", "the objective holds products that are no squares"
-
-
-def _is_convex(family: Bound) -> bool:
-    """Whether each summand of a quadratic family is convex: its own small Hessian has no negative eigenvalue."""
-    place = {symbol: number for number, symbol in enumerate(family.variables)}
-    hessian = np.zeros((family.count, len(place), len(place)))
-    for term in family.of_degree(2):
-        first, second = (place[symbol] for symbol in term.symbols)
-        hessian[:, first, second] += term.coefficient
-        hessian[:, second, first] += term.coefficient
-    values = np.linalg.eigvalsh(hessian)
-    return bool((values[:, 0] >= -_ZERO * np.maximum(values[:, -1], 0.0)).all()) if values.size else True
 
 
 def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
@@ -133,54 +101,9 @@ def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
     np.add.at(hessian, (place[:, 0], place[:, 1]), value)
     np.add.at(hessian, (place[:, 1], place[:, 0]), value)
     values = np.linalg.eigvalsh(hessian)
-    slack = _ZERO * float(np.abs(values).max(initial=0.0))
+    slack = NEGLIGIBLE * float(np.abs(values).max(initial=0.0))
     negative, positive = int((values < -slack).sum()), int((values > slack).sum())
     return {"negative": negative, "zero": problem.columns - negative - positive, "positive": positive}
-
-
-def _of_rows(problem: Problem) -> str:
-    if not problem.rows:
-        return "none"
-    if problem.row_degree <= 1:
-        return "linear"
-    curved = [family for family in problem.rows if family.degree > 1]
-    if problem.row_degree > 2:
-        return "nonconvex"
-    return (
-        "convex"
-        if all(family.family.sense == "<=" and _is_convex(family) for family in curved)
-        else "indefinite"
-    )
-
-
-def probtype(problem: Problem) -> str | None:
-    """QPLIB's three letters (objective, variables, constraints); None for what is beyond quadratic."""
-    if max(problem.objective_degree, problem.row_degree) > 2:
-        return None
-    return _objective_letter(problem) + _variables_letter(problem) + _constraints_letter(problem)
-
-
-def _objective_letter(problem: Problem) -> str:
-    kind, _ = _of_objective(problem)
-    if kind == "convex":
-        index, _ = problem.merged_objective(2)
-        return "D" if (index[:, 0] == index[:, 1]).all() else "C"
-    return {"linear": "L"}.get(kind, "Q")
-
-
-def _variables_letter(problem: Problem) -> str:
-    binary, integer = _binary(problem), problem.integer
-    if not integer.any():
-        return "C"
-    if (binary == integer).all():
-        return "B" if integer.all() else "M"
-    return "I" if integer.all() and not binary.any() else "G"
-
-
-def _constraints_letter(problem: Problem) -> str:
-    bounded = bool(np.isfinite(problem.lower).any() or np.isfinite(problem.upper).any())
-    kinds = {"none": "B" if bounded else "N", "linear": "L", "convex": "C"}
-    return kinds.get(_of_rows(problem), "Q")
 
 
 def ranges(problem: Problem) -> dict[str, list[float] | None]:
@@ -212,7 +135,7 @@ def tangent_bound(problem: Problem, point: Floats) -> float | None:
 
     f(x) >= f(x0) + g (x - x0), whose least value over the box is found coordinate by coordinate.
     """
-    if problem.rows or problem.integer.any() or _of_objective(problem)[0] != "convex":
+    if problem.rows or problem.integer.any() or of_objective(problem)[0] != "convex":
         return None
     slope = np.zeros(problem.columns)
     index, cost = problem.merged_objective(1)

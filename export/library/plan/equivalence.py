@@ -8,8 +8,8 @@ from typing import Any
 from ....models.errors import UnsupportedByFormatError
 from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, TWO_NORM
 from ....models.formulations.problem import Problem
-from ...formats.lp import needs_one
 from ...formats.registry import FORMATS, carried
+from ...writing.canonical import Canonical
 from .recipe import EntryRecipe, entry_name
 
 
@@ -107,6 +107,6 @@ def notes_of(problem: Problem, name: str) -> list[str]:
         return []
     lifting = held.formulation.lifted
     found = [f"lifted: {lifting}; the class there is {held.problem_class}"] if lifting else []
-    if name in {"lp", "mps"} and needs_one(held):
+    if name in {"lp", "mps"} and Canonical(held).has_one:
         found.append("the constant of the objective is the cost of a column ONE that is fixed to 1")
     return found

@@ -23,9 +23,9 @@ import numpy as np
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
+from ...writing.canonical import Order
 from .text import (
     Cursor,
-    Order,
     RawSolution,
     Status,
     fault,

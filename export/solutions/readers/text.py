@@ -12,21 +12,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import repeat
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Bools, Floats
+from ...writing.canonical import Order
 
 Bytes = NDArray[np.bytes_]
 Letters = NDArray[np.uint8]
 Positions = NDArray[np.int64]
-
-Order = Literal["nl", "lp", "mps", "mod"]
-"""The kind of file whose columns a positional solution follows: .nl has an order of its own, LP and MPS put ONE first and last, and of
-a .mod GLPK numbers the columns as it meets them."""
 
 TOKEN_LIMIT: Final = 63
 """Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""

@@ -18,6 +18,7 @@ from crossfield import templates
 from crossfield.export.formats import gams_indexed, lp
 from crossfield.export.formats import gams_scalar as gams
 from crossfield.export.writing import records
+from crossfield.export.writing.canonical import Canonical
 from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.field.field import CrossField, relabelled
@@ -97,7 +98,7 @@ def problem_of(case: str) -> Problem:
 
 
 def text_of(problem: Problem, layout: str, **options: Any) -> bytes:
-    return b"".join(LAYOUTS[layout](problem, HEADER, **options))
+    return b"".join(LAYOUTS[layout](Canonical(problem), HEADER, **options))
 
 
 def names_of(matrix: np.ndarray) -> list[str]:
@@ -264,7 +265,7 @@ def highs_optimum(problem: Problem, folder: Path) -> float:
     import highspy
 
     path = folder / "x.lp"
-    path.write_bytes(b"".join(lp.generate(problem, [])))
+    path.write_bytes(b"".join(lp.generate(Canonical(problem), [])))
     solver = highspy.Highs()
     solver.setOptionValue("output_flag", False)
     solver.setOptionValue("mip_rel_gap", 0.0)
@@ -399,7 +400,9 @@ def test_golden_file():
     """A small model that people can read; the other tests say that it means the right thing."""
     instance = Instance("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(
-        gams_indexed.generate(make_problem("minlp-quartic", instance), ["minlp-quartic on three pixels"])
+        gams_indexed.generate(
+            Canonical(make_problem("minlp-quartic", instance)), ["minlp-quartic on three pixels"]
+        )
     )
     assert text == (GOLDEN / "minlp-quartic.gms").read_bytes()
     assert text.count(b"\n") < 80

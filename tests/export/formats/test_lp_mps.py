@@ -13,6 +13,7 @@ from cases import CASES, LOW_DEGREE, make_instance, make_problem, names_of, poin
 from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, carried, header, write
 from crossfield.export.solving.local import solve
+from crossfield.export.writing.canonical import Canonical
 from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -33,7 +34,7 @@ def held(label: str) -> Problem:
 
 
 def text_of(problem: Problem, suffix: str) -> str:
-    return b"".join(GENERATE[suffix](problem, header(problem))).decode("ascii")
+    return b"".join(GENERATE[suffix](Canonical(problem), header(problem))).decode("ascii")
 
 
 def assert_same(model: Model, expected: Model) -> None:
@@ -206,10 +207,10 @@ def test_lp_keeps_to_the_common_subset(label: str):
     assert not {"Generals", "Binaries"} & set(sections) or problem.integer.any()
     assert {"Minimize", "Subject To", "Bounds", "End"} <= set(sections)
     parts = dict(re.findall(r"^(\w[\w ]*)\n((?: .*\n)*)", text, re.MULTILINE))
-    names = names_of(column_names(problem)) + ["ONE"] * lp.needs_one(problem)
+    names = names_of(column_names(problem)) + ["ONE"] * Canonical(problem).has_one
 
     linear, _, products = parts["Minimize"].partition(" + [\n")
-    one = ["ONE"] * lp.needs_one(problem)
+    one = ["ONE"] * Canonical(problem).has_one
     assert re.findall(r"[+-] \S+ ([A-Za-z]\w+)\n", linear) == one + names_of(column_names(problem))
     if products:
         assert products.endswith(" ] / 2\n")
@@ -252,7 +253,7 @@ def test_mps_keeps_to_the_common_subset(label: str):
     assert all(len(line) == 3 for line in columns)
     assert [line[0] for line in columns if line[1] == "obj"] == [
         *names_of(column_names(problem)),
-        *["ONE"] * lp.needs_one(problem),
+        *["ONE"] * Canonical(problem).has_one,
     ]
     markers = [line[2] for line in columns if line[1] == "'MARKER'"]
     assert markers == ["'INTORG'", "'INTEND'"] * (len(markers) // 2)
@@ -347,7 +348,7 @@ def test_golden_files(file: str, pixels: int, tmp_path: Path):
     instance = Instance("golden", mask, np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     name, suffix = file.split(".")
     problem = make_problem(name, instance)
-    text = b"".join(GENERATE[suffix](problem, ["for people to read"]))
+    text = b"".join(GENERATE[suffix](Canonical(problem), ["for people to read"]))
     assert text == (GOLDEN / file).read_bytes()
     expected = of_problem(problem)
     assert_same(by_scip(GOLDEN / file).ordered(expected.columns, expected.rows), expected)

@@ -24,7 +24,6 @@ import numpy as np
 import pytest
 from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
-from crossfield.export.formats.qplib import kind
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
@@ -34,6 +33,7 @@ from crossfield.export.verify.programs.reading import Meaning, Points
 from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
+from crossfield.export.writing.curvature import probtype
 from crossfield.export.writing.names import column_names, row_names
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError
@@ -548,7 +548,7 @@ KINDS = {
 @for_each("formulation", KINDS)
 def test_qplib_types(formulation: str):
     problem = carried(make_problem(formulation, make_instance("full")), FORMATS["qplib"])
-    assert kind(problem) == KINDS[formulation]
+    assert probtype(problem) == KINDS[formulation]
 
 
 def without_names(text: str) -> str:

@@ -13,6 +13,7 @@ from cases import CASES, make_field, make_instance, make_problem, points_of, pro
 from crossfield.export.formats import nl
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import write
+from crossfield.export.writing.canonical import Canonical
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
@@ -24,7 +25,7 @@ GOLDEN = places.GOLDEN
 
 
 def save(problem: Problem, path: Path, *, binary: bool = False, start: np.ndarray | None = None) -> Path:
-    path.write_bytes(b"".join(nl.generate(problem, binary=binary, start=start)))
+    path.write_bytes(b"".join(nl.generate(Canonical(problem), binary=binary, start=start)))
     return path
 
 
@@ -119,7 +120,7 @@ def test_header_agrees_with_the_writer_of_pyomo(label: str):
     alone = grid.size - len(
         {*grid.first.tolist(), *grid.second.tolist(), *problem.instance.stroke_index.tolist()}
     )
-    ours = b"".join(nl.generate(problem)).decode().splitlines()
+    ours = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
     theirs = [line.partition("#")[0].split() for line in pyomo_text(problem)[:10]]
     mine = [line.split() for line in ours[:10]]
     assert mine[0] == ["g3", "1", "1", "0"]
@@ -134,7 +135,7 @@ def test_header_of_a_model_that_can_be_counted_by_hand():
     """A line of five pixels with its bilinear rows: which columns are nonlinear where."""
     problem = make_problem("miqcp-bilinear", make_instance("row", "box"))
     strokes = len(problem.instance.theta)
-    lines = b"".join(nl.generate(problem)).decode().splitlines()
+    lines = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
     # 10 angles and 4 each of p1, p2, s, t; for each of the four pairs c14 .. c17 and jlo: p1 = 0 with p2 = -1 is no jump of the box.
     assert lines[1].split() == ["26", "20", "1", "0", "0"]
     assert lines[2].split() == ["8", "1"]
@@ -146,7 +147,7 @@ def test_header_of_a_model_that_can_be_counted_by_hand():
 @for_each("label", CASES)
 def test_text_keeps_to_the_common_subset(label: str):
     problem = problem_of(label)
-    text = b"".join(nl.generate(problem, start=points_of(problem)[0])).decode("ascii")
+    text = b"".join(nl.generate(Canonical(problem), start=points_of(problem)[0])).decode("ascii")
     lines = text.splitlines()
     assert "#" not in text
     assert "\r" not in text
@@ -182,7 +183,7 @@ def test_names_stand_in_file_order_and_the_objective_comes_last(tmp_path: Path):
 def test_binary_holds_the_numbers_themselves():
     problem = problem_of("milp-mccormick gauge=strokes")
     point = points_of(problem)[0]
-    data = b"".join(nl.generate(problem, binary=True, start=point))
+    data = b"".join(nl.generate(Canonical(problem), binary=True, start=point))
     head = data.split(b"\n", 10)
     assert head[0] == b"b3 1 1 0"
     assert head[5].split() == [b"0", b"0", b"1", b"1"]
@@ -219,7 +220,7 @@ def test_golden_file():
     """
     instance = Instance("golden", np.ones((1, 2), bool), np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     problem = make_problem("minlp-cubic", instance)
-    assert b"".join(nl.generate(problem)) == (GOLDEN / "minlp-cubic.nl").read_bytes()
+    assert b"".join(nl.generate(Canonical(problem))) == (GOLDEN / "minlp-cubic.nl").read_bytes()
     read = by_casadi(GOLDEN / "minlp-cubic.nl")
     a, b, x, y, p1, p2 = 0.5, 2.0, 0.25, -0.125, 1, 0
     smooth = 2 * ((a - b + np.pi / 2 * (p1 + 2 * p2)) ** 2 + ((1 - 2 * p1) * x - y) ** 2)

@@ -12,6 +12,7 @@ from crossfield.export.formats import gams_indexed, lp, mps, nl
 from crossfield.export.formats import gams_scalar as gams
 from crossfield.export.formats.registry import write
 from crossfield.export.writing import records
+from crossfield.export.writing.canonical import Canonical
 from crossfield.export.writing.records import (
     Decimals,
     OnlyWhere,
@@ -226,12 +227,12 @@ def test_a_block_leaves_no_seam(count, monkeypatch):
 
 
 WRITERS = {
-    "lp": lambda problem, _: lp.generate(problem, ["head"]),
-    "mps": lambda problem, _: mps.generate(problem, ["head"]),
-    "nl text": lambda problem, start: nl.generate(problem, start=start),
-    "nl binary": lambda problem, start: nl.generate(problem, binary=True, start=start),
-    "gms scalar": lambda problem, start: gams.generate(problem, ["head"], start=start),
-    "gms indexed": lambda problem, start: gams_indexed.generate(problem, ["head"], start=start),
+    "lp": lambda problem, _: lp.generate(Canonical(problem), ["head"]),
+    "mps": lambda problem, _: mps.generate(Canonical(problem), ["head"]),
+    "nl text": lambda problem, start: nl.generate(Canonical(problem), start=start),
+    "nl binary": lambda problem, start: nl.generate(Canonical(problem), binary=True, start=start),
+    "gms scalar": lambda problem, start: gams.generate(Canonical(problem), ["head"], start=start),
+    "gms indexed": lambda problem, start: gams_indexed.generate(Canonical(problem), ["head"], start=start),
 }
 
 
@@ -294,7 +295,7 @@ def test_points_of_any_size_are_starting_points():
     """Starting values are no coefficients: none is refused, each survives."""
     problem = make_problem("qp-fixed", make_instance("row"))
     point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
-    lines = b"".join(nl.generate(problem, start=point)).decode().splitlines()
+    lines = b"".join(nl.generate(Canonical(problem), start=point)).decode().splitlines()
     at = lines.index(f"x{problem.columns}")
     found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.columns]]
     np.testing.assert_array_equal(found, point[nl.Layout(problem).order])

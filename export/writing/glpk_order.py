@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....models.formulations.problem import Problem
-from ....models.instance.grid import Ints
+from ...models.formulations.problem import Problem
+from ...models.instance.grid import Ints
 
 
 def glpk_order(problem: Problem) -> Ints:
