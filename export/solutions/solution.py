@@ -101,14 +101,11 @@ class Solution:
 def read_solution(path: str | Path, problem: Problem, *, tolerance: float = TOLERANCE) -> Solution:
     """The solution that a file holds for the problem; the format is found by content.
 
-    Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted),
-    positional ones by the column order of the .nl, LP or MPS file. A file without a point gives a Solution
-    without one.
-    tolerance: how far the point may be off, in units of a column, before its status is no longer what the
-    file claims.
+    Named values are mapped by name (an LP or MPS file may hold the problem with its products lifted), positional ones
+    by the column order of the .nl, LP or MPS file. A file without a point gives a Solution without one.
+    tolerance: how far the point may be off, in units of a column, before its status is no longer what the file claims.
     Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
-    Raises InputError when the file cannot be read, and SolutionError, naming it, when it is malformed or of
-    another problem.
+    Raises SolutionError, naming the file, when it is malformed or of another problem.
     """
     raw = read_raw(path)
     if raw.stamp and raw.stamp != problem.stamp:
