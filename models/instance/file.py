@@ -179,25 +179,33 @@ def check_schema(
 ) -> dict[str, Any]:
     """The document, which obeys the `<schema>.schema.json` that ships with a package.
 
-    Raises InstanceError with the place.
-
     rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not
-    looked at one by one.
+    looked at one by one. Raises InstanceError with the place.
     """
-    import jsonschema
-
     assert isinstance(document, dict)
     quick = {
         key: document[key][:1]
         for key, are_good in (rows or {}).items()
         if _is_list(document.get(key)) and are_good(document[key])
     }
-    errors = jsonschema.Draft202012Validator(_schema(schema, package)).iter_errors({**document, **quick})
-    first = islice(errors, _MOST_ERRORS)
-    error = min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
+    error = schema_error({**document, **quick}, schema, package)
     if error is not None:
         raise InstanceError(f"{error.json_path}: {shortened(error.message, 200)}")
     return cast("dict[str, Any]", document)
+
+
+def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | None:
+    """The outermost jsonschema.ValidationError of a document, None when it obeys its schema.
+
+    A text of the format `line` has printable characters only.
+    """
+    import jsonschema
+
+    lines = jsonschema.FormatChecker(formats=())
+    lines.checks("line")(lambda text: not isinstance(text, str) or text.isprintable())
+    validator = jsonschema.Draft202012Validator(_schema(schema, package), format_checker=lines)
+    first = islice(validator.iter_errors(document), _MOST_ERRORS)
+    return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
 
 
 def _is_list(value: object) -> bool:

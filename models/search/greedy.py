@@ -19,9 +19,9 @@ from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from .energy import CLOSE, Solver, energy_at, local_step
 from .free_field import FreeField
-from .nearest_stroke import stroke_cells
+from .nearest_stroke import nearest_strokes
 
-Progress = Callable[[int, int], object]
+JumpProgress = Callable[[int, int], object]
 """Is told how many jumps are known, and how many there are."""
 
 _BATCH_COST: Final = 1.0  # energy that one batch of jumps may add
@@ -31,7 +31,7 @@ _CLOSE_UP_TO: Final = (
 _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the smooth part of the error
 
 
-def greedy(instance: Instance, *, progress: Progress | None = None, over: Over = never) -> CrossField:
+def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha,
     beta and p.
 
@@ -41,19 +41,19 @@ def greedy(instance: Instance, *, progress: Progress | None = None, over: Over =
     progress: called as progress(jumps known, jumps in all) after every batch. over: says whether the time is
     over; then all jumps that are left are decided at once.
     """
-    cells = stroke_cells(instance)
-    angle = np.append(instance.target, 0.0)[cells]
+    nearest = nearest_strokes(instance)
+    angle = np.append(instance.target, 0.0)[nearest]
     state = FreeField(
         instance, angle, np.zeros(len(angle)), np.zeros(len(instance.grid.first), dtype=np.int32)
     )
-    _stitch(state, cells, progress, over)
+    _stitch(state, nearest, progress, over)
     return state.bounded(over)
 
 
-def _stitch(state: FreeField, cells: Ints, progress: Progress | None, over: Over) -> None:
+def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over: Over) -> None:
     """Decide the jumps between cells, cheapest first, in batches that cost at most `_BATCH_COST`."""
     grid, solver = state.instance.grid, Solver()
-    known = cells[grid.first] == cells[grid.second]
+    known = nearest[grid.first] == nearest[grid.second]
     _settle(state, known, solver)
     while not known.all():
         open_ = np.nonzero(~known)[0]

@@ -24,7 +24,7 @@ from .box_qp import least_in_box
 from .energy import CLOSE, Solver, energy_at
 from .free_field import FreeField, free_bounds
 from .greedy import greedy
-from .nearest_stroke import chamfer, stroke_cells
+from .nearest_stroke import chamfer, nearest_strokes
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
@@ -104,7 +104,7 @@ def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
     curve = stroke_curves(instance)
     miss = CrossField(instance, state.alpha, state.beta, state.p).residual_r ** 2 * instance.w
     worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
-    of_pixel = np.append(curve, -1)[stroke_cells(instance)]
+    of_pixel = np.append(curve, -1)[nearest_strokes(instance)]
     for number in worst:
         if over():
             return

@@ -5,7 +5,7 @@ single jumps do not lead out of.
   two opposite ones meet, or a pair of them is made;
 - `turn`: round a piece of a curve, or a disc: the strokes inside change to the other family of lines.
 
-A change is (pairs, steps): local numbers of pairs of a window, each at most once, and what is added to their
+A change is (pairs, steps): local numbers of pairs of a patch, each at most once, and what is added to their
 jumps.
 """
 
@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.grid import Ints
-from .landscape import Window
+from .landscape import Patch
 
 Change = tuple[Ints, Ints]
 
@@ -28,24 +28,24 @@ _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a block on its counter-c
 
 
 class Kicks:
-    """Random changes inside one window."""
+    """Random changes inside one patch."""
 
-    def __init__(self, window: Window, curve: Ints) -> None:
+    def __init__(self, patch: Patch, curve: Ints) -> None:
         """curve: number of the curve of each pixel, -1 without a stroke; shape (n,)."""
-        instance = window.instance
-        self._window = window
+        instance = patch.instance
+        self._patch = patch
         local = np.full(len(instance.grid.first), -1)
-        local[window.pairs] = np.arange(len(window.pairs))
+        local[patch.pairs] = np.arange(len(patch.pairs))
         blocks = local[instance.grid.blocks]
         self._blocks = blocks[(blocks >= 0).all(axis=1)]
-        self._beside = _blocks_of_pairs(self._blocks, len(window.pairs))
-        self._curve = curve[window.pixels]
+        self._beside = _blocks_of_pairs(self._blocks, len(patch.pairs))
+        self._curve = curve[patch.pixels]
         self._strokes = np.nonzero(self._curve >= 0)[0]
-        self._row = instance.grid.rows[window.pixels].astype(np.float64)
-        self._column = instance.grid.columns[window.pixels].astype(np.float64)
+        self._row = instance.grid.rows[patch.pixels].astype(np.float64)
+        self._column = instance.grid.columns[patch.pixels].astype(np.float64)
 
     def draw(self, rng: np.random.Generator, p: Ints) -> Change:
-        """A random change for the present jumps p (m,); never an empty one where the window has a block."""
+        """A random change for the present jumps p (m,); never an empty one where the patch has a block."""
         kind = rng.random()
         change = self.turn(rng) if kind < _TURNS and len(self._strokes) else self.shift(rng, p)
         return change if len(change[0]) else self.shift(rng, p)
@@ -53,9 +53,9 @@ class Kicks:
     def shift(self, rng: np.random.Generator, p: Ints) -> Change:
         """The jumps along a random path of blocks, which starts at a singularity every other time."""
         if not len(self._blocks):
-            pair = rng.integers(len(self._window.pairs), size=1, dtype=np.int32)
+            pair = rng.integers(len(self._patch.pairs), size=1, dtype=np.int32)
             return pair, rng.choice(np.array([-1, 1], dtype=np.int32), size=1)
-        turns = p[self._window.pairs[self._blocks]] @ np.array(_SIDES)
+        turns = p[self._patch.pairs[self._blocks]] @ np.array(_SIDES)
         singular = np.nonzero(turns)[0]
         if len(singular) and rng.random() < 0.5:
             block = int(rng.choice(singular))
@@ -73,7 +73,7 @@ class Kicks:
             pair = int(self._blocks[block, side])
             steps[pair] += direction * _SIDES[side]
             block = int(self._beside[pair, int(side < 2)])
-            if block < 0:  # the border of the window: the turn has left
+            if block < 0:  # the border of the patch: the turn has left
                 break
             if rng.random() < 0.3:
                 side = int(rng.integers(4))
@@ -89,7 +89,7 @@ class Kicks:
         if rng.random() < 0.7:
             inside &= self._curve == self._curve[centre]
         own: Ints = inside.astype(np.int32) * np.int32(rng.choice([-1, 1]))
-        steps = own[self._window.first] - own[self._window.second]
+        steps = own[self._patch.first] - own[self._patch.second]
         pairs = np.nonzero(steps)[0].astype(np.int32)
         return pairs, steps[pairs]
 

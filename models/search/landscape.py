@@ -2,7 +2,7 @@
 and any change of jumps in no time.
 
 For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
-(models/search/energy.py). On a window of some hundred pixels G is a small dense matrix. A jump p_e of the
+(models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
 pair (i, j) that changes by d
 
 - moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 q r;
@@ -10,13 +10,13 @@ pair (i, j) that changes by d
   which by the formula of Woodbury changes G by a matrix of rank 2.
 
 So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change
-that is made costs one update of G. Angles outside the window stay as they are; the energy is that of the
+that is made costs one update of G. Angles outside the patch stay as they are; the energy is that of the
 whole field.
 
 Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of
 beta, (alpha + c, beta -+ c) costs w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends
 this state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is taken
-from its definition (models/search/window_energy.py), and where the updates say another one, G is computed
+from its definition (models/search/patch_energy.py), and where the updates say another one, G is computed
 anew. Gains that no energy can have are not believed either.
 """
 
@@ -34,7 +34,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from .energy import PULL, energy_at
 from .free_field import free_bounds
-from .window_energy import WindowEnergy
+from .patch_energy import PatchEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
 """Changes of one jump that `gains` tells of."""
@@ -67,7 +67,7 @@ class _State(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Window:
+class Patch:
     """Pixels whose angles are free and the pairs inside, by local numbers.
 
     pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second:
@@ -81,8 +81,8 @@ class Window:
     second: Ints
 
     @classmethod
-    def of(cls, instance: Instance, free: Bools) -> Window:
-        """The window of the pixels that are free; free has shape (n,)."""
+    def of(cls, instance: Instance, free: Bools) -> Patch:
+        """The patch of the pixels that are free; free has shape (n,)."""
         grid = instance.grid
         pixels = np.nonzero(free)[0].astype(np.int32)
         number = np.full(grid.size, -1, dtype=np.int32)
@@ -92,12 +92,12 @@ class Window:
 
     @property
     def unknowns(self) -> Ints:
-        """Places of the window's angles in (alpha, beta), shape (2k,)."""
+        """Places of the patch's angles in (alpha, beta), shape (2k,)."""
         return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
 
 
 class Landscape:
-    """The least energy over a window's angles at jumps that change step by step; angles outside stay.
+    """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
 
     energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite.
     Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact
@@ -108,15 +108,15 @@ class Landscape:
     cannot solve.
     """
 
-    def __init__(self, window: Window, x: Floats, p: Ints) -> None:
-        """Start at the angles x (2n,), of which those in the window are solved for, and jumps p (m,)."""
-        self.window = window
+    def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
+        """Start at the angles x (2n,), of which those in the patch are solved for, and jumps p (m,)."""
+        self.patch = patch
         self.p = p.copy()
         self._around = x
-        self._defined = WindowEnergy(window, x, p)
-        soft = max(PULL, _SOFTEST - window.instance.w_beta)
-        self._soft = np.repeat([PULL, soft], len(window.pixels))
-        self._lower, self._upper = _bounds(window)
+        self._defined = PatchEnergy(patch, x, p)
+        soft = max(PULL, _SOFTEST - patch.instance.w_beta)
+        self._soft = np.repeat([PULL, soft], len(patch.pixels))
+        self._lower, self._upper = _bounds(patch)
         self._held: dict[int, float] = {}
         self._solve()
         self._settle()
@@ -125,7 +125,7 @@ class Landscape:
     def angles(self) -> Floats:
         """The angles (alpha, beta) of the whole field, shape (2n,)."""
         x = self._around.copy()
-        x[self.window.unknowns] = self._x
+        x[self.patch.unknowns] = self._x
         return x
 
     @property
@@ -133,7 +133,7 @@ class Landscape:
         """The field within its bounds, with its energy by definition."""
         inside = np.clip(self._x, self._lower, self._upper)
         x = self._around.copy()
-        x[self.window.unknowns] = inside
+        x[self.patch.unknowns] = inside
         return Point(self._defined(inside, self.p), x, self.p.copy())
 
     def saved(self) -> _State:
@@ -160,9 +160,9 @@ class Landscape:
 
     def _gains(self) -> Floats:
         """The gains by the present inverse, infinite where they cannot be true."""
-        g, x, i, j = self._inverse, self._x, self.window.first, self.window.second
-        k = len(self.window.pixels)
-        p = self.p[self.window.pairs]
+        g, x, i, j = self._inverse, self._x, self.patch.first, self.patch.second
+        k = len(self.patch.pixels)
+        p = self.p[self.patch.pairs]
         a = x[i] - x[j] + HALF * p
         give = g[i, i] + g[j, j] - 2 * g[i, j]
         at_i, at_j = i + k, j + k
@@ -180,14 +180,14 @@ class Landscape:
         return gains
 
     def change(self, pairs: Ints, steps: Ints) -> None:
-        """Add steps, shape (c,), to the jumps of the window's pairs with those local numbers,
+        """Add steps, shape (c,), to the jumps of the patch's pairs with those local numbers,
         each at most once.
         """
         try:
             self._follow(pairs, steps)
         except np.linalg.LinAlgError:
             self.energy = np.nan  # which is no energy, so that all is solved anew
-        self.p[self.window.pairs[pairs]] += steps
+        self.p[self.patch.pairs[pairs]] += steps
         self._settle()
 
     def _follow(self, pairs: Ints, steps: Ints) -> None:
@@ -209,8 +209,8 @@ class Landscape:
 
     def _solve(self) -> None:
         """Compute inverse, angles and energy from the jumps and from the angles that are held."""
-        places = self.window.unknowns
-        energy = energy_at(self.window.instance, self.p)
+        places = self.patch.unknowns
+        energy = energy_at(self.patch.instance, self.p)
         rows = energy.matrix[places]
         outside = self._around.copy()
         outside[places] = 0.0
@@ -225,7 +225,7 @@ class Landscape:
         self._x = self._inverse @ right
         self._x += self._inverse @ (right - system @ self._x)
         if not np.isfinite(self._x).all():
-            raise np.linalg.LinAlgError("the angles of a window are not finite")
+            raise np.linalg.LinAlgError("the angles of a patch are not finite")
         self.energy = self._defined_energy()
         self._fresh = True
 
@@ -253,9 +253,9 @@ class Landscape:
 
     def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and what c - 2 x'b gains."""
-        i, j = self.window.first[pairs], self.window.second[pairs]
+        i, j = self.patch.first[pairs], self.patch.second[pairs]
         q = HALF * steps
-        a = self._x[i] - self._x[j] + HALF * self.p[self.window.pairs[pairs]]
+        a = self._x[i] - self._x[j] + HALF * self.p[self.patch.pairs[pairs]]
         push = np.zeros(len(self._x))
         np.subtract.at(push, i, 2 * q)
         np.add.at(push, j, 2 * q)
@@ -265,12 +265,12 @@ class Landscape:
     def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
         """The unknowns beta whose couplings turn, shape (c,), and what is added to H there, shape (c, c)."""
         odd = pairs[(steps & 1) == 1]
-        ends = np.concatenate([self.window.first[odd], self.window.second[odd]])
+        ends = np.concatenate([self.patch.first[odd], self.patch.second[odd]])
         places, where = np.unique(ends, return_inverse=True)
         first, second = where[: len(odd)], where[len(odd) :]
         added = np.zeros((len(places), len(places)))
-        added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.window.pairs[odd]])
-        return places + len(self.window.pixels), added
+        added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.patch.pairs[odd]])
+        return places + len(self.patch.pixels), added
 
     def _small(self, places: Ints, added: Floats) -> Floats:
         """C (1 + G C)^-1 for couplings C that are added at these places:
@@ -308,7 +308,7 @@ class Landscape:
         column = self._inverse[:, [place]]
         stiffer = 1 + weight * column[place, 0]
         if not stiffer > 0:
-            raise np.linalg.LinAlgError("rounding has made the inverse of a window indefinite")
+            raise np.linalg.LinAlgError("rounding has made the inverse of a patch indefinite")
         share = weight / stiffer
         off = goal - self._x[place]
         self.energy += share * off * off
@@ -316,7 +316,7 @@ class Landscape:
         self._update(-share, column, column)
 
 
-def _bounds(window: Window) -> tuple[Floats, Floats]:
-    """Least and greatest angles of the window, shapes (2k,)."""
-    lower, upper = free_bounds(window.instance)
-    return lower[window.unknowns], upper[window.unknowns]
+def _bounds(patch: Patch) -> tuple[Floats, Floats]:
+    """Least and greatest angles of the patch, shapes (2k,)."""
+    lower, upper = free_bounds(patch.instance)
+    return lower[patch.unknowns], upper[patch.unknowns]

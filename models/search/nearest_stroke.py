@@ -12,7 +12,7 @@ from ..instance.grid import Grid, Ints
 from ..instance.instance import Instance
 
 
-def stroke_cells(instance: Instance) -> Ints:
+def nearest_strokes(instance: Instance) -> Ints:
     """For each pixel the number of its nearest stroke pixel, or -1 in a part without strokes; shape (n,).
 
     Nearest by the 3-4 chamfer distance along paths inside the mask.
@@ -23,8 +23,8 @@ def stroke_cells(instance: Instance) -> Ints:
     )
     number = np.full(grid.size + 1, -1, dtype=np.int32)
     number[instance.stroke_index] = np.arange(len(instance.stroke_index))
-    cells: Ints = number[np.where(source >= 0, source, grid.size)]
-    return cells
+    nearest: Ints = number[np.where(source >= 0, source, grid.size)]
+    return nearest
 
 
 def chamfer(grid: Grid) -> Any:

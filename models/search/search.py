@@ -1,7 +1,7 @@
-"""A search for a field of low 2-norm energy: from the greedy field downwards, window by window, on all cores.
+"""A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
 
-Every round some windows of the grid are explored (models/search/walk.py) with all else fixed; what is lower
-is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one window. On
+Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
+is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
 one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
 processes, unless seconds are given and run out: then the clock decides where the start, the grids of lower
 resolution and the last round are cut off. What a round that was cut off has found is taken over if it is
@@ -28,24 +28,24 @@ from .energy import Solver
 from .free_field import FreeField, free_bounds
 from .improvement import first_field, improved, settle, stroke_curves
 from .landscape import Point
-from .nearest_stroke import stroke_cells
+from .nearest_stroke import nearest_strokes
 from .power_field import power_field
 from .walk import LOWER, Explored, Task, explore
 
-Progress = Callable[[int, float], object]
+RoundProgress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
 
 Explorers = Callable[[list[Task]], list[Explored]]
-"""Explores windows side by side and gives what was found in the order of the tasks."""
+"""Explores patches side by side and gives what was found in the order of the tasks."""
 
-_WINDOW: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
-_WINDOWS: Final = 4  # a round
+_PATCH: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
+_PATCHES: Final = 4  # a round
 _FINE: Final = 0.6  # share of the seconds that is kept for the grid of higher resolution
 _COARSE: Final = 60  # rounds on a grid of lower resolution
 _LATEST: Final = 4  # fields that are brought from there
-_KICKS: Final = 40  # a window
+_KICKS: Final = 40  # a patch
 _SETTLE: Final = 8  # rounds between two improvements of the whole grid
-_IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a window
+_IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a patch
 _PATIENCE: Final = 200  # kicks a pixel without success that end a search
 _ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
 _HURRY: Final = 5.0  # seconds; with less, starting processes would take a good part of them
@@ -74,7 +74,7 @@ def search(
     seed: int = 0,
     jobs: int = 2,
     start: CrossField | None = None,
-    progress: Progress = lambda *_: None,
+    progress: RoundProgress = lambda *_: None,
 ) -> Search:
     """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off,
     the improved greedy field.
@@ -192,7 +192,7 @@ class _Hunt:
         self._latest = [start]
         self._unsettled = False
         # Parts without a stroke are constant and cost nothing.
-        self._reached = stroke_cells(instance) >= 0
+        self._reached = nearest_strokes(instance) >= 0
         self._curve = np.full(instance.grid.size, -1)
         self._curve[instance.stroke_index] = stroke_curves(instance)
 
@@ -203,8 +203,8 @@ class _Hunt:
 
     @property
     def large(self) -> bool:
-        """Whether the grid is more than one window."""
-        return self._instance.grid.size > _WINDOW * 5 // 4
+        """Whether the grid is more than one patch."""
+        return self._instance.grid.size > _PATCH * 5 // 4
 
     def latest(self, over: Over) -> list[CrossField]:
         """The last fields that were the best for a round or more, the best first."""
@@ -216,7 +216,7 @@ class _Hunt:
             self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
-    def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
+    def run(self, explorers: Explorers, limits: _Limits, progress: RoundProgress) -> str:
         """Go on until a limit is met; which one."""
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
@@ -235,21 +235,21 @@ class _Hunt:
         x, p = self._state.x, self._state.p
         return [
             Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number), deadline)
-            for number, free in enumerate(self._windows(rng))
+            for number, free in enumerate(self._patches(rng))
         ]
 
-    def _windows(self, rng: np.random.Generator) -> Iterator[Bools]:
-        """The windows of a round, round pixels of high energy and others in turn."""
+    def _patches(self, rng: np.random.Generator) -> Iterator[Bools]:
+        """The patches of a round, round pixels of high energy and others in turn."""
         grid = self._instance.grid
         if not self.large:
-            yield from [self._reached] * _WINDOWS
+            yield from [self._reached] * _PATCHES
             return
         field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
         high = field.pixel_energy + 1e-12
-        for number in range(_WINDOWS):
+        for number in range(_PATCHES):
             centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
-            yield (away <= np.partition(away, _WINDOW)[_WINDOW]) & self._reached
+            yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
 
     def _take(self, tasks: list[Task], found: list[Point | None], over: Over) -> None:
         """Take over what is lower, the lowest first, and bring the whole grid up to date now and then."""
@@ -267,7 +267,7 @@ class _Hunt:
             self.offer(improved(self.best(over), over))
 
     def _adopt(self, task: Task, better: Point, over: Over) -> None:
-        """Take over a window's angles and jumps if that lowers the energy beside what else was taken over."""
+        """Take over a patch's angles and jumps if that lowers the energy beside what else was taken over."""
         state = self._state
         trial = FreeField(
             self._instance, state.alpha, state.beta, np.where(better.p != task.p, better.p, state.p)
@@ -275,7 +275,7 @@ class _Hunt:
         inside = np.concatenate([task.free, task.free])
         trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
         if not self.large and trial.energy >= state.energy - LOWER:
-            # Others were taken over in the same window: the angles for all of the new jumps are neither's.
+            # Others were taken over in the same patch: the angles for all of the new jumps are neither's.
             trial.x = state.x
             settle(trial, self._solver, over)
         if trial.energy < state.energy - LOWER:

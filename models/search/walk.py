@@ -1,4 +1,4 @@
-"""A walk over the jumps of one window of the grid: kick, follow the valley down,
+"""A walk over the jumps of one patch of the grid: kick, follow the valley down,
 keep what is lower (iterated local search).
 
 After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump
@@ -19,7 +19,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from .kicks import Change, Kicks
-from .landscape import STEPS, Landscape, Point, Window
+from .landscape import STEPS, Landscape, Patch, Point
 
 LOWER: Final = 1e-7
 """Energy by which a field has to be lower to count as better: less may be rounding."""
@@ -31,9 +31,9 @@ _REST: Final = (4, 12)  # changes for which a jump stays as it is once it has ch
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A window to explore, from a field on.
+    """A patch to explore, from a field on.
 
-    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the window,
+    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the patch,
     shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to
     try; seed: of their choice; deadline: when to end.
     """
@@ -49,7 +49,7 @@ class Task:
 
 
 class Explored(NamedTuple):
-    """The point of least energy, outside the window that of the task,
+    """The point of least energy, outside the patch that of the task,
     or None when none was lower by more than 1e-7.
 
     whole: whether all kicks were tried; if not, the clock has had a say in the point.
@@ -60,7 +60,7 @@ class Explored(NamedTuple):
 
 
 def explore(task: Task) -> Explored:
-    """What was found in a window; energies are those of the definition, within all bounds of the angles.
+    """What was found in a patch; energies are those of the definition, within all bounds of the angles.
 
     The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several
     threads end in other digits.
@@ -72,15 +72,15 @@ def explore(task: Task) -> Explored:
 
 def _explore(task: Task, over: Over) -> Explored:
     rng = np.random.default_rng(task.seed)
-    window = Window.of(task.instance, task.free)
-    land = Landscape(window, task.x, task.p)
-    home, kicks = land.saved(), Kicks(window, task.curve)
+    patch = Patch.of(task.instance, task.free)
+    land = Landscape(patch, task.x, task.p)
+    home, kicks = land.saved(), Kicks(patch, task.curve)
     alpha, beta = np.split(task.x, 2)
     given = CrossField(task.instance, alpha, beta, task.p).energy().total
-    # Solved in the window alone the angles may be lower already; jumps have to do better than that.
+    # Solved in the patch alone the angles may be lower already; jumps have to do better than that.
     least = min(given, land.point.energy)
     best: Point | None = None
-    for _ in range(task.kicks if len(window.pairs) else 0):
+    for _ in range(task.kicks if len(patch.pairs) else 0):
         lower = _kicked(land, kicks.draw(rng, land.p), rng, home.energy - LOWER, over)
         if lower is not None and lower.point.energy < least - LOWER:
             land, home, best = lower, lower.saved(), lower.point
@@ -103,13 +103,13 @@ def _kicked(
     with suppress(np.linalg.LinAlgError):
         land.change(*kick)
         jumps = _walk(land, rng, goal, over)
-        return None if jumps is None else Landscape(land.window, land.angles, jumps)
+        return None if jumps is None else Landscape(land.patch, land.angles, jumps)
     return None
 
 
 def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) -> Ints | None:
     """The jumps (m,) of the lowest point below `goal` of a walk from where the landscape stands."""
-    resting = np.zeros(len(land.window.pairs), dtype=np.int64)
+    resting = np.zeros(len(land.patch.pairs), dtype=np.int64)
     low, found = land.energy, None
     fruitless = 0
     for now in range(1, _MOST_STEPS + 1):

@@ -13,7 +13,7 @@ GAPS: Final = (0.03, 0.06, 0.12)
 tried in turn.
 """
 ENCLOSED: Final = 0.25
-"""Least share of the strokes' convex hull that a silhouette must fill; otherwise the drawing is open."""
+"""Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
 CRUMB: Final = 0.01
 """Least share of a region for a part of its own;
 smaller ones are left over where a stroke grazes the outline.
@@ -24,7 +24,7 @@ less is a stroke that ends a little beyond an outline.
 """
 
 
-def silhouette(strokes: Bools) -> Bools:
+def inside_outline(strokes: Bools) -> Bools:
     """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
 
     The narrowest of GAPS for which the drawing encloses something decides; an open drawing, which encloses

@@ -25,7 +25,7 @@ from ..storage import read_bytes
 from .bitmap import Picture, read_picture, read_white
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .outline import parts_with, silhouette
+from .outline import inside_outline, parts_with
 from .scap import read_scap
 from .svg import read_svg
 
@@ -71,7 +71,7 @@ def read_sketch(
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
     size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
-    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`silhouette`), in the
+    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`), in the
     parts that curvature lines run through; an open drawing gets the whole rectangle.
     mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
@@ -258,14 +258,16 @@ def _mask_on_grid(
 
 
 def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
-    """The pixels to solve for: the given mask or the silhouette, less what other strokes cut out."""
+    """The pixels to solve for: the given mask or the inside of the outline, less what other strokes cut out."""
     cut = others.amount >= CUT
     if given is not None:
         return given & ~cut
     walls = (lines.amount >= LEAST_WEIGHT) | cut
     if not walls.any():
         raise InputError("no stroke is left on so coarse a grid; choose a larger size")
-    solve = parts_with(silhouette(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
+    solve = parts_with(
+        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
+    )
     if not solve.any():
         raise InputError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"

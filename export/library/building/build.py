@@ -15,7 +15,7 @@ from typing import Any
 from ....models.errors import CrossfieldError
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, are_whole, read_about, read_library, read_sidecar
-from ..documents.lock import changing
+from ..documents.lock import Progress, changing
 from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
@@ -24,8 +24,6 @@ from .executor import Tasks, ahead, executor
 from .index import write_index
 from .inputs import Inputs
 from .instance_task import Files, about_file, prepare
-
-Progress = Callable[[str], None]
 
 
 def build(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +25,7 @@ from ..building.build import rebuilt
 from ..building.index import SUMS
 from ..checking.finding import FEASIBLE, SAME
 from ..documents.documents import Library, problem_of, read_library
-from ..documents.lock import changing
+from ..documents.lock import Progress, changing
 from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, add_record
@@ -35,8 +34,6 @@ from ..ledger.points import complete_point, field_of
 UNKNOWN: Final = "unknown"
 _LONGEST: Final = 200  # characters of a text in the ledger
 _TOLD: Final = 4  # names in a message
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -22,21 +22,23 @@ Read from TOML and checked.
     rungs = ["tiny"]                   all by default
     sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
 
-Files are found from the folder of the specification.
+Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
+what is checked here are words of tables that the program has, and what several keys say together.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from ....models.errors import InputError, shortened
 from ....models.formulations.declaration import FACETS, FORMULATIONS
 from ....models.input_limits import MAX_BYTES
+from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
@@ -46,13 +48,8 @@ FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
 """The ladder: every solver in seconds; optimum proven; gap open; reading and presolve."""
-SHAPES: Final = ("full", "ragged")
-"""Masks of random instances: the whole square, or a ragged part of it."""
+Kind = Literal["sample", "file", "random"]
 DEFAULT: Final = Path(__file__).with_name("default.toml")
-
-_NAME: Final = re.compile(r"[a-z][a-z0-9]{0,15}")
-_MOST_SEED: Final = 999
-_LARGEST: Final = 999  # three digits in names
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ class Sketch:
     """
 
     name: str
-    kind: Literal["sample", "file", "random"]
+    kind: Kind
     what: str
     title: str
     rungs: tuple[str, ...]
@@ -173,210 +170,178 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
     Raises InputError, naming `path`.
     """
     try:
-        return _spec(_Table(document, ""), path.parent)
+        _check_form(document)
+        return _spec(document, path.parent)
     except InputError as error:
         raise error if error.file is not None else InputError(str(error), file=path) from error
 
 
-class _Table:
-    """A table of the document: every key is taken once and checked; what is left in the end is unknown."""
-
-    def __init__(self, given: Any, place: str) -> None:
-        if not isinstance(given, dict):
-            raise InputError(f"{place}: is not a table; write [{place}]")
-        self._given, self.place, self._known = given, place, list[str]()
-
-    def __contains__(self, key: str) -> bool:
-        return key in self._given
-
-    def at(self, key: str) -> str:
-        """The place of a key in words."""
-        return f"{self.place}.{key}" if self.place else key
-
-    def raw(self, key: str, default: Any = None) -> Any:
-        """The value of a key as it stands."""
-        self._known.append(key)
-        return self._given.get(key, default)
-
-    def text(self, key: str, default: str | None = None) -> str:
-        """One line of text."""
-        value = self.raw(key, default)
-        if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 300:
-            raise InputError(f"{self.at(key)}: must be one line of text, in quotes")
-        return value
-
-    def chosen(self, key: str, known: Iterable[str], default: Sequence[str] | None = None) -> tuple[str, ...]:
-        """A list of known words, each once."""
-        known = tuple(known)
-        found = self.list(key, str, "text in quotes", list(known if default is None else default))
-        for word in found:
-            if word not in known:
-                raise InputError(
-                    f"{self.at(key)}: there is no {shortened(word)!r}; choose from {', '.join(known)}"
-                )
-        return found
-
-    def numbers(self, key: str, least: int, most: int) -> tuple[int, ...]:
-        """A list of whole numbers in a range, each once."""
-        found = self.list(key, int, "whole numbers", None)
-        for value in found:
-            if not least <= value <= most:
-                raise InputError(
-                    f"{self.at(key)}: {shortened(value)} is out of range; choose {least} to {most}"
-                )
-        return found
-
-    def list(self, key: str, kind: type[Any], words: str, default: Any) -> tuple[Any, ...]:
-        """A list that is not empty, of values of one type, each once."""
-        found = self.raw(key, default)
-        if not isinstance(found, list) or not found or not all(type(value) is kind for value in found):
-            raise InputError(f"{self.at(key)}: must be a list of {words}, at least one")
-        twice = [value for number, value in enumerate(found) if value in found[:number]]
-        if twice:
-            raise InputError(f"{self.at(key)}: {shortened(twice[0])!r} is listed twice; list it once")
-        return tuple(found)
-
-    def flag(self, key: str) -> bool:
-        """True or false, false by default."""
-        value = self.raw(key, default=False)
-        if not isinstance(value, bool):
-            raise InputError(f"{self.at(key)}: must be true or false")
-        return value
-
-    def finish(self) -> None:
-        """Refuse what nobody took."""
-        for key in self._given:
-            if key not in self._known:
-                raise InputError(f"{self.at(key)}: is unknown; the keys here are {', '.join(self._known)}")
-
-
-def _spec(table: _Table, folder: Path) -> Spec:
+def _check_form(document: dict[str, Any]) -> None:
     for key, value in (("format", FORMAT), ("version", VERSION)):
-        if table.raw(key) != value:
+        if document.get(key) != value:
             raise InputError(
                 f"{key}: must be {value!r}; this is no specification of a library, or another version"
             )
-    gauges, facets = table.chosen("gauges", GAUGES, ["strokes"]), table.chosen("facets", FACETS, ["hull"])
-    title = table.text("title")
-    formulations = table.chosen("formulations", FORMULATIONS)
-    rungs = _rungs(table, gauges, facets)
-    sketches = _sketches(table, folder, rungs)
-    ledger = folder / table.text("ledger") if "ledger" in table else None
-    table.raw("ledger")
-    table.finish()
+    try:
+        error = schema_error(document, "library-spec", __package__)
+    except ValueError as large:  # of a whole number of more digits than Python writes
+        raise InputError("holds a number of thousands of digits; write a smaller one") from large
+    if error is not None:
+        raise InputError(_of_key(error) or _of_value(error))
+
+
+def _of_key(error: Any) -> str | None:
+    """What is said of a key that is too many or missing; None where the error is about a value."""
+    given, said, place = error.instance, error.validator_value, error.json_path[2:]
+    known = error.schema.get("properties", {})
+    match error.validator:
+        case "additionalProperties":
+            key = next(key for key in given if key not in known)
+            words = f"is unknown; the keys here are {', '.join(known)}"
+        case "required":
+            key = next(key for key in said if key not in given)
+            words = f"there is none; write {known[key].get('description', 'it')}"
+        case "dependentRequired":
+            key, needed = next(
+                (key, need) for key, (need,) in said.items() if key in given and need not in given
+            )
+            words = f"goes with {needed}; write both, or leave it out"
+        case _:
+            return None
+    return f"{place}.{key}: {words}" if place else f"{key}: {words}"
+
+
+def _of_value(error: Any) -> str:
+    """What is said of a value, at its place; an entry of a list is told of as the list."""
+    place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
+    if not isinstance(error.instance, dict):
+        place = re.sub(r"\[\d+\]$", "", place)
+    match error.validator:
+        case "uniqueItems":
+            twice = next(each for n, each in enumerate(error.instance) if each in error.instance[:n])
+            words = f"{shortened(twice)!r} is listed twice; list it once"
+        case "minimum" | "maximum":
+            words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
+        case "enum":
+            words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
+        case "oneOf":
+            words = f"needs exactly one of {', '.join(_SOURCES)}"
+        case "pattern":
+            words = f"{value!r} is not allowed; write {schema['description']}"
+        case _:
+            words = f"must be {schema['description']}"
+    return f"{place}: {words}"
+
+
+def _spec(document: dict[str, Any], folder: Path) -> Spec:
+    defaults = {
+        "formats": tuple(FORMATS),
+        "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
+        "facets": _words(document, "facets", FACETS, ("hull",)),
+    }
+    formulations = _words(document, "formulations", FORMULATIONS, tuple(FORMULATIONS))
+    rungs = tuple(
+        _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
+    )
+    sketches = tuple(
+        _sketch(table, f"sketches[{number}].", folder, rungs)
+        for number, table in enumerate(document["sketches"])
+    )
+    _check_names([sketch.name for sketch in sketches])
+    ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
-    return Spec(title, formulations, rungs, sketches, ledger)
+    return Spec(document["title"], formulations, rungs, sketches, ledger)
 
 
-def _rungs(table: _Table, gauges: tuple[str, ...], facets: tuple[str, ...]) -> tuple[Rung, ...]:
-    given = table.raw("rungs", {})
-    names = _Table(given, "rungs")
-    found = [
-        _rung(name, _Table(names.raw(name), f"rungs.{name}"), gauges, facets)
-        for name in RUNGS
-        if name in names
-    ]
-    for name in RUNGS:
-        names.raw(name)
-    names.finish()
-    if not found:
-        raise InputError("rungs: there is none; write at least one table, say [rungs.tiny] with sizes = [4]")
-    return tuple(found)
-
-
-def _rung(name: str, table: _Table, gauges: tuple[str, ...], facets: tuple[str, ...]) -> Rung:
-    rung = Rung(
-        name,
-        table.numbers("sizes", 1, _LARGEST),
-        table.chosen("formats", FORMATS),
-        table.flag("compress"),
-        table.chosen("gauges", GAUGES, gauges),
-        table.chosen("facets", FACETS, facets),
-    )
-    table.finish()
-    return rung
-
-
-def _sketches(table: _Table, folder: Path, rungs: tuple[Rung, ...]) -> tuple[Sketch, ...]:
-    given = table.raw("sketches")
-    if not isinstance(given, list) or not given:
-        raise InputError("sketches: there is none; write at least one table [[sketches]]")
-    found = [_sketch(_Table(each, f"sketches[{number}]"), folder, rungs) for number, each in enumerate(given)]
-    names = [sketch.name for sketch in found]
+def _check_names(names: list[str]) -> None:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise InputError(
                 f"sketches[{number}].name: {name!r} is the name of two sketches; give each its own"
             )
-    return tuple(found)
 
 
-def _sketch(table: _Table, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
-    name = table.text("name")
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f"{table.at('name')}: {name[:40]!r} is not allowed; use a lower-case letter, "
-            "then at most 15 lower-case letters and digits, no path"
-        )
-    wanted = table.chosen("rungs", [rung.name for rung in rungs])
-    sizes = _sizes(table, wanted)
-    kinds = [kind for kind in _KINDS if kind in table]
-    if len(kinds) != 1:
-        raise InputError(f"{table.place}: {name} needs exactly one of {', '.join(_KINDS)}")
-    sketch = replace(_KINDS[kinds[0]](table, name, wanted, folder), sizes=sizes)
-    table.finish()
+def _words(
+    table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
+) -> tuple[str, ...]:
+    """The words of a list, all of them known ones, or the default."""
+    found = tuple(table.get(key, default))
+    for word in found:
+        _check_known(word, known, f"{place}{key}")
+    return found
+
+
+def _check_known(word: str, known: Collection[str], place: str, kind: str = "") -> None:
+    if word not in known:
+        raise InputError(f"{place}: there is no {kind}{shortened(word)!r}; choose from {', '.join(known)}")
+
+
+def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]) -> Rung:
+    known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
+    words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
+    return Rung(name, _whole(table["sizes"]), compress=table.get("compress", False), **words)
+
+
+def _whole(numbers: list[float]) -> tuple[int, ...]:
+    """The numbers of a list that is checked: 4.0 is whole too."""
+    return tuple(map(int, numbers))
+
+
+def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
+    name, names = table["name"], tuple(rung.name for rung in rungs)
+    wanted = _words(table, "rungs", names, names, place)
+    kind = next(kind for kind in _SOURCES if kind in table)
+    what: dict[str, Any] = _SOURCES[kind](table, place, folder)
+    sketch = Sketch(
+        name,
+        kind,
+        title=table.get("title", what.pop("title")),
+        rungs=wanted,
+        sizes=_sizes(table, place, wanted),
+        **what,
+    )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
     for size in every:
         if every.count(size) > 1:
             raise InputError(
-                f"{table.place}: {name} has size {size} on two rungs; keep it on one, "
+                f"{place[:-1]}: {name} has size {size} on two rungs; keep it on one, "
                 "because names carry the size alone"
             )
     return sketch
 
 
-def _sizes(table: _Table, rungs: tuple[str, ...]) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    given = _Table(table.raw("sizes", {}), table.at("sizes"))
-    found = tuple((rung, given.numbers(rung, 1, _LARGEST)) for rung in rungs if rung in given)
-    for rung in rungs:
-        given.raw(rung)
-    given.finish()
-    return found
+def _sizes(
+    table: dict[str, Any], place: str, rungs: tuple[str, ...]
+) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    given = table.get("sizes", {})
+    for rung in given:
+        if rung not in rungs:
+            raise InputError(f"{place}sizes.{rung}: is unknown; the keys here are {', '.join(rungs)}")
+    return tuple((rung, _whole(given[rung])) for rung in rungs if rung in given)
 
 
-def _sample(table: _Table, name: str, rungs: tuple[str, ...], _folder: Path) -> Sketch:
-    what = table.text("sample")
-    if what not in SAMPLES:
-        raise InputError(
-            f"{table.at('sample')}: there is no sample {shortened(what)!r}; choose from {', '.join(SAMPLES)}"
-        )
-    return Sketch(name, "sample", what, table.text("title", SAMPLES[what].description), rungs)
+def _sample(table: dict[str, Any], place: str, _folder: Path) -> dict[str, Any]:
+    what = table["sample"]
+    _check_known(what, SAMPLES, f"{place}sample", "sample ")
+    return {"what": what, "title": SAMPLES[what].description}
 
 
-def _random(table: _Table, name: str, rungs: tuple[str, ...], _folder: Path) -> Sketch:
-    what = table.text("random")
-    if what not in SHAPES:
-        raise InputError(
-            f"{table.at('random')}: there is no shape {shortened(what)!r}; choose from {', '.join(SHAPES)}"
-        )
-    seeds = table.numbers("seeds", 0, _MOST_SEED)
+def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]:
+    what = table["random"]
     title = f"random strokes on a {'full square' if what == 'full' else 'ragged part of a square'}"
-    return Sketch(name, "random", what, table.text("title", title), rungs, seeds=seeds)
+    return {"what": what, "title": title, "seeds": _whole(table["seeds"])}
 
 
-def _file(table: _Table, name: str, rungs: tuple[str, ...], folder: Path) -> Sketch:
-    what, mask = table.text("file"), table.text("mask") if "mask" in table else ""
-    source = table.text("source", Path(what).name)
-    table.raw("mask")
-    drawing = _content(folder / what, table.at("file"))
-    masked = _content(folder / mask, table.at("mask")) if mask else b""
-    return Sketch(
-        name, "file", source, table.text("title", source), rungs, drawing=drawing, mask=masked, mask_name=mask
-    )
+def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
+    what, mask = table["file"], table.get("mask", "")
+    source = table.get("source", Path(what).name)
+    drawing = _content(folder / what, f"{place}file")
+    masked = _content(folder / mask, f"{place}mask") if mask else b""
+    return {"what": source, "title": source, "drawing": drawing, "mask": masked, "mask_name": mask}
 
 
-_KINDS: Final[dict[str, Callable[[_Table, str, tuple[str, ...], Path], Sketch]]] = {
+_SOURCES: Final[dict[Kind, Callable[[dict[str, Any], str, Path], dict[str, Any]]]] = {
     "sample": _sample,
     "file": _file,
     "random": _random,

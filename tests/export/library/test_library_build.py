@@ -207,13 +207,44 @@ BAD = {
     "two sources": (HEAD + GOOD_RUNG + GOOD_SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
     "random without seeds": (
         HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
-        "sketches[0].seeds: must be a list",
+        "sketches[0].random: goes with seeds",
     ),
     "sizes on a rung that is not": (
         HEAD + GOOD_RUNG + GOOD_SKETCH + "sizes = { large = [9] }\n",
         "sketches[0].sizes.large: is unknown",
     ),
-    "seeds of a sample": (HEAD + GOOD_RUNG + GOOD_SKETCH + "seeds = [1]\n", "sketches[0].seeds: is unknown"),
+    "seeds of a sample": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + "seeds = [1]\n",
+        "sketches[0].seeds: goes with random",
+    ),
+    "mask of a sample": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + 'mask = "m.png"\n',
+        "sketches[0].mask: goes with file",
+    ),
+    "two lines in a title": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + 'title = "a\\nb"\n',
+        "sketches[0].title: must be one line",
+    ),
+    "two lines in a name": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"a\\n"'),
+        "sketches[0].name: must be a",
+    ),
+    "compressed as text": (
+        HEAD + GOOD_RUNG + 'compress = "no"\n' + GOOD_SKETCH,
+        "rungs.tiny.compress: must be true or",
+    ),
+    "a rung without sizes": (
+        HEAD + "[rungs.tiny]\n" + GOOD_SKETCH,
+        "rungs.tiny.sizes: there is none; write a list",
+    ),
+    "a sketch that is a number": (
+        HEAD + "sketches = [3]\n" + GOOD_RUNG,
+        "sketches: must be a table [[sketches]]",
+    ),
+    "another shape": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "round"\nseeds = [1]\n',
+        "sketches[0].random: there is no 'round'; choose from full, ragged",
+    ),
     "missing ledger": (
         HEAD + 'ledger = "gone.json"\n' + GOOD_RUNG + GOOD_SKETCH,
         "ledger: there is no file gone.json",

@@ -11,7 +11,7 @@ from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy
 from crossfield.models.search.improvement import first_field
-from crossfield.models.search.nearest_stroke import stroke_cells
+from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.power_field import power_field
 from crossfield.models.search.search import search
 from crossfield.models.sketch.samples import sample
@@ -118,11 +118,11 @@ MOVES = {"turned": np.rot90, "mirrored": np.fliplr, "transposed": np.transpose}
 def same_cells(instance, moved, move):
     """Whether pixels as near to two strokes, if any, went to the same stroke before and after the move."""
     cells = np.full(instance.mask.shape, -1)
-    cells[instance.mask] = stroke_cells(instance)
+    cells[instance.mask] = nearest_strokes(instance)
     names = np.full(instance.mask.shape, -1)
     names[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     order = move(names)[tuple(moved.stroke_pixels.T)]
-    return (np.append(order, -1)[stroke_cells(moved)] == move(cells)[moved.mask]).all()
+    return (np.append(order, -1)[nearest_strokes(moved)] == move(cells)[moved.mask]).all()
 
 
 @pytest.mark.parametrize("name", MOVES)
@@ -274,7 +274,7 @@ def test_cells_go_round_the_hole_of_a_mask():
     theta[0, 0], theta[2, 2] = 0.1, 0.2
     instance = sketch(mask, theta)
     cells = np.full(mask.shape, -1)
-    cells[mask] = stroke_cells(instance)
+    cells[mask] = nearest_strokes(instance)
     assert cells[:, 2].tolist() == [1, 1, 1]
     assert cells[:2, 0].tolist() == [0, 0]
 
@@ -282,7 +282,7 @@ def test_cells_go_round_the_hole_of_a_mask():
 def test_cells_do_not_leap_over_a_corner():
     mask = np.eye(2, dtype=bool)
     instance = sketch(mask, np.array([[0.3, np.nan], [np.nan, np.nan]]))
-    assert stroke_cells(instance).tolist() == [0, -1]
+    assert nearest_strokes(instance).tolist() == [0, -1]
 
 
 def test_dense_least_squares_agree_with_the_energy_of_a_field():

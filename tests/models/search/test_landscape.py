@@ -13,7 +13,7 @@ from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.free_field import free_bounds
 from crossfield.models.search.improvement import first_field, stroke_curves
 from crossfield.models.search.kicks import Kicks
-from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Window
+from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.search import _Hunt
 from crossfield.models.search.walk import explore
 from hypothesis import given, settings
@@ -59,7 +59,7 @@ def definition(instance, x, p):
 
 def assert_as_defined(land):
     """The energy of a landscape is that of its angles and jumps, and of the pulls on them."""
-    energy = definition(land.window.instance, land.angles, land.p)
+    energy = definition(land.patch.instance, land.angles, land.p)
     held = sum(_HOLD * (land._x[place] - bound) ** 2 for place, bound in land._held.items())
     soft = float(land._soft @ land._x**2)
     assert land.energy >= 0
@@ -69,13 +69,13 @@ def assert_as_defined(land):
 def walked(instance, seed, kicks, steps):
     """Kicks, and after each some steps of the best change of one jump; every point on the way is checked."""
     field = first_field(instance)
-    window = Window.of(instance, np.ones(instance.grid.size, bool))
-    if not len(window.pairs):
+    patch = Patch.of(instance, np.ones(instance.grid.size, bool))
+    if not len(patch.pairs):
         return
     curve = np.full(instance.grid.size, -1)
     curve[instance.stroke_index] = stroke_curves(instance)
-    land = Landscape(window, np.concatenate([field.alpha, field.beta]), field.p)
-    draw, rng = Kicks(window, curve).draw, np.random.default_rng(seed)
+    land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
+    draw, rng = Kicks(patch, curve).draw, np.random.default_rng(seed)
     for _ in range(kicks):
         land.change(*draw(rng, land.p))
         assert_as_defined(land)
@@ -88,7 +88,7 @@ def walked(instance, seed, kicks, steps):
 
 
 def explored(instance, seed, kicks):
-    """What the windows of a round find, checked, and a round of the search."""
+    """What the patches of a round find, checked, and a round of the search."""
     tasks = _Hunt(instance, seed, first_field(instance)).tasks(Deadline(np.inf))
     lower, upper = free_bounds(instance)
     for task in tasks:

@@ -15,7 +15,7 @@ from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy
 from crossfield.models.search.improvement import first_field, improved, stroke_curves
 from crossfield.models.search.kicks import Kicks
-from crossfield.models.search.landscape import STEPS, Landscape, Window
+from crossfield.models.search.landscape import STEPS, Landscape, Patch
 from crossfield.models.search.walk import Task, explore
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
@@ -32,15 +32,15 @@ def angles(field):
 
 def landscape(field, free=None):
     size = field.instance.grid.size
-    window = Window.of(field.instance, np.ones(size, bool) if free is None else free)
-    return Landscape(window, angles(field), field.p)
+    patch = Patch.of(field.instance, np.ones(size, bool) if free is None else free)
+    return Landscape(patch, angles(field), field.p)
 
 
-def kicks_of(window):
-    instance = window.instance
+def kicks_of(patch):
+    instance = patch.instance
     curve = np.full(instance.grid.size, -1)
     curve[instance.stroke_index] = stroke_curves(instance)
-    return Kicks(window, curve)
+    return Kicks(patch, curve)
 
 
 def gentle(seed):
@@ -73,7 +73,7 @@ def test_energy_after_many_changes_is_that_of_its_jumps(seed):
     field = first_field(gentle(seed))
     land = landscape(field)
     rng = np.random.default_rng(seed)
-    kicks = kicks_of(land.window)
+    kicks = kicks_of(land.patch)
     start = land.saved()
     for _ in range(6):
         land.change(*kicks.draw(rng, land.p))
@@ -92,20 +92,20 @@ def test_energy_after_many_changes_is_that_of_its_jumps(seed):
 def test_bounds_hold_after_changes():
     field = first_field(random_instance(4, shape=(5, 6), strokes=12))
     land = landscape(field)
-    kicks, rng = kicks_of(land.window), np.random.default_rng(0)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(0)
     for _ in range(30):
         land.change(*kicks.draw(rng, land.p))
         beta = np.split(land.angles, 2)[1]
         assert np.abs(beta).max() < QUARTER + 1e-2
 
 
-def test_angles_outside_the_window_stay():
+def test_angles_outside_the_patch_stay():
     field = first_field(cf.sample("mouse", 12))
     grid = field.instance.grid
     free = grid.columns < 6
     land = landscape(field, free)
     assert land.energy == pytest.approx(field.energy().total, rel=1e-6)
-    kicks, rng = kicks_of(land.window), np.random.default_rng(3)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(3)
     for _ in range(5):
         land.change(*kicks.draw(rng, land.p))
     outside = np.concatenate([~free, ~free])
@@ -122,7 +122,7 @@ def turns(instance, p):
 def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
     field = first_field(cf.sample("ring", 14))
     land = landscape(field)
-    kicks, rng = kicks_of(land.window), np.random.default_rng(5)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(5)
     before = turns(field.instance, field.p)
     moved = set()
     for _ in range(200):
@@ -130,7 +130,7 @@ def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
             pairs, steps = change
             assert len(pairs) == len(set(pairs.tolist()))
             p = field.p.copy()
-            p[land.window.pairs[pairs]] += steps
+            p[land.patch.pairs[pairs]] += steps
             changed = turns(field.instance, p) - before
             assert (changed != 0).sum() <= most
             moved.add(int(np.abs(changed).sum()))
@@ -176,7 +176,7 @@ def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
         assert len({getattr(field, name).tobytes() for field in fields}) == 1
 
 
-def test_a_large_grid_is_searched_from_coarse_to_fine_by_windows():
+def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     instance = cf.sample("mouse", 40)
     seen = []
     found = cf.search(instance, rounds=2, progress=lambda rounds, energy: seen.append((rounds, energy)))
@@ -238,7 +238,7 @@ def test_work_ends_soon_after_its_time_and_gives_a_field(work):
         assert time.asked - grains <= 8
 
 
-def test_a_window_without_time_is_not_whole_and_its_walk_stops():
+def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
     field = first_field(cf.sample("mouse", 12))
     free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
     task = Task(

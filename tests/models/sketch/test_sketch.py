@@ -13,7 +13,7 @@ from crossfield.models.instance.angles import line_difference, line_of
 from crossfield.models.sketch.bitmap import read_picture
 from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
 from crossfield.models.sketch.curves import bounding_box, flatten
-from crossfield.models.sketch.outline import silhouette
+from crossfield.models.sketch.outline import inside_outline
 from crossfield.models.sketch.read import LEAST_WEIGHT, check_memory, instance_of, name_from, read_sketch
 from crossfield.models.sketch.scap import read_scap
 from crossfield.models.sketch.svg import read_svg
@@ -552,7 +552,7 @@ def test_a_silhouette_holds_every_stroke_and_what_is_closed_off():
     walls = np.zeros((30, 30), dtype=bool)
     walls[5, 5:25] = walls[24, 5:25] = walls[5:25, 5] = walls[5:25, 24] = True
     walls[2, 2:6] = True
-    region = silhouette(walls)
+    region = inside_outline(walls)
     assert region[5:25, 5:25].all()
     assert region[walls].all()
     assert not region[28].any()

@@ -1,4 +1,4 @@
-"""The energy of a field as a function of the angles in a window, by its definition: squares of residuals,
+"""The energy of a field as a function of the angles in a patch, by its definition: squares of residuals,
 which no update can spoil.
 """
 
@@ -14,25 +14,25 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF
 
 if TYPE_CHECKING:
-    from .landscape import Window
+    from .landscape import Patch
 
 
-class WindowEnergy:
-    """The 2-norm energy of the whole field where only the angles in a window and the
+class PatchEnergy:
+    """The 2-norm energy of the whole field where only the angles in a patch and the
     jumps between its pixels change.
     """
 
-    def __init__(self, window: Window, x: Floats, p: Ints) -> None:
-        """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the window stay."""
-        instance, grid, free = window.instance, window.instance.grid, np.zeros(len(x) // 2, dtype=bool)
-        free[window.pixels] = True
+    def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
+        """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the patch stay."""
+        instance, grid, free = patch.instance, patch.instance.grid, np.zeros(len(x) // 2, dtype=bool)
+        free[patch.pixels] = True
         self._instance = instance
         self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
         ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
-        # Local numbers: the pixels of the window, and then those beside it, whose angles stay.
-        beside = np.setdiff1d(ends, window.pixels)
+        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        beside = np.setdiff1d(ends, patch.pixels)
         number = np.zeros(grid.size, dtype=np.int32)
-        number[np.concatenate([window.pixels, beside])] = np.arange(len(window.pixels) + len(beside))
+        number[np.concatenate([patch.pixels, beside])] = np.arange(len(patch.pixels) + len(beside))
         self._first, self._second = np.split(number[ends], 2)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[beside], beta[beside]
@@ -41,7 +41,7 @@ class WindowEnergy:
         self._rest = _rest(CrossField(instance, alpha, beta, p), free, self._pairs, self._strokes)
 
     def __call__(self, x: Floats, p: Ints) -> float:
-        """The energy at the window's angles x (2k,) and the jumps p (m,) of the whole field."""
+        """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
         inside = np.split(x, 2)
         alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
         jumps, instance = p[self._pairs], self._instance
@@ -55,7 +55,7 @@ class WindowEnergy:
 
 
 def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
-    """The part of the energy that is none of the window's: of other pixels,
+    """The part of the energy that is none of the patch's: of other pixels,
     and without these pairs and strokes.
     """
     instance = field.instance
