@@ -24,16 +24,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.problem import Block, Bound, Problem
-from ...models.formulations.symbols import SCALARS, SLOTS, VARIABLES, IndexSet, pixel_of
+from ...models.formulations.symbols import VARIABLES, IndexSet, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
-from ..writing.expressions import Language, wrapped
 from ..writing.names import name_length
-from ..writing.records import Decimals, Piece, Pieces, Words, check_coefficients, number, render, table, words
+from ..writing.records import Decimals, Piece, Pieces, Words, number, render, table, words
+from .indexed import Indexed, check_indexed, described
 
 SECOND: Final = "r - north[h], c + east[h]"
 """The pixel j of the pair (r,c,h)."""
@@ -45,8 +44,7 @@ DOMAINS: Final[dict[IndexSet, str]] = {
 }
 _INDEX: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h"}
 
-SENSES: Final = {">=": " >= ", "<=": " <= ", "==": " = "}
-WIDTH: Final = 110
+SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
@@ -55,7 +53,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
     problem = form.problem
-    _check(problem)
+    check_indexed(problem, "mod", "nl, lp or mps")
     context = {
         "header": header,
         "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
@@ -67,8 +65,8 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
             for block in problem.blocks.values()
             if block.count
         ],
-        "terms": [_described(family) | {"text": _term(family)} for family in problem.objective],
-        "rows": [_described(family) | {"text": _row(family)} for family in problem.rows],
+        "terms": [_described(family) for family in problem.objective],
+        "rows": [_described(family) for family in problem.rows],
     }
     yield from stream("models/ampl.mod.j2", {}, **context)
 
@@ -93,14 +91,6 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     yield b"end;\n"
 
 
-def _check(problem: Problem) -> None:
-    instance = problem.instance
-    if problem.pinned is not None:
-        raise UnsupportedByFormatError("mod has no place for columns fixed one by one; write nl, lp or mps")
-    for name, values in (("w", instance.w), ("w_strokes", instance.w_strokes), ("w_beta", instance.w_beta)):
-        check_coefficients(values, f"{name} of {instance.name}")
-
-
 def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
     """Row and column of the pixel of each element."""
     at = pixel_of(instance, over)
@@ -123,7 +113,7 @@ def _variable(block: Block) -> dict[str, str]:
     variable, language = VARIABLES[block.name], _Ampl(block.over)
     attributes = ["integer"] * block.integer
     attributes += [
-        f"{sign} {_text(language.alone(end))}"
+        f"{sign} {language.bound(end)}"
         for sign, end in ((">=", variable.lower), ("<=", variable.upper))
         if not end.is_infinite
     ]
@@ -142,12 +132,7 @@ def _label(instance: Instance, block: Block) -> str:
 
 
 def _described(family: Bound) -> dict[str, str]:
-    paper = family.family.paper
-    return {
-        "tag": family.family.tag,
-        "paper": f"section {paper}" if paper[0].isdigit() else paper,
-        "domain": _domain(family),
-    }
+    return described(_Ampl, family, SENSES) | {"domain": _domain(family)}
 
 
 def _domain(family: Bound) -> str:
@@ -158,47 +143,16 @@ def _domain(family: Bound) -> str:
     return f"{DOMAINS[over][:-1]}: abs({only[0]}[{_INDEX[over]}]) mod 2 = {only[1]}}}"
 
 
-class _Ampl(Language):
-    """The language over an index set: symbols by their name and index, constants as mathematics writes them."""
+class _Ampl(Indexed):
+    """The language of AMPL."""
 
-    def __init__(self, over: IndexSet) -> None:
-        self._over = over
+    index = _INDEX
+    second = SECOND
+    brackets = "[]"
 
-    def symbol(self, symbol: sp.Symbol) -> Piece:
-        if symbol in SCALARS:
-            return SCALARS[symbol].encode()
-        name, kind = SLOTS[self._over][symbol]
-        index = SECOND if kind == "second" else "r,c" if kind == "first" else _INDEX[self._over]
-        return f"{name}[{index}]".encode()
-
-    def is_data(self, expression: sp.Expr) -> bool:
-        return not expression.free_symbols
-
-    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        negative = bool(expression < 0)
-        text = str(-expression if negative else expression).replace("**", "^")
-        if signed:
-            return f"{'-' if negative else '+'} {text}".encode()
-        return f"(-{text})".encode() if negative else text.encode()
-
-    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        return self.constant(expression, signed=signed)
+    def exact(self, constant: sp.Expr) -> str:
+        return str(constant).replace("**", "^")
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
         bracketed = base if len(base) == 1 else [b"(", *base, b")"]
         return [*bracketed, f"^{exponent}".encode()]
-
-
-def _term(family: Bound) -> str:
-    return _text(wrapped(_Ampl(family.family.over).summands(family.family.expression), WIDTH, b"  "))
-
-
-def _row(family: Bound) -> str:
-    language, relation = _Ampl(family.family.over), family.family.expression
-    left, right = (_text(language.expression(side)) for side in (relation.lhs, relation.rhs))
-    return left + SENSES[family.family.sense] + right
-
-
-def _text(pieces: list[Any]) -> str:
-    """The text of pieces that are all literal."""
-    return b"".join(pieces).decode().removeprefix(" + ")

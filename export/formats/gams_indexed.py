@@ -21,24 +21,21 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.problem import Block, Bound, Problem
-from ...models.formulations.symbols import SCALARS, SLOTS, VARIABLES, IndexSet
+from ...models.formulations.symbols import VARIABLES, IndexSet
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
-from ..writing.expressions import Language, wrapped
 from ..writing.names import element_names
-from ..writing.records import Bytes, Piece, Words, check_coefficients, number, render, words
+from ..writing.records import Bytes, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
+from .indexed import Indexed, check_indexed, described
 
 SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,side"}
 SECOND: Final = "r-north(side),c+east(side)"
 """The pixel j of the pair (r,c,side)."""
-
-WIDTH: Final = 110
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
@@ -48,12 +45,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
     """
     problem, instance = form.problem, form.problem.instance
-    if problem.pinned is not None:
-        raise UnsupportedByFormatError(
-            "gms in indexed layout has no place for columns fixed one by one; write the scalar layout"
-        )
-    for name, values in (("w", instance.w), ("w_strokes", instance.w_strokes), ("w_beta", instance.w_beta)):
-        check_coefficients(values, f"{name} of {instance.name}")
+    check_indexed(problem, "gms in indexed layout", "the scalar layout")
     blocks = {
         "pixels": _pixels(instance),
         "theta": _data(keys(instance, "strokes"), instance.target),
@@ -92,11 +84,8 @@ def _model_context(problem: Problem) -> dict[str, Any]:
     """Variables, terms and rows as the template prints them."""
     return {
         "variables": [_variable(block) for block in problem.blocks.values() if block.count],
-        "terms": [_described(family) | {"text": _term(family)} for family in problem.objective],
-        "rows": [
-            _described(family) | {"text": _row(family), "condition": _condition(family)}
-            for family in problem.rows
-        ],
+        "terms": [_described(family) for family in problem.objective],
+        "rows": [_described(family) | {"condition": _condition(family)} for family in problem.rows],
         "model_type": MODEL_TYPES[problem.problem_class],
     }
 
@@ -169,45 +158,24 @@ def _bound(expression: sp.Expr, over: IndexSet) -> str:
     """A bound of a variable for all elements of its set."""
     if expression.is_infinite:
         return "-inf" if expression.is_extended_negative else "+inf"
-    return _text(_Indexed(over, SETS[over]).alone(expression))
+    return _Gams(over, SETS[over]).bound(expression)
 
 
 def _described(family: Bound) -> dict[str, str]:
-    over, paper = family.family.over, family.family.paper
-    return {
-        "tag": family.family.tag,
-        "paper": f"section {paper}" if paper[0].isdigit() else paper,
-        "domain": DOMAINS[over],
-        "controls": f"{SETS[over]}({DOMAINS[over]})",
-    }
+    domain = DOMAINS[family.family.over]
+    controls = f"{SETS[family.family.over]}({domain})"
+    return described(_Gams, family, SENSES) | {"domain": domain, "controls": controls}
 
 
-class _Indexed(Language):
-    """The language over an index set: symbols by their name and index, constants as mathematics writes them."""
+class _Gams(Indexed):
+    """The language of indexed GAMS."""
 
-    def __init__(self, over: IndexSet, own: str = "") -> None:
-        """own: index of the elements themselves, by default each by its labels."""
-        self._over = over
-        self._own = own or DOMAINS[over]
+    index = DOMAINS
+    second = SECOND
+    brackets = "()"
 
-    def symbol(self, symbol: sp.Symbol) -> Piece:
-        if symbol in SCALARS:
-            return SCALARS[symbol].encode()
-        name, kind = SLOTS[self._over][symbol]
-        return f"{name}({SECOND if kind == 'second' else 'r,c' if kind == 'first' else self._own})".encode()
-
-    def is_data(self, expression: sp.Expr) -> bool:
-        return not expression.free_symbols
-
-    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        negative = bool(expression < 0)
-        text = _exact(-expression if negative else expression)
-        if signed:
-            return f"{'-' if negative else '+'} {text}".encode()
-        return f"(-{text})".encode() if negative else text.encode()
-
-    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        return self.constant(expression, signed=signed)
+    def exact(self, constant: sp.Expr) -> str:
+        return _exact(constant)
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
         return power(base, exponent)
@@ -221,21 +189,6 @@ def _exact(constant: sp.Expr) -> str:
     pi = {0: "", 1: "pi", 2: "sqr(pi)"}[int(exponent) if base == sp.pi else 0]
     text = "*".join(filter(None, (str(rational) if rational != 1 or not pi else "", pi)))
     return text if denominator == 1 else f"{text}/{denominator}"
-
-
-def _term(family: Bound) -> str:
-    return _text(wrapped(_Indexed(family.family.over).summands(family.family.expression), WIDTH, b"  "))
-
-
-def _row(family: Bound) -> str:
-    language, relation = _Indexed(family.family.over), family.family.expression
-    left, right = (_text(language.expression(side)) for side in (relation.lhs, relation.rhs))
-    return left + SENSES[family.family.sense].decode() + right
-
-
-def _text(pieces: list[Piece]) -> str:
-    """The text of pieces that are all literal."""
-    return b"".join(piece for piece in pieces if isinstance(piece, bytes)).decode().removeprefix(" + ")
 
 
 def _condition(family: Bound) -> str:

@@ -34,7 +34,7 @@ from ...models.formulations.problem import Block, Bound, Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
-from ..writing.expressions import Language, wrapped
+from ..writing.expressions import Language, is_data, wrapped
 from ..writing.names import Names
 from ..writing.records import (
     Piece,
@@ -113,7 +113,6 @@ class Scalar(Language):
     def __init__(self, family: Bound, names: Names) -> None:
         self._family = family
         self._names = names
-        self._variables = set(family.variables)
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
         """A column's name at each element."""
@@ -121,7 +120,7 @@ class Scalar(Language):
 
     def is_data(self, expression: sp.Expr) -> bool:
         """Whether it holds no column."""
-        return not expression.free_symbols & self._variables
+        return is_data(self._family, expression)
 
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
         """One number an element."""

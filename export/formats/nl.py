@@ -29,6 +29,7 @@ import sympy as sp
 from ...models.formulations.problem import Bound, Term
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
+from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, name_length
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
@@ -195,7 +196,7 @@ def _objective(layout: Layout, code: Encoder) -> Iterator[bytes]:
 
 def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
     """The expression in prefix notation; parts free of columns become one number."""
-    if not expression.free_symbols & set(family.variables):
+    if is_data(family, expression):
         return code.constant(family.data(expression))
     if expression.is_Symbol:
         return code.variable(layout.places(family, expression))
@@ -212,19 +213,18 @@ def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> 
 
 def _chain(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
     """A sum or a product, its parts free of columns joined into one number in front."""
-    join = sp.Add if expression.is_Add else sp.Mul
-    data = [arg for arg in expression.args if not arg.free_symbols & set(family.variables)]
-    rest = [_tree(layout, code, family, arg) for arg in expression.args if arg not in data]
-    if join is sp.Add:
-        return _sum(code, ([code.constant(family.data(sp.Add(*data)))] if data else []) + rest)
+    data, others = split(family, expression)
+    rest = [_tree(layout, code, family, part) for part in others]
+    if expression.is_Add:
+        return _sum(code, ([] if data is None else [code.constant(family.data(data))]) + rest)
     parts = list(rest[-1])
     for factor in reversed(rest[:-1]):
         parts = [*code.operator(MULTIPLY), *factor, *parts]
-    if not data:
+    if data is None:
         return parts
-    if sp.Mul(*data) == -1:
+    if data == -1:
         return [*code.operator(NEGATE), *parts]
-    return [*code.operator(MULTIPLY), *code.constant(family.data(sp.Mul(*data))), *parts]
+    return [*code.operator(MULTIPLY), *code.constant(family.data(data)), *parts]
 
 
 def _sum(code: Encoder, summands: list[Pieces]) -> Pieces:

@@ -29,6 +29,7 @@ import sympy as sp
 from ...models.formulations.problem import Block, Bound, Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
+from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, Names
 from ..writing.records import (
     Decimals,
@@ -188,7 +189,7 @@ def _nonlinear(problem: Problem) -> Iterator[bytes]:
 
 def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
     """An expression as nodes; parts free of columns become one number."""
-    if not expression.free_symbols & set(family.variables):
+    if is_data(family, expression):
         return _constant(family, expression)
     if expression.is_Symbol:
         return [b'<variable idx="', Decimals(family.columns(expression)), b'"/>']
@@ -202,13 +203,10 @@ def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
 
 def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
     """A sum or a product, its parts free of columns joined into one number in front."""
-    join, name = (sp.Add, b"sum") if expression.is_Add else (sp.Mul, b"product")
-    parts = sp.Add.make_args(expression) if expression.is_Add else sp.Mul.make_args(expression)
-    data = [part for part in parts if not part.free_symbols & set(family.variables)]
-    constant = _constant(family, join(*data)) if data else []
-    return _node(
-        name, constant + [piece for part in parts if part not in data for piece in _tree(family, part)]
-    )
+    data, others = split(family, expression)
+    constant = [] if data is None else _constant(family, data)
+    inside = constant + [piece for part in others for piece in _tree(family, part)]
+    return _node(b"sum" if expression.is_Add else b"product", inside)
 
 
 def _constant(family: Bound, expression: sp.Expr) -> list[Piece]:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
+from ...models.formulations.problem import Bound
 from ...models.formulations.symbols import SCALARS, VARIABLES
 from .records import Piece, Pieces
 
@@ -98,6 +99,18 @@ class Language(ABC):
 def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
     """Order of the factors of a product: weights, data, variables, and then what is no symbol."""
     return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
+
+
+def is_data(family: Bound, expression: sp.Expr) -> bool:
+    """Whether an expression of a family holds no column."""
+    return not expression.free_symbols & set(family.variables)
+
+
+def split(family: Bound, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
+    """A sum or a product in two: what is data as one expression, None without any, and its other parts in order."""
+    data = [part for part in chain.args if is_data(family, part)]
+    others = [part for part in chain.args if part not in data]
+    return (chain.func(*data) if data else None), others
 
 
 def wrapped(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
