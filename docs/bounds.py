@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import crossfield as cf
 import highspy
 import numpy as np
+from crossfield.export.solving.highs import loaded
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from make import markdown, said
@@ -62,7 +63,7 @@ def bounds(problem: Problem, model: highspy.Highs) -> None:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Trial:
     """How HiGHS fared."""
 
     proven: bool
@@ -72,18 +73,14 @@ class Outcome:
     seconds: float
 
 
-def strengthened(task: tuple[tuple[int, int, int], tuple[str, ...]]) -> Outcome:
+def strengthened(task: tuple[tuple[int, int, int], tuple[str, ...]]) -> Trial:
     """HiGHS on one thread on the written MPS of `milp-mccormick`, with rows or bounds added."""
     size, chosen = task
     problem = cf.formulate(instance_of(*size), "milp-mccormick")
-    model: Any = highspy.Highs()
-    model.setOptionValue("output_flag", "false")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.mps"
         cf.write(problem, path)
-        model.readModel(str(path))
-    for option, value in (("threads", 1), ("time_limit", MILP_SECONDS), ("mip_rel_gap", 1e-6)):
-        model.setOptionValue(option, value)
+        model = loaded(path, threads=1, time_limit=MILP_SECONDS, mip_rel_gap=1e-6)
     for name, add in (("odd cycles", odd_cycles), ("bounds", bounds)):
         if name in chosen:
             add(problem, model)
@@ -91,7 +88,7 @@ def strengthened(task: tuple[tuple[int, int, int], tuple[str, ...]]) -> Outcome:
     model.run()
     seconds, info = time.process_time() - begin, model.getInfo()
     proven = model.getModelStatus() == highspy.HighsModelStatus.kOptimal
-    return Outcome(proven, info.objective_function_value, info.mip_dual_bound, info.mip_node_count, seconds)
+    return Trial(proven, info.objective_function_value, info.mip_dual_bound, info.mip_node_count, seconds)
 
 
 def strengthening() -> tuple[list[list[str]], list[list[str]]]:
@@ -117,7 +114,7 @@ def strengthening() -> tuple[list[list[str]], list[list[str]]]:
     ], rows
 
 
-def overall(chosen: tuple[str, ...], found: list[Outcome], plain: list[Outcome]) -> list[str]:
+def overall(chosen: tuple[str, ...], found: list[Trial], plain: list[Trial]) -> list[str]:
     """How a variant fares on all instances: proofs, shifted geometric means as MIPLIB takes them, and where it is quicker than as written."""
     return [
         " + ".join(chosen) or "as written",

@@ -108,7 +108,7 @@ def run_command(
 
     Ctrl-C ends the present method with its best field and the run with it; a second one ends at once.
     """
-    from ..solving.local import Limits
+    from ..solving.job import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)

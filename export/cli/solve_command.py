@@ -76,7 +76,7 @@ def solve_command(
     Both start from the greedy field, improved, unless --start gives another. Ctrl-C ends the search and keeps the best so far.
     """
     deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
-    from ..solving.local import Limits
+    from ..solving.job import Limits
     from ..solving.methods import Request
 
     if (formulation is None) == (method is None):

@@ -20,7 +20,7 @@ from ...models.search.improvement import first_field
 from ...models.search.power_field import power_field
 from ...models.search.search import search
 from ..solutions.solution import Solution
-from .local import Limits
+from .job import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
 from .windows import WINDOW_SOLVERS, search_windows
 

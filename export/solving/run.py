@@ -15,7 +15,7 @@ from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..solutions.solution import Solution
-from .local import Limits
+from .job import Limits
 from .methods import METHODS, Candidate, Method, Progress, Request, finite, solution_facts
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")

@@ -13,7 +13,8 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
 from ...models.search.improvement import first_field
 from ..solutions.solution import Solution
-from .local import Limits, solve
+from .job import Limits
+from .local import solve
 
 _ANGLES: Final = 0.2
 """Share of the time that the second stage keeps, and the seconds that it needs at least: its process has to start."""

@@ -27,10 +27,12 @@ from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
 from ..solutions.solution import Solution
-from .local import Limits, solve
+from ..solvers_table import DRIVEN
+from .job import Limits
+from .local import solve
 
-WINDOW_SOLVERS: Final = {"bonmin": ("miqp-exact", 4), "highs": ("milp-mccormick", 5)}
-"""For each solver of windows what it solves, and the side of the first windows in pixels: what it closes within seconds."""
+WINDOW_SOLVERS: Final = {name: solver.window for name, solver in DRIVEN.items() if solver.window is not None}
+"""For each solver of windows what it solves, and the side of the first windows."""
 
 _WIDEST: Final = 8  # side at which a search ends: no solver here closes such a window
 _WINDOWS: Final = 4  # a round
@@ -94,7 +96,7 @@ def search_windows(
     if not seconds > 0 or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
     deadline = Deadline.after(seconds)
-    state = _State(field, WINDOW_SOLVERS[solver][1], np.random.default_rng(seed))
+    state = _State(field, WINDOW_SOLVERS[solver].side, np.random.default_rng(seed))
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
         try:
             with interruptible() as interrupted, side_by_side(_solved, jobs) as explore:
@@ -122,7 +124,7 @@ def _solved(task: _Task) -> _Found | None:
     if deadline.later(-_SHORTEST).passed():
         return None
     piece = excerpt(task.field, task.free)
-    formulation, _ = WINDOW_SOLVERS[task.solver]
+    formulation = WINDOW_SOLVERS[task.solver].formulation
     problem = with_rest_fixed(formulate(piece.field.instance, formulation), piece.field, piece.free)
     limits = Limits(threads=1).until(deadline)
     with tempfile.TemporaryDirectory(dir=task.folder) as folder:

@@ -29,13 +29,12 @@ from ...models.instance.instance import QUARTER
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
-from ..solutions.readers.text import Status
+from ..solutions.readers.text import RawSolution, Status, values_for
 from ..solutions.solution import ROUND
-from ..solvers_table import EXTERNALS
+from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
-from .programs.reading import Evaluation, Meaning, Outcome, Points, load, save
-from .programs.registry import CONSUMERS, Consumer, absent, lacking
+from .programs.reading import Evaluation, Meaning, Points, load, save
 from .programs.worker import Worker
 
 RESULT: Final = "verify.json"
@@ -171,12 +170,11 @@ def verify(
     Raises InputError when the folder holds no manifest, and what reading manifests raises.
     """
     folder = Path(folder)
-    wanted = [CONSUMERS[name] for name in consumers or CONSUMERS]
+    wanted = [PROGRAMS[name] for name in consumers or PROGRAMS]
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
-    gone = absent()
-    found = Verification(folder, absent={each.name: gone[each.name] for each in wanted if each.name in gone})
+    found = Verification(folder, absent={each.name: each.install for each in wanted if not each.present})
     with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
         subjects, broken = _subjects(manifests, Path(temporary))
         found.findings.extend(broken)
@@ -263,7 +261,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 class _Bench:
     """A consumer at work: its child process, where that leaves arrays, and seconds for a solve."""
 
-    consumer: Consumer
+    program: Program
     worker: Worker
     result: Path
     seconds: float | None
@@ -275,7 +273,7 @@ class _Bench:
         yield read
         if self.seconds is None:
             return
-        for solver in self.consumer.solvers:
+        for solver in self.program.solvers:
             key = (solver, subject.held.sha256)
             if read.verdict in {Verdict.AGREES, Verdict.NOT_TRIED} and key not in self.solved:
                 self.solved.add(key)
@@ -292,38 +290,34 @@ class _Bench:
         return self.worker.ask(task | {"seconds": seconds} | more, seconds)
 
     def _read(self, subject: _Subject) -> Finding:
-        algebra = subject.format in self.consumer.algebra
-        refusal = _refusal(self.consumer.name, subject, "read")
+        algebra = subject.format in self.program.algebra
+        refusal = _refusal(self.program.name, subject, "read")
         answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
         if answer["kind"] != "done":
             return self._unread(subject, answer, refusal)
         if refusal:
             words = f"it was read, though {refusal}"
-            return subject.finding(self.consumer.name, "read", Verdict.DIFFERS, words)
+            return subject.finding(self.program.name, "read", Verdict.DIFFERS, words)
         points = load(Points, subject.points)
         if algebra:
             model = load(Meaning, self.result)
-            wrong = difference(model, subject.held, self.consumer.tolerance, points.values)
+            wrong = difference(model, subject.held, self.program.tolerance, points.values)
         else:
             wrong = evaluation_difference(load(Evaluation, self.result), subject.held, points)
-        return subject.finding(
-            self.consumer.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong
-        )
+        return subject.finding(self.program.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong)
 
     def _unread(self, subject: _Subject, answer: dict[str, Any], refusal: str) -> Finding:
         if answer["kind"] == "too large":
-            return subject.finding(self.consumer.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] == "not told":
-            return subject.finding(self.consumer.name, "read", Verdict.NOT_TRIED, answer["words"])
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, answer["words"])
         if answer["kind"] == "refused" and refusal:
-            return subject.finding(self.consumer.name, "read", Verdict.REFUSED, refusal)
-        return subject.finding(self.consumer.name, "read", Verdict.FAILED, answer["words"])
+            return subject.finding(self.program.name, "read", Verdict.REFUSED, refusal)
+        return subject.finding(self.program.name, "read", Verdict.FAILED, answer["words"])
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
-        return (
-            f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.consumer.free}"
-        )
+        return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _Subject, solver: str) -> Finding:
         refusal = _refusal(solver, subject, "solve")
@@ -332,8 +326,8 @@ class _Bench:
         local = _refusal(solver, subject, "local")
         if local:
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, local)
-        if remedy := lacking(solver):
-            reason = f"{EXTERNALS[solver].title} is not installed: {remedy}"
+        if missing := SOLVERS[solver].missing:
+            reason = f"{SOLVERS[solver].title} is not installed: {missing}"
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, reason)
         assert self.seconds is not None
         begin = time.perf_counter()
@@ -342,31 +336,31 @@ class _Bench:
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] != "done":
             return subject.finding(solver, "solve", Verdict.FAILED, answer["words"])
-        return _judged(subject, solver, load(Outcome, self.result), time.perf_counter() - begin)
+        return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
 
 
-def _refusal(solver: str, subject: _Subject, step: Any) -> str:
-    """Why the solver refuses at that step, as the table of capabilities states it; empty when it does not."""
-    refusal = EXTERNALS[solver].refusal(subject.held, step) if solver in EXTERNALS else None
+def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
+    """Why the solver refuses at that stage, as the table of solvers states it; empty when it does not."""
+    refusal = SOLVERS[solver].refusal(subject.held, stage) if solver in SOLVERS else None
     return "" if refusal is None else refusal.reason
 
 
-def _judged(subject: _Subject, solver: str, outcome: Outcome, seconds: float) -> Finding:
+def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Finding:
     """What a solver's answer is worth: its point is checked, its objective and the energy of its field computed again."""
-    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(outcome.bound)}
-    if not len(outcome.values):
-        limit = outcome.status == Status.LIMIT_WITHOUT_POINT
+    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
+    if not len(answer.values):
+        limit = answer.status == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
-        return subject.finding(solver, "solve", verdict, f"no point: {outcome.words}", **numbers)
-    point, wrong = _point(held, outcome)
+        return subject.finding(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
+    point, wrong = _point(held, answer)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
     numbers |= {"objective": objective, "energy": energy}
     worst = held.violation(point)
     if not wrong and worst.worst > FEASIBLE_WITHIN:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
-    proven = outcome.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    claim = outcome.objective
+    proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+    claim = answer.objective
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"  # before the end its own variable for it may be loose
     wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
@@ -376,7 +370,7 @@ def _judged(subject: _Subject, solver: str, outcome: Outcome, seconds: float) ->
         solver,
         "solve",
         Verdict.AGREES if proven else Verdict.LIMIT,
-        "" if proven else outcome.words,
+        "" if proven else answer.message,
         proven=proven,
         **numbers,
     )
@@ -398,14 +392,14 @@ def _finite(value: float | None) -> float | None:
     return None if value is None or abs(value) >= 1e19 else float(value)
 
 
-def _point(problem: Problem, outcome: Outcome) -> tuple[Floats, str]:
-    """The point by name, integers rounded; a column that the solver does not tell is at zero."""
-    values = dict(zip(outcome.columns, outcome.values.tolist(), strict=True))
-    names = names_of(column_names(problem))
-    point = np.array([values.get(name, 0.0) for name in names])
-    if not values.keys() & set(names):
-        return point, "it tells no column that we know"
-    return np.where(problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point), ""
+def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
+    """The point by name, integers rounded; a column that the solver does not tell is at zero. And what is wrong with it."""
+    names = np.array([name.encode() for name in names_of(column_names(problem))])
+    values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
+    point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
+    return np.where(
+        problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point
+    ), wrong
 
 
 def same(first: float, second: float) -> bool:

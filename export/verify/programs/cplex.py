@@ -9,10 +9,10 @@ import cplex
 import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
-from .reading import Meaning, Outcome
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
 
 _SIZE_LIMIT = 1016
 _INFINITY = 1e20
@@ -87,7 +87,7 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
     )
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     tolerances = model.parameters
@@ -114,7 +114,8 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     mixed = "MI" in model.problem_type[model.get_problem_type()]
     if not answer.is_primal_feasible():
         status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
-        return Outcome(status, words, names, np.zeros(0))
+        return told(status, words)
     status = Status.OPTIMAL_GLOBAL if "optimal" in words else Status.LIMIT_WITH_POINT
     bound = answer.MIP.get_best_objective() if mixed else None
-    return Outcome(status, words, names, np.array(answer.get_values()), answer.get_objective_value(), bound)
+    objective = answer.get_objective_value()
+    return told(status, words, names, answer.get_values(), objective=objective, bound=bound)

@@ -14,14 +14,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from . import casadi as consumer_casadi
-from .reading import Evaluation, Outcome, Points
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Evaluation, Points, told
 
 _BARON_FILES: Final = ("baron", "libbaronnavvy64.so", "optbaron.def", "gmsba_us.run", "gmsba_ux.out")
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
@@ -130,7 +128,7 @@ _MODEL_STATUS: Final = {
 _NORMAL: Final = 1
 
 
-def solve(path: Path, seconds: float, solver: str) -> Outcome:
+def solve(path: Path, seconds: float, solver: str) -> RawSolution:
     """The answer of one of GAMS's solvers within the time, from the CSV that our models write."""
     answer = Path("answer.csv").resolve()
     answer.unlink(missing_ok=True)
@@ -154,7 +152,6 @@ def solve(path: Path, seconds: float, solver: str) -> Outcome:
         raw = read_raw(answer)
     except SolutionError as error:
         raise Refused(f"no answer: {words}; {error}") from error
-    if raw.names is None or not raw.has_point or status in {Status.ERROR, Status.INFEASIBLE}:
-        return Outcome(status, words, [], np.zeros(0))
-    names = [name.decode() for name in np.asarray(raw.names).tolist()]
-    return Outcome(status, words, names, raw.values, raw.objective, float(bound[1]) if bound else None)
+    if status in {Status.ERROR, Status.INFEASIBLE}:
+        return told(status, words)
+    return replace(raw, status=status, message=words, bound=float(bound[1]) if bound else None)

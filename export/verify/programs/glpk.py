@@ -14,10 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
+from ...solvers_table import PROGRAMS
 from ...writing.terms import terms
-from .reading import Evaluation, Meaning, Outcome, Points
-from .registry import CONSUMERS, Refused, program
+from .protocol import Refused, executable
+from .reading import Evaluation, Meaning, Points, told
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps"}
 _OBJECTIVE: Final = "energy"
@@ -25,7 +26,9 @@ _OBJECTIVE: Final = "energy"
 
 def version() -> str:
     """Its version."""
-    said = subprocess.run([program("glpk"), "--version"], check=False, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        [executable("glpk"), "--version"], check=False, capture_output=True, text=True
+    ).stdout
     found = re.search(r"(\d+\.\d+)", said)
     return found[1] if found else "unknown"
 
@@ -34,7 +37,7 @@ def _run(path: Path, *arguments: str) -> str:
     kind = path.suffix.removeprefix(".")
     given = ["--model", str(path), "--data", str(path.with_suffix(".dat"))] if kind == "mod" else [_KINDS[kind], str(path)]  # fmt: skip
     done = subprocess.run(
-        [program("glpk"), *given, *arguments],
+        [executable("glpk"), *given, *arguments],
         check=False,
         capture_output=True,
         text=True,
@@ -96,7 +99,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
         model.row_upper,
         model.objective(given),
         model.activities(given),
-        rounding=CONSUMERS["glpk"].tolerance,
+        rounding=PROGRAMS["glpk"].tolerance,
         may_lack=True,
     )
 
@@ -146,7 +149,7 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
 _STATUS: Final = {"o": Status.OPTIMAL_GLOBAL, "f": Status.LIMIT_WITH_POINT, "n": Status.INFEASIBLE}
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
     said = _run(path, "--tmlim", str(max(1, round(seconds))), "--wglp", "model.glp", "-w", "answer.txt")
     names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
@@ -159,6 +162,6 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     if head[1] == "bas":
         status = Status.OPTIMAL_GLOBAL if head[4:6] == ["f", "f"] else Status.LIMIT_WITHOUT_POINT
     if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return Outcome(status, words, names, np.zeros(0))
+        return told(status, words)
     values = np.array([float(line[place]) for line in answer if line[0] == "j"])
-    return Outcome(status, words, names, values, float(head[-1]))
+    return told(status, words, names, values, objective=float(head[-1]))

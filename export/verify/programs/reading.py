@@ -6,13 +6,15 @@ Two forms. A `Meaning` is the algebra: costs, quadratic terms and rows by coeffi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 
 from ....models.instance.grid import Bools, Floats, Ints
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
 
 
@@ -126,22 +128,25 @@ class Points:
         return self.values[:, places(self.names, columns)]
 
 
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a solver answers: status (a solution_text.Status), its words, objective, dual bound, and a point by column name."""
+def told(
+    status: Status,
+    words: str,
+    columns: Sequence[str] = (),
+    values: Sequence[float] | Floats = (),
+    *,
+    objective: float | None = None,
+    bound: float | None = None,
+) -> RawSolution:
+    """What a program answers through an interface of its own, in the form in which files are read."""
+    names = np.array([name.encode() for name in columns], dtype=np.bytes_)
+    return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
 
-    status: str
-    words: str
-    columns: list[str]
-    values: Floats
-    objective: float | None = None
-    bound: float | None = None
+
+_TOLD: Final = "the program itself"
+T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
 
 
-T = TypeVar("T", Meaning, Evaluation, Points, Outcome)
-
-
-def save(given: Meaning | Evaluation | Points | Outcome, path: Path) -> None:
+def save(given: Meaning | Evaluation | Points | RawSolution, path: Path) -> None:
     """Write the arrays to a .npz."""
     arrays: dict[str, Any] = {
         name: np.asarray(value) for name, value in vars(given).items() if value is not None
@@ -152,9 +157,10 @@ def save(given: Meaning | Evaluation | Points | Outcome, path: Path) -> None:
 def load(kind: type[T], path: Path) -> T:
     """What `save` wrote."""
     with np.load(path, allow_pickle=False) as archive:
-        arrays = dict(archive)
-    values = {name: _plain(value) for name, value in arrays.items()}
-    return kind(**({"integer": None} if kind is Evaluation else {}) | values)
+        values = {name: _plain(value) for name, value in archive.items()}
+    if "status" in values:
+        values["status"] = Status(values["status"])
+    return kind(**dict.fromkeys(field.name for field in fields(kind)) | values)
 
 
 def _plain(value: Any) -> Any:

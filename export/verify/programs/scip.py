@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 import pyscipopt
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
-from .reading import Evaluation, Meaning, Outcome, Points
-from .registry import Refused, file_names
+from .protocol import Refused, file_names
+from .reading import Evaluation, Meaning, Points, told
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
 _CONSTANT: Final = "objconstvar"
@@ -183,7 +183,7 @@ _STATUS: Final = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     scip = _load(path)
     for option, value in (
@@ -200,8 +200,9 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     status = _STATUS.get(words, Status.ERROR)
     if not scip.getNSols():
         without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-        return Outcome(without, words, [], np.zeros(0), bound=scip.getDualbound())
+        return told(without, words, bound=scip.getDualbound())
     best = scip.getBestSol()
     ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     values = np.array([scip.getSolVal(best, v) for v in ours])
-    return Outcome(status, words, [v.name for v in ours], values, scip.getObjVal(), scip.getDualbound())
+    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound()}
+    return told(status, words, [v.name for v in ours], values, **numbers)

@@ -9,8 +9,8 @@ import pytest
 from crossfield.export.bundle.manifest import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.solving.local import solver_for
-from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.export.verify.verify import Verdict, compared, verify
 
 LIFTED = ("minlp-quartic", "minlp-cubic")
@@ -92,8 +92,8 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 @pytest.mark.oracles
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, and a contradiction if both were called optima of one problem."""
-    if not CONSUMERS["scip"].present:
-        pytest.skip(f"SCIP is not installed: {CONSUMERS['scip'].install}")
+    if not PROGRAMS["scip"].present:
+        pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
     found = verify(tmp_path, seconds=4.0, consumers=["scip", "highs"])
     assert found.bad == []
