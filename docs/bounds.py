@@ -1,4 +1,4 @@
-"""Make docs/bounds.md: how far optima can be proven with open solvers, and what strengthens the MILP: `python docs/bounds.py` (some five minutes)."""
+"""Make docs/bounds.md, how far open solvers prove optima: `python docs/bounds.py` (some five minutes)."""
 
 from __future__ import annotations
 
@@ -41,9 +41,11 @@ def instance_of(height: int, width: int, seed: int) -> Instance:
 
 
 def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
-    """Add, for every 2 x 2 block C and odd subset F: sum of p1 over F less that over C - F <= |F| - 1 + (2/pi) sum of s over C.
+    """Add a row for every 2 x 2 block C and odd subset F of its pairs.
 
-    Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2 at least.
+    Sum of p1 over F less that over C - F <= |F| - 1 + (2/pi) sum of s over C.
+    Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2
+    at least.
     """
     p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
     for block in problem.instance.grid.blocks:
@@ -56,7 +58,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
 
 
 def bounds(problem: Problem, model: highspy.Highs) -> None:
-    """Bound s and t by pi/2: of the two jumps nearest to what the angles ask for, each leaves |A| below that, and |beta| is at most pi/4."""
+    """Bound s and t by pi/2: the two nearest jumps leave |A| below that, and |beta| is at most pi/4."""
     for name in ("s", "t"):
         for column in range(problem.columns)[problem.blocks[name].columns]:
             model.changeColBounds(column, 0.0, np.pi / 2)
@@ -115,7 +117,7 @@ def strengthening() -> tuple[list[list[str]], list[list[str]]]:
 
 
 def overall(chosen: tuple[str, ...], found: list[Trial], plain: list[Trial]) -> list[str]:
-    """How a variant fares on all instances: proofs, shifted geometric means as MIPLIB takes them, and where it is quicker than as written."""
+    """How a variant fares on all instances: proofs, shifted geometric means, where it is quicker."""
     return [
         " + ".join(chosen) or "as written",
         f"{sum(each.proven for each in found)} of {len(found)}",
@@ -133,7 +135,7 @@ def shifted_mean(values: list[float] | list[int], shift: float) -> float:
 
 
 def closing() -> Iterator[list[str]]:
-    """A row for each size and solver: the MILP and its relaxation by HiGHS, the exact convex MIQP by Bonmin, each from the searched field."""
+    """A row for each size and solver: MILP and relaxation by HiGHS, exact MIQP by Bonmin."""
     for side in SIDES:
         instance = instance_of(side, side, 0)
         start = cf.search(instance, rounds=10).field
@@ -177,7 +179,10 @@ def main() -> None:
 
 
 def in_short(closed: list[list[str]], means: list[list[str]]) -> str:
-    """How far proofs get, what the relaxation is worth, and whether strengthening pays. Rows of the page's first two tables."""
+    """How far proofs get, what the relaxation is worth, and whether strengthening pays.
+
+    Rows of the page's first two tables.
+    """
     whole = {
         name: [row[0] for row in closed if row[1] == f"`{name}`" and row[5] == "yes"] for name, _, _ in RUNS
     }

@@ -1,6 +1,7 @@
-"""Make docs/validation.md: one small instance to proven optimality through every route: `python docs/validate.py` (some four minutes).
+"""Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a file that was written, a program that read it, and its answer, checked by `crossfield verify --solve`.
+Every row is a file that was written, a program that read it, and its answer, checked by `crossfield verify
+--solve`.
 """
 
 from __future__ import annotations
@@ -94,7 +95,10 @@ def routes(main: Run) -> list[str]:
         found = main.of(name)
         proven = [f.objective for f in found if f.proven and f.objective is not None]
         agree = (
-            f"{len(proven)} routes prove an optimum; the furthest two are {max(proven) - min(proven):.1e} apart."
+            (
+                f"{len(proven)} routes prove an optimum; "
+                f"the furthest two are {max(proven) - min(proven):.1e} apart."
+            )
             if proven
             else "No route proves an optimum in the time."
         )
@@ -138,7 +142,8 @@ def in_short(main: Run, runs: list[Run]) -> str:
     apart = max(max(each) - min(each) for each in proven)
     return (
         f"{len(PROGRAMS)} programs read {read} files as they were meant, and {wrong} otherwise. "
-        f"Of the {len(FORMULATIONS)} formulations {len(proven)} are proven optimal by {min(map(len, proven))} to {max(map(len, proven))} routes each. "
+        f"Of the {len(FORMULATIONS)} formulations {len(proven)} are proven optimal "
+        f"by {min(map(len, proven))} to {max(map(len, proven))} routes each. "
         f"The proven optima of one formulation are at most {apart:.1e} apart."
     )
 
@@ -210,13 +215,16 @@ def main() -> None:
         if (gauge, facet) != ("strokes", "hull")
     ]
     runs = [main_run, *rest]
-    grid = f"{SHAPE[0]} x {SHAPE[1]} pixels, {STROKES} of them with a stroke in a random direction (seed {SEED}), w_beta = 0.001"
+    grid = f"{SHAPE[0]} x {SHAPE[1]} pixels, {STROKES} of them with a stroke "
+    grid += f"in a random direction (seed {SEED}), w_beta = 0.001"
     parts = [
         "# One instance, all routes",
         said("python docs/validate.py"),
         (
-            f"An instance of {grid}, in all formulations and all formats, handed to every program that can be had for free. Objectives are recomputed "
-            f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each solve, on one thread where that can be set. "
+            f"An instance of {grid}, in all formulations and all formats, handed to every program "
+            "that can be had for free. Objectives are recomputed "
+            f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each "
+            "solve, on one thread where that can be set. "
             "Optima must agree to 1e-6. `crossfield verify DIR --solve` does the same for any folder."
         ),
         in_short(main_run, runs),
@@ -227,7 +235,8 @@ def main() -> None:
         *routes(main_run),
         "## Gauge and facet",
         (
-            "The misprints of the paper as numbers. With the printed facet (26) the optimum falls below the energy of the field it stands for; with the "
+            "The misprints of the paper as numbers. With the printed facet (26) the optimum falls "
+            "below the energy of the field it stands for; with the "
             "printed box (1) it rises."
         ),
         errata(runs),

@@ -1,11 +1,12 @@
-"""The one table of solvers: what each reads, refuses, starts from and proves, what brings it, and how it is driven here.
+"""The one table of solvers: what each reads, refuses, starts from, proves, what brings it, what drives it.
 
-It is true of solvers anywhere, not only of those that are installed here. `crossfield list`, the manifests, starting points, solving,
-verification, the library and the docs are generated from it; a solver is added by one entry.
+It is true of solvers anywhere, not only of those that are installed here. `crossfield list`, the manifests,
+starting points, solving, verification, the library and the docs are generated from it; a solver is added by
+one entry.
 
-A refusal names a trait of a problem *as the format holds it* (LP and MPS hold (8) and (9) with lifted products), and the stage at
-which it strikes: `read`: the file is not taken; `solve`: it is read, but not solved, or not to a proven optimum. The tests hand each
-combination to the real solver.
+A refusal names a trait of a problem *as the format holds it* (LP and MPS hold (8) and (9) with lifted
+products), and the stage at which it strikes: `read`: the file is not taken; `solve`: it is read, but not
+solved, or not to a proven optimum. The tests hand each combination to the real solver.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Proof = Literal["global", "convex", "local"]
 
 
 class Refusal(NamedTuple):
-    """Why a solver does not take a trait, and where that shows: `local` means that it answers, without proof."""
+    """Why a solver does not take a trait, and where that shows; `local`: it answers, without proof."""
 
     stage: Stage
     reason: str
@@ -53,11 +54,12 @@ TRAITS: Final[dict[str, Callable[[Problem], bool]]] = {
 
 @dataclass(frozen=True)
 class Program:
-    """What reads our files, as `verify` hands them over, and may bring solvers: a Python package or an executable.
+    """A Python package or an executable that reads our files, and may bring solvers.
 
-    algebra, behaviour: the formats of which it tells coefficients, or values at points. needs: its package, or its executable.
-    tolerance: relative difference of the numbers that it tells, 0 for equal to the bit. free: what its free edition takes.
-    adds: pattern of the columns that it adds when it reads or writes a model.
+    algebra, behaviour: the formats of which it tells coefficients, or values at points. needs: its package,
+    or its executable. tolerance: relative difference of the numbers that it tells, 0 for equal to the bit.
+    free: what its free edition takes. adds: pattern of the columns that it adds when it reads or writes a
+    model.
     """
 
     name: str
@@ -120,11 +122,14 @@ PROGRAMS: Final = {
         ),
     )
 }  # fmt: skip
-"""The programs that our files are for, as far as they can be had for free; each has a module in export/verify/programs."""
+"""The programs that our files are for, as far as they can be had for free.
+
+Each has a module in export/verify/programs.
+"""
 
 
 class StartFile(NamedTuple):
-    """The file from which a solver starts: its layout (a name in export/bundle/starts.py), its suffix, and how it is read.
+    """The file from which a solver starts: its layout (see export/bundle/starts.py), suffix, and use.
 
     convex: whether the solver uses it for convex problems only.
     """
@@ -136,7 +141,7 @@ class StartFile(NamedTuple):
 
 
 class WindowUse(NamedTuple):
-    """What a solver solves of a window of the grid, and the side of the first windows in pixels: what it closes within seconds."""
+    """What a solver solves of a window, and the side in pixels of the first: what it closes in seconds."""
 
     formulation: str
     side: int
@@ -146,11 +151,11 @@ class WindowUse(NamedTuple):
 class Solver:
     """A solver: the formats it reads, the preferred one first; what brings it; what it refuses, by trait.
 
-    program: the name of the program that brings it. package: a Python package that it needs besides.
-    proves: of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
-    start: the file it starts from beside a model, where it takes one. driver: the module in export/solving that runs it on a
-    file of its first format, empty where it is not driven here. not_for: classes of problems for which others come first.
-    window: how it solves windows, where it does.
+    program: the name of the program that brings it. package: a Python package that it needs besides. proves:
+    of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
+    start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
+    that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
+    problems for which others come first. window: how it solves windows, where it does.
     """
 
     name: str
@@ -199,7 +204,8 @@ SOLVERS: Final = {
                 ),
                 "a non-convex quadratic objective": Refusal(
                     "solve",
-                    "error 5002: CPLEX takes a non-convex objective only with its parameter optimalitytarget = 3",
+                    "error 5002: CPLEX takes a non-convex objective only "
+                    "with its parameter optimalitytarget = 3",
                 ),
             },
             start=StartFile("cplex", ".mst", "read MODEL.mps, then read START.mst"),
@@ -274,7 +280,10 @@ DRIVEN: Final = {name: solver for name, solver in SOLVERS.items() if solver.driv
 
 
 class Taking(NamedTuple):
-    """Whether a solver takes a problem: `yes`, `local` (it answers without proof) or `no`; in which format, and why not `yes`."""
+    """Whether a solver takes a problem, in which format, and the reason for any answer but `yes`.
+
+    answer: `yes`, `local` (it answers without proof) or `no`.
+    """
 
     answer: Literal["yes", "local", "no"]
     format: str
@@ -306,7 +315,7 @@ def takers(problem: Problem) -> dict[str, Taking]:
 
 
 def smallest(formulation: Formulation) -> Problem:
-    """The formulation on an instance of two pixels: enough to ask what a format carries and a solver takes."""
+    """The formulation on two pixels: enough to ask what a format carries and a solver takes."""
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
     instance = Instance("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)
     return Problem(instance, formulation, np.zeros(1, dtype=np.int32) if formulation.fixed else None)

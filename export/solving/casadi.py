@@ -1,4 +1,4 @@
-"""The driver of Ipopt and Bonmin: a child process (casadi_driver.py) reads the .nl through CasADi and leaves a .sol.
+"""The driver of Ipopt and Bonmin: a child process (casadi_driver.py) reads the .nl and leaves a .sol.
 
 A crash of a solver, or one that heeds no limit, takes the child alone.
 """
@@ -44,8 +44,9 @@ def _no_answer(job: Job, ended: ChildExit) -> str:
 
 
 def _hand_over_start(job: Job) -> None:
-    """Leave the start as the answer of a solver that was stopped before it had one, if it is a point of the problem."""
+    """Leave the start, if it is feasible, as the answer of a solver that was stopped before it had one."""
     if job.start is not None and job.problem.violation(job.start).worst <= _FEASIBLE:
-        message = f"{job.solver}: stopped at its limit or by Ctrl-C, nothing better than the start\n{job.problem.stamp}"
+        words = "stopped at its limit or by Ctrl-C, nothing better than the start"
+        message = f"{job.solver}: {words}\n{job.problem.stamp}"
         point = job.start[Layout(job.problem).order]
         write_ampl_sol(job.solution, message, point, job.problem.row_count, _LIMIT)

@@ -1,14 +1,14 @@
 """A driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
-Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline gap stamp`:
-a crash of a solver takes the child alone, and its log is the child's output. The log's first line says that the solver
-starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point so far. It ends with its parent:
-when its standard input closes.
+Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline
+gap stamp`: a crash of a solver takes the child alone, and its log is the child's output. The log's first line
+says that the solver starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point
+so far. It ends with its parent: when its standard input closes.
 
 The stamp says of which problem the model is, and is repeated in the message.
 
-Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better points only,
-and the start is the answer when there is none.
+Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better
+points only, and the start is the answer when there is none.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
             "ipopt.max_wall_time": seconds,
             "ipopt.tol": 1e-10,
             "ipopt.max_iter": 10000,
-            # Fixed integers make equations of the facets: without a little room Ipopt stops early and says optimal.
+            # Fixed integers make equations of the facets.
+            # Without a little room Ipopt then stops early and says optimal.
             "ipopt.bound_relax_factor": 1e-9,
             "ipopt.honor_original_bounds": "yes",
             "ipopt.sb": "yes",

@@ -12,7 +12,7 @@ from ...models.processes.deadline import Deadline
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
-"""Seconds after its deadline, and the share of its time in addition, in which a child may hand over its best point.
+"""Seconds after its deadline, and a share of its time, in which a child may hand over its best point.
 
 Then it is killed.
 """
@@ -34,10 +34,11 @@ class ChildExit(NamedTuple):
 
 
 def run_child(command: list[str], log: Path, deadline: Deadline) -> ChildExit:
-    """How a child ended whose output went to `log`. Its standard input is a pipe that closes with this process.
+    """How a child ended whose output went to `log`.
 
-    A deadline that has passed is as one that kills it. Once the deadline has passed, or the user interrupts, the child is
-    interrupted (SIGINT) and may leave what it has. A second Ctrl-C kills it at once and goes on as KeyboardInterrupt.
+    Its standard input is a pipe that closes with this process. A deadline that has passed is as one that
+    kills it. Once the deadline has passed, or the user interrupts, the child is interrupted (SIGINT) and may
+    leave what it has. A second Ctrl-C kills it at once and goes on as KeyboardInterrupt.
     """
     if deadline.passed():
         return ChildExit(-signal.SIGKILL, interrupted=False)
@@ -55,7 +56,7 @@ def run_child(command: list[str], log: Path, deadline: Deadline) -> ChildExit:
 
 @dataclass
 class _Watch:
-    """A running child: how often it was interrupted, and until when it may answer Ctrl-C, if that was pressed."""
+    """A running child: how often it was interrupted, and until when it may answer Ctrl-C."""
 
     child: subprocess.Popen[bytes]
     log: Path
@@ -86,6 +87,6 @@ class _Watch:
             self.asked += 1
 
     def _reasons(self) -> int:
-        """How often it should have been interrupted by now: more than once, for a first signal may come too early."""
+        """How often it should have been interrupted by now; a first signal may come too early."""
         late = self.deadline.passed()
         return late if self.patience is None else late + 1 + self.patience.later(-PATIENCE / 2).passed()

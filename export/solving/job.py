@@ -44,7 +44,7 @@ class Limits:
 
 
 class Job(NamedTuple):
-    """What a solver is to do: read `model`, a file of `problem`, and leave `solution` and `log` by the deadline.
+    """What a solver is to do: read `model`, a file of `problem`; leave `solution` and `log` by the deadline.
 
     solver: its name. start: a complete point (columns,), or None.
     """
@@ -60,7 +60,7 @@ class Job(NamedTuple):
 
 
 class RunEnd(NamedTuple):
-    """What the solution file does not say: whether the user interrupted, and the dual bound where one is told."""
+    """What the solution file does not say: whether the user interrupted, and the dual bound, if any."""
 
     interrupted: bool
     bound: float | None = None

@@ -1,6 +1,7 @@
-"""Solving here: the file is written, a driver lets the solver read it, and the answer is read back as anybody's is.
+"""Solving here: write the file, let a driver solve it, read the answer back as anybody's.
 
-So a solve tests the file too. Which solvers are driven, and by which module of this folder, stands in the table of solvers.
+So a solve tests the file too. Which solvers are driven, and by which module of this folder, stands in the
+table of solvers.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from .job import Job, Limits, RunEnd
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
     """The solver of that name, or the preferred one for the problem's class.
 
-    One whose format holds a weaker relaxation of the problem comes after the others.
-    Raises UnsupportedBySolverError when it does not take the class, MissingSolverError when its package is absent.
+    One whose format holds a weaker relaxation of the problem comes after the others. Raises
+    UnsupportedBySolverError when it does not take the class, MissingSolverError when its package is absent.
     """
     if name is not None and name not in DRIVEN:
         raise InputError(f"there is no solver {name!r}; choose one of {', '.join(DRIVEN)}")
@@ -71,12 +72,12 @@ def solve(
     limits: Limits | None = None,
     start: CrossField | None = None,
 ) -> Solution:
-    """The solution that a local solver finds, read back from the file it leaves and checked, all within the time limit.
+    """The solution that a solver finds here, read back from its file and checked, all within the time limit.
 
-    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the solution back.
-    start: a field whose complete point is handed over as incumbent or starting point.
-    Ctrl-C ends the solver and gives its best point so far.
-    Raises UnsupportedBySolverError, MissingSolverError, SolverError, OutputError.
+    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the
+    solution back. start: a field whose complete point is handed over as incumbent or starting point. Ctrl-C
+    ends the solver and gives its best point so far. Raises UnsupportedBySolverError, MissingSolverError,
+    SolverError, OutputError.
     """
     chosen = solver_for(problem, solver)
     if folder is None:

@@ -23,9 +23,9 @@ _FEASIBLE: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class NlModel:
-    """A .nl file in its own order: limits of columns (n,) and rows (m,), start (n,), zeros where there is none, integrality (n,).
+    """A .nl file in its own order: limits of columns (n,) and rows (m,), start (n,), integrality (n,).
 
-    problem: CasADi's expressions, `x`, `f` and `g`.
+    start: zeros where the file has none. problem: CasADi's expressions, `x`, `f` and `g`.
     """
 
     problem: dict[str, Any]

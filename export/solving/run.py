@@ -1,4 +1,4 @@
-"""Everything at once: an instance, all its files, every field that can be had here, pictures, and a report."""
+"""Everything at once: an instance, its files, every field that can be had here, pictures, a report."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a run found. candidates: every field, best (lowest 2-norm energy) first; manifests: the written sets.
+    """What a run found. candidates: every field, best (lowest 2-norm energy) first.
 
-    failures: reasons by method; interrupted: the method, or `drawing`, that Ctrl-C ended, and the run with it; empty when none did.
+    Manifests: the written sets. failures: reasons by method; interrupted: the method, or `drawing`, that
+    Ctrl-C ended, and the run with it; empty when none did.
     """
 
     instance: Instance
@@ -109,16 +110,18 @@ def run(
     jobs: int = 1,
     progress: Progress = lambda _: None,
 ) -> Report:
-    """The report of a run; the folder then holds instance, solver files, the best field, pictures and report.json.
+    """The report of a run.
 
+    The folder then holds instance, solver files, the best field, pictures and report.json.
         DIR/models     every formulation in every format, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
-    limits: for each method that searches; `progress` is first told what that makes in all. A method that fails is noted in the report;
-    the fields that were found stand. Ctrl-C ends the present method with its best field and the run with it: no further method is
-    tried and nothing drawn. Before the first field is there it goes on as KeyboardInterrupt. Raises OutputError.
+    limits: for each method that searches; `progress` is first told what that makes in all. A method that
+    fails is noted in the report; the fields that were found stand. Ctrl-C ends the present method with its
+    best field and the run with it: no further method is tried and nothing drawn. Before the first field is
+    there it goes on as KeyboardInterrupt. Raises OutputError.
     """
     folder, limits = make_folder(folder), limits or Limits()
     for stale in (REPORT, *map(_picture, PICTURES)):

@@ -1,7 +1,7 @@
-"""Large-neighbourhood search by exact solvers: windows of the grid are set free, all else fixed, and solved from the written file.
+"""Large-neighbourhood search: windows of the grid are set free, all else fixed, and solved exactly.
 
-Where `search` walks over the jumps of some hundred pixels, this proves what is best on some ten. Windows lie at random, round singularities
-and where the energy is high; once all of a size are solved, they grow.
+Where `search` walks over the jumps of some hundred pixels, this proves what is best on some ten. Windows lie
+at random, round singularities and where the energy is high; once all of a size are solved, they grow.
 """
 
 from __future__ import annotations
@@ -45,9 +45,10 @@ Progress = Callable[[int, float], object]
 
 @dataclass(frozen=True)
 class WindowSearch:
-    """The field, how many windows were solved, how many of them to the end, how many lowered the energy, and how it ended.
+    """The field; how many windows were solved, to the end, and to a lower energy; how the search ended.
 
-    side: of the windows that were solved last, in pixels. ended: `time`, `interrupted`, or `windows`: all were solved, up to 8 x 8.
+    side: of the windows that were solved last, in pixels. ended: `time`, `interrupted`, or `windows`: all
+    were solved, up to 8 x 8.
     """
 
     field: CrossField
@@ -59,7 +60,7 @@ class WindowSearch:
 
 
 class _Task(NamedTuple):
-    """A window: the field round it, its free pixels (n,), the solver's name, the end of the search, and a folder for files."""
+    """A window: the field round it, its free pixels (n,), solver, end of the search, folder for files."""
 
     field: CrossField
     free: Bools
@@ -87,9 +88,10 @@ def search_windows(
 ) -> WindowSearch:
     """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
 
-    solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows. seconds: when to end;
-    jobs: processes. The seed decides on the first windows; how far each is solved, and so what follows, depends on time. Ctrl-C ends the
-    search after the windows at hand, a second one at once. Raises InputError for limits that are not positive and for another solver.
+    solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows.
+    seconds: when to end; jobs: processes. The seed decides on the first windows; how far each is solved, and
+    so what follows, depends on time. Ctrl-C ends the search after the windows at hand, a second one at once.
+    Raises InputError for limits that are not positive and for another solver.
     """
     if solver not in WINDOW_SOLVERS:
         raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
@@ -119,7 +121,10 @@ def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
 
 
 def _solved(task: _Task) -> _Found | None:
-    """A window, solved by an external solver from the file that is written for it; None where there was no time for it."""
+    """A window, solved by an external solver from the file that is written for it.
+
+    None where there was no time for it.
+    """
     deadline = task.deadline.within(_SECONDS)
     if deadline.later(-_SHORTEST).passed():
         return None
@@ -209,7 +214,10 @@ class _State:
         self._open[:] = True
 
     def _try(self, field: CrossField, free: Bools) -> bool:
-        """Go on from a field, its angles and jumps brought up to date, if it is lower; then windows near by are open again."""
+        """Go on from a field, its angles and jumps brought up to date, if it is lower.
+
+        Then windows near by are open again.
+        """
         state = FreeField.of(field)
         settle(state, Solver())
         better = state.bounded()

@@ -1,9 +1,11 @@
-"""Every written file handed to every program that can be had for free: read, compared, evaluated, and on request solved.
+"""Every written file handed to every free program: read, compared, evaluated, and on request solved.
 
-For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its format. What a program reads
-is compared with the problem by name: sense, constant, costs, quadratic terms, types, bounds, rows; and as numbers at random points.
-With `seconds`, each solver solves it: the point is checked against the problem, its energy computed again, and the optima of one
-problem compared with each other across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes silently: what was not tried is a finding, with its reason.
+For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its
+format. What a program reads is compared with the problem by name: sense, constant, costs, quadratic terms,
+types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it: the point is
+checked against the problem, its energy computed again, and the optima of one problem compared with each other
+across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes
+silently: what was not tried is a finding, with its reason.
 """
 
 from __future__ import annotations
@@ -68,9 +70,10 @@ _BAD: Final = frozenset({Verdict.DIFFERS, Verdict.FAILED})
 class Finding:
     """What became of a file at a consumer: reading it, or solving it with one of its solvers.
 
-    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound; energy: the objective
-    again, with every other column at the value that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the
-    group of which the file holds a relaxation, whose optimum is no higher.
+    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound;
+    energy: the objective again, with every other column at the value that follows from angles and jumps.
+    group: where it is equal, so is the optimum; relaxes: the group of which the file holds a relaxation,
+    whose optimum is no higher.
     """
 
     problem: str
@@ -90,7 +93,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verification:
-    """All findings, the versions of the consumers that took part, and those that are absent with how to install them."""
+    """All findings, the versions of the programs that took part, and how to install those that are absent."""
 
     folder: Path
     findings: list[Finding] = field(default_factory=list)
@@ -125,7 +128,7 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """A file to be verified: what it should hold, unpacked where the consumers find it, and the points to compare at."""
+    """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
 
     manifest: Manifest
     problem: Problem
@@ -164,10 +167,11 @@ def verify(
     consumers: list[str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Verification:
-    """What became of all the files in a folder at all the consumers that are here; also written there as verify.json.
+    """What became of all the files in a folder at all the consumers that are here.
 
-    seconds: for each solve; None: nothing is solved. consumers: names, all by default. progress: called with each file and consumer.
-    Raises InputError when the folder holds no manifest, and what reading manifests raises.
+    Also written there as verify.json. seconds: for each solve; None: nothing is solved. consumers: names, all
+    by default. progress: called with each file and consumer. Raises InputError when the folder holds no
+    manifest, and what reading manifests raises.
     """
     folder = Path(folder)
     wanted = [PROGRAMS[name] for name in consumers or PROGRAMS]
@@ -209,7 +213,8 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             if path.suffix == FORMATS[entry["format"]].suffix:
                 held = carried(problem, FORMATS[entry["format"]])
                 if entry["lifted"] != held.formulation.lifted:
-                    words = f"the manifest says of it {entry['lifted']!r}, and it holds {held.formulation.lifted!r}; export again"
+                    said, holds = entry["lifted"], held.formulation.lifted
+                    words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
                     broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
                 points = place / f"points_{len(held.blocks)}.npz"
                 if not points.exists():
@@ -249,7 +254,7 @@ def _points(problem: Problem) -> Points:
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:
-    """A field on the problem's instance: angles anywhere within their bounds, any jump within its bounds, or those that are data."""
+    """A random field on the problem's instance within all bounds; jumps that are data are kept."""
     rng, instance = np.random.default_rng(seed), problem.instance
     alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
     beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
@@ -268,7 +273,10 @@ class _Bench:
     solved: set[tuple[str, str]] = field(default_factory=set)
 
     def findings(self, subject: _Subject) -> Iterator[Finding]:
-        """What the consumer makes of a file: of reading it, and of each of its solvers; two files of the same problem are solved once."""
+        """What the consumer makes of a file: of reading it, and of each of its solvers.
+
+        Two files of the same problem are solved once.
+        """
         read = self._read(subject)
         yield read
         if self.seconds is None:
@@ -346,7 +354,7 @@ def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
 
 
 def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Finding:
-    """What a solver's answer is worth: its point is checked, its objective and the energy of its field computed again."""
+    """What a solver's answer is worth: its point checked, objective and energy computed again."""
     held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
     if not len(answer.values):
         limit = answer.status == Status.LIMIT_WITHOUT_POINT
@@ -362,7 +370,8 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
     claim = answer.objective
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
-        wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"  # before the end its own variable for it may be loose
+        # Before the end a solver's own variable for it may be loose.
+        wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
     if wrong:
         return subject.finding(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
@@ -377,7 +386,7 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
 
 
 def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
-    """What is wrong with an objective, given that of the point's own field: slacks of an optimum are tight, others may be loose."""
+    """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
     options = problem.formulation.options
     if (
         options.relax or options.facet == "printed"
@@ -393,7 +402,10 @@ def _finite(value: float | None) -> float | None:
 
 
 def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
-    """The point by name, integers rounded; a column that the solver does not tell is at zero. And what is wrong with it."""
+    """The point by name, integers rounded; a column that the solver does not tell is at zero.
+
+    And what is wrong with it.
+    """
     names = np.array([name.encode() for name in names_of(column_names(problem))])
     values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
     point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
@@ -408,7 +420,7 @@ def same(first: float, second: float) -> bool:
 
 
 def compared(findings: list[Finding]) -> list[Finding]:
-    """The findings, those solves marked as different whose proven optimum, or whose bound, contradicts the best of their problem."""
+    """The findings; solves whose optimum or bound contradicts the best of their problem are different."""
     return [_against(finding, findings) for finding in findings]
 
 
@@ -422,7 +434,10 @@ def _against(finding: Finding, findings: list[Finding]) -> Finding:
 
 
 def _beside_others(finding: Finding, findings: list[Finding]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem; empty when it does not."""
+    """How a proven optimum or a bound contradicts the best point of the same problem.
+
+    Empty when it does not.
+    """
     best = _best(findings, finding.group)
     if best is None:
         return ""
@@ -434,7 +449,10 @@ def _beside_others(finding: Finding, findings: list[Finding]) -> str:
 
 
 def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
-    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when it does not."""
+    """How the proven optimum of a relaxation lies above a point of the problem itself.
+
+    Empty when it does not.
+    """
     best = _best(findings, finding.relaxes)
     lower = finding.objective if finding.proven else finding.bound
     if best is None or lower is None or lower <= best or same(lower, best):
@@ -443,7 +461,7 @@ def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
 
 
 def _as_relaxation(finding: Finding, findings: list[Finding]) -> str:
-    """What is told of the solve of a relaxation: beside the best point of the problem itself, where one was found."""
+    """What is told of the solve of a relaxation, beside the best point of the problem itself, if any."""
     best, told = _best(findings, finding.relaxes), f"; {finding.reason}" if finding.reason else ""
     beside = (
         f", no higher than {best:.9g} of the problem itself" if best is not None and finding.proven else ""

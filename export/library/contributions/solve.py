@@ -28,7 +28,7 @@ from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7
-"""Relative gap that a search is allowed: less than what counts as proven, for some points are a little infeasible."""
+"""Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
 _BETTER: Final = 1e-9  # relative: a lower objective than this is no better point
 
 Progress = Callable[[str], None]

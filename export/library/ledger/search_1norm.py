@@ -1,4 +1,4 @@
-"""Fields of low 1-norm energy by HiGHS, limited in work and not in time, so that every build finds the same."""
+"""Fields of low 1-norm energy by HiGHS, limited in work, not in time: every build finds the same."""
 
 from __future__ import annotations
 

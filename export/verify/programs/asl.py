@@ -1,6 +1,7 @@
-"""The real AMPL Solver Library as a consumer of .nl, text and binary: Debian's gjh_asl_json, which tells what it reads as JSON.
+"""The AMPL Solver Library, for .nl: Debian's gjh_asl_json, which tells what it reads as JSON.
 
-It evaluates at the starting point of a file. A segment x at the end of a copy of the file is that point, and outweighs an earlier one.
+It evaluates at the starting point of a file. A segment x at the end of a copy of the file is that point, and
+outweighs an earlier one.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ def version() -> str:
 
 
 def at_start(path: Path) -> dict[str, Any]:
-    """What the library says of an .nl file: statistics, bounds, and values at its starting point. Leaves a .json beside it."""
+    """What the library says of an .nl file: statistics, bounds, and values at its starting point.
+
+    Leaves a .json beside it.
+    """
     done = subprocess.run(
         [executable("asl"), str(path.with_suffix(""))],
         check=False,

@@ -1,7 +1,7 @@
 """CBC's executable as a consumer of LP and MPS. It knows nothing of products: hand it linear models only.
 
-What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the names, in the same
-order, by its table of all rows and columns.
+What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the
+names, in the same order, by its table of all rows and columns.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""CPLEX as a consumer of LP and MPS, through its Python API. The community edition solves up to 1000 columns and rows."""
+"""CPLEX as a consumer of LP and MPS, through its Python API.
+
+The community edition solves up to 1000 columns and rows.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ def _load(path: Path) -> Any:
 
 
 def read(path: Path) -> Meaning:
-    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times; quadratic rows come after the others."""
+    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times.
+
+    Quadratic rows come after the others.
+    """
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:

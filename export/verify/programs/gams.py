@@ -1,7 +1,8 @@
-"""GAMS as a consumer of its own language: the free gamspy_base compiles a model, CONVERT translates it, its solvers solve it.
+"""GAMS: the free gamspy_base compiles a model, CONVERT translates it, its solvers solve it.
 
-CONVERT writes an .nl file of its own, which CasADi evaluates: an independent way from our GAMS text to numbers. BARON comes as
-gamspy_baron, whose files have to lie among those of gamspy_base: both are linked into a folder of the child process.
+CONVERT writes an .nl file of its own, which CasADi evaluates: an independent way from our GAMS text to
+numbers. BARON comes as gamspy_baron, whose files have to lie among those of gamspy_base: both are linked into
+a folder of the child process.
 """
 
 from __future__ import annotations
@@ -46,7 +47,11 @@ def version() -> str:
 
 
 def _system(solver: str) -> Path:
-    """The folder of GAMS; for BARON a copy of it, by links where that works, with BARON's files and its entry in the table of solvers."""
+    """The folder of GAMS.
+
+    For BARON a copy of it, by links where that works, with BARON's files and its entry in the table of
+    solvers.
+    """
     base, baron = _package("gamspy_base"), _package("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
@@ -107,7 +112,10 @@ def our_name(name: str) -> str:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The GAMS model as CONVERT translates it and CasADi reads it. Columns that stand in no term are not in GAMS's model."""
+    """The GAMS model as CONVERT translates it and CasADi reads it.
+
+    Columns that stand in no term are not in GAMS's model.
+    """
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():

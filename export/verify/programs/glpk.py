@@ -1,7 +1,7 @@
 """GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
 
-What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective is a row there as well,
-and columns are indexed: alpha[1,2].
+What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
+is a row there as well, and columns are indexed: alpha[1,2].
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ...writing.terms import terms
 from .protocol import Refused, executable
 from .reading import Evaluation, Meaning, Points, told
 
-_KINDS: Final = {"lp": "--lp", "mps": "--freemps"}
+_KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
 
 
@@ -35,7 +35,9 @@ def version() -> str:
 
 def _run(path: Path, *arguments: str) -> str:
     kind = path.suffix.removeprefix(".")
-    given = ["--model", str(path), "--data", str(path.with_suffix(".dat"))] if kind == "mod" else [_KINDS[kind], str(path)]  # fmt: skip
+    given = [_KINDS[kind], str(path)]
+    if kind == "mod":
+        given += ["--data", str(path.with_suffix(".dat"))]
     done = subprocess.run(
         [executable("glpk"), *given, *arguments],
         check=False,
@@ -120,7 +122,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
 
 
 def _ours(names: list[str], path: Path) -> list[str]:
-    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as the model prints answers."""
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
     printed = re.search(r"_%0(\d+)d", path.read_text())
     assert printed
     return [_our_name(name, int(printed[1])) for name in names]
@@ -132,7 +134,7 @@ def _our_name(name: str, digits: int) -> str:
 
 
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
-    """Bounds of rows or columns: a letter (free, lower, upper, double, s for fixed) at place `at` of a line, and its numbers.
+    """Bounds of rows or columns: a letter (free, lower, upper, double, s: fixed) at place `at`, and numbers.
 
     Rows without a line are free; columns have at least 0, and at most 1 in a model with integers.
     """

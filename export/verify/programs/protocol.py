@@ -1,5 +1,6 @@
-"""What the module of a program has, and what it raises. Which programs there are stands in the table of solvers.
+"""What the module of a program has, and what it raises.
 
+Which programs there are stands in the table of solvers.
 A program's module is imported in a child process only (worker.py). It has
 
     version() -> str                                 of the program
@@ -36,6 +37,9 @@ def executable(name: str) -> str:
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
-    """Names of columns and of rows of an .nl file, from the .col and .row beside it; that of the objective is left out."""
+    """Names of columns and of rows of an .nl file, from the .col and .row beside it.
+
+    That of the objective is left out.
+    """
     columns, rows = (path.with_suffix(suffix).read_text().split() for suffix in (".col", ".row"))
     return columns, [name for name in rows if name != "obj"]

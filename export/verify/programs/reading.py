@@ -1,7 +1,8 @@
-"""What a model file means to the program that read it, as plain arrays. comparison.py says how that differs from the problem.
+"""What a model file means to the program that read it, as plain arrays.
 
-Two forms. A `Meaning` is the algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS give it. An
-`Evaluation` is the behaviour: values of objective and rows at points, as readers of .nl and GAMS give it.
+Comparison.py says how that differs from the problem. Two forms. A `Meaning` is the algebra: costs, quadratic
+terms and rows by coefficient, as readers of LP and MPS give it. An `Evaluation` is the behaviour: values of
+objective and rows at points, as readers of .nl and GAMS give it.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from ...writing.terms import Terms, terms
 class Meaning:
     """A quadratic model: costs, limits and coefficients in the order of `columns` and `rows`.
 
-    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column); row_quadratic at (row, i, j).
+    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column);
+    row_quadratic at (row, i, j).
     """
 
     columns: list[str]
@@ -42,7 +44,10 @@ class Meaning:
 
     @classmethod
     def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
-        """The model of these columns and rows; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
+        """The model of these columns and rows.
+
+        `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out.
+        """
         for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
             found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
             given |= {f"{name}_at": found.at, name: found.value}
@@ -93,8 +98,9 @@ def places(have: list[str], wanted: list[str]) -> Ints:
 class Evaluation:
     """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
 
-    integer is None where the program does not tell it, discrete then counts them. What is not told of the values is NaN.
-    rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term are left out.
+    integer is None where the program does not tell it, discrete then counts them. What is not told of the
+    values is NaN. rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term
+    are left out.
     """
 
     columns: list[str]

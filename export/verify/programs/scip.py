@@ -1,7 +1,8 @@
 """SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
-A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed variable. SCIP evaluates no nonlinear row at a point, but it
-judges points: at a feasible one the objective is within a hair of ours when a hair more is feasible and a hair less is not.
+A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
+variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is
+within a hair of ours when a hair more is feasible and a hair less is not.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The .nl or OSiL file as SCIP reads it: columns, and its judgement of the objective at the feasible points. Linear rows are evaluated."""
+    """The .nl or OSiL file as SCIP reads it: columns, linear rows, its judgement of the objective."""
     scip = _load(path)
     variables = {v.name: v for v in scip.getVars()}
     rows = {row.name: row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS}

@@ -1,7 +1,7 @@
-"""A program in a child process: `python -m crossfield.export.verify.programs.worker NAME`, one task a line, one answer a line, both JSON.
+"""A program in a child process, this module with its name: a task a line, an answer a line, both JSON.
 
-A crash or a hang of a program takes the child alone: `Worker` notes it for that task and starts another child for the next.
-Arrays go through .npz files in the worker's folder. What a program prints goes to a log.
+A crash or a hang of a program takes the child alone: `Worker` notes it for that task and starts another child
+for the next. Arrays go through .npz files in the worker's folder. What a program prints goes to a log.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .protocol import NotTold, Refused, TooLarge
 from .reading import Points, load, save
 
 GRACE: Final = 20.0
-"""Seconds that a task may take beyond the limit of its solve: for reading, and for solvers that look at the clock rarely."""
+"""Seconds that a task may take beyond its limit: for reading, and for solvers slow to look at the clock."""
 
 
 class Worker:

@@ -104,7 +104,8 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     for option, value in (
-        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9), ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
+        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
         model.setControl(option, value)

@@ -83,7 +83,7 @@ def starts(instance):
 def test_a_solver_is_chosen_that_reads_the_products(two):
     """HiGHS would solve the weaker problem of the .mps; it does so when it is asked for, and the facts tell."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
-    assert solver_for(problem).format == "nl"
+    assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
     assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.weakened is False
 
