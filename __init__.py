@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
-    from .export.solving.local import Limits as Limits
+    from .export.solving.job import Limits as Limits
     from .export.solving.local import solve as solve
     from .export.solving.run import run as run
     from .export.solving.two_stage import fit_angles as fit_angles
@@ -47,7 +47,7 @@ _HOME: Final = {
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Instance": ".models.instance.instance",
-    "Limits": ".export.solving.local",
+    "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",

@@ -1,10 +1,11 @@
-"""Starting points as each solver takes them beside an LP, MPS or .nl file: complete and feasible in the formulation's own variables.
+"""Starting points as each solver takes them beside an LP, MPS or .nl file: complete and feasible.
 
-    gurobi   .mst   lines `name value`                                  Gurobi: model.read(...), or its command line's InputFile
-    cplex    .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
-    highs    .sol   style 0: `# Columns n`, lines `name value`           HiGHS: --read_solution_file, readSolution
-    scip     .sol   lines `name value`                                   SCIP: read file.sol, readSol
-    xpress   .slx   `NAME`, lines ` C name value`, `ENDATA`              Xpress: readslxsol
+    layout
+    list    .mst   lines `name value`                                  Gurobi: model.read(...), or InputFile
+    cplex   .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
+    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: --read_solution_file, readSolution
+    scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
+    slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
 Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS has the columns of these
 files: with products lifted where they are lifted, and ONE. SCIP reads a nonlinear objective as a variable of its own, under three
@@ -28,7 +29,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ..formats.registry import FORMATS, carried
-from ..solvers_table import takes
+from ..solvers_table import SOLVERS, takes
 from ..writing.canonical import Canonical
 from ..writing.names import ONE
 from ..writing.records import Decimals, Pieces, number, render, words
@@ -72,7 +73,7 @@ class Start:
             yield b"c_ONE 1\n"
 
 
-def _gurobi(start: Start) -> Iterator[bytes]:
+def _list(start: Start) -> Iterator[bytes]:
     yield f"# MIP start, objective {number(start.objective)}\n".encode()
     yield from start.lines()
 
@@ -124,37 +125,19 @@ def _objective_variables(start: Start) -> dict[str, float]:
     return found
 
 
-def _xpress(start: Start) -> Iterator[bytes]:
+def _slx(start: Start) -> Iterator[bytes]:
     yield f"NAME {start.problem.instance.name}\n".encode()
     yield from start.lines(b" C ")
     yield b"ENDATA\n"
 
 
-@dataclass(frozen=True)
-class StartFormat:
-    """A format of starting points: the solver, the suffix of its files, what generates them, and how they are read.
-
-    convex: whether the solver uses it for convex problems only.
-    """
-
-    solver: str
-    suffix: str
-    generate: Callable[[Start], Iterator[bytes]]
-    use: str
-    convex: bool = False
-
-
-STARTS: Final = {
-    entry.solver: entry
-    for entry in (
-        StartFormat("gurobi", ".mst", _gurobi, "gurobi_cl InputFile=START.mst MODEL.mps"),
-        StartFormat("cplex", ".mst", _cplex, "read MODEL.mps, then read START.mst"),
-        StartFormat("highs", ".sol", _highs, "highs --read_solution_file START.sol MODEL.mps"),
-        StartFormat("scip", ".sol", _scip, "read MODEL.mps (or .nl), then read START.sol"),
-        StartFormat("xpress", ".slx", _xpress, "READPROB MODEL.mps, then READSLXSOL START.slx", convex=True),
-    )
+LAYOUTS: Final[dict[str, Callable[[Start], Iterator[bytes]]]] = {
+    "list": _list, "cplex": _cplex, "highs": _highs, "scip": _scip, "slx": _slx,
 }  # fmt: skip
-"""The table of formats of starting points, by solver."""
+"""What makes a starting point, by the layout that the table of solvers names."""
+
+STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solver.start is not None}
+"""The files of starting points, by solver."""
 
 
 def start_of(problem: Problem, field: CrossField) -> Start:
@@ -185,7 +168,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
         raise UnsupportedBySolverError(
             f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
         )
-    save(Path(path), STARTS[solver].generate(start))
+    save(Path(path), LAYOUTS[STARTS[solver].layout](start))
     return start.objective
 
 

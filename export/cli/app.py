@@ -115,7 +115,7 @@ def run_command(
     The methods are {methods of a run}. report.json has all facts. Ctrl-C ends the run with the best field so
     far; a second one ends at once.
     """
-    from ..solving.local import Limits
+    from ..solving.job import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)

@@ -40,15 +40,15 @@ def _methods_of_a_run() -> Iterable[str]:
 
 
 def _solvers() -> Iterable[str]:
-    from ..solving.local import SOLVERS
+    from ..solvers_table import DRIVEN
 
-    return SOLVERS
+    return DRIVEN
 
 
 def _programs() -> Iterable[str]:
-    from ..verify.programs.registry import CONSUMERS
+    from ..solvers_table import PROGRAMS
 
-    return CONSUMERS
+    return PROGRAMS
 
 
 def _answers() -> Iterable[str]:

@@ -81,7 +81,7 @@ def solve_command(
     """
     deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
     from ...models.field.file import read_field
-    from ..solving.local import Limits
+    from ..solving.job import Limits
     from ..solving.methods import Request
 
     if (formulation is None) == (method is None):

@@ -10,10 +10,9 @@ from ...models.formulations.problem import Problem
 from ...models.sketch.samples import sample, samples
 from ..formats.registry import FORMATS, carried
 from ..solutions.readers.registry import READERS
-from ..solvers_table import EXTERNALS, smallest, takers
-from ..solving.local import SOLVERS, refusal
+from ..solvers_table import DRIVEN, PROGRAMS, SOLVERS, smallest, takers
+from ..solving.local import refusal
 from ..solving.methods import METHODS
-from ..verify.programs.registry import CONSUMERS
 
 Row = dict[str, Any]
 Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
@@ -31,11 +30,11 @@ def tables() -> Tables:
             [_format_row(name) for name in FORMATS],
         ),
         "solvers": (
-            ("formulation", *SOLVERS),
+            ("formulation", *DRIVEN),
             [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
         ),
         "externals": (
-            ("formulation", *EXTERNALS),
+            ("formulation", *SOLVERS),
             [_external_row(problem) for problem in smallest_problems()],
         ),
         "methods": (
@@ -97,7 +96,7 @@ def _carriage(problem: Problem, name: str) -> str:
 
 def _format_row(name: str) -> Row:
     entry = FORMATS[name]
-    readers = [consumer.title for consumer in CONSUMERS.values() if name in consumer.formats]
+    readers = [program.title for program in PROGRAMS.values() if name in program.formats]
     return {
         "name": name,
         "written": "by default" if entry.default else "when asked for",
@@ -108,7 +107,7 @@ def _format_row(name: str) -> Row:
 
 
 def _solver_row(problem: Problem, relaxed: bool) -> Row:
-    answers = {name: refusal(problem, solver) or "yes" for name, solver in SOLVERS.items()}
+    answers = {name: refusal(problem, solver) or "yes" for name, solver in DRIVEN.items()}
     return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
 
 

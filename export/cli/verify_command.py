@@ -38,12 +38,12 @@ def verify_command(
 
     All findings go to verify.json in the folder. The exit code is 1 when something differs.
     """
-    from ..verify.programs.registry import CONSUMERS
+    from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
 
     for name in consumer or ():
-        if name not in CONSUMERS:
-            raise InputError(f"there is no consumer {name!r}; choose one of {', '.join(CONSUMERS)}")
+        if name not in PROGRAMS:
+            raise InputError(f"there is no consumer {name!r}; choose one of {', '.join(PROGRAMS)}")
     with progress(quiet=quiet) as show:
         found = verify(folder, seconds=time_limit if solve else None, consumers=consumer, progress=show)
     if as_json:

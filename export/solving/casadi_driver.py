@@ -1,13 +1,14 @@
-"""A solver driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
+"""A driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
-Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline gap stamp`: a crash of a solver takes
-the child alone, and its log is the child's output. The log's first line says that the solver starts now; from then on an
-interrupt (SIGINT) ends the search and leaves the best point so far. It ends with its parent: when its standard input closes.
+Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline
+gap stamp`: a crash of a solver takes the child alone, and its log is the child's output. The log's first line
+says that the solver starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point
+so far. It ends with its parent: when its standard input closes.
 
 The stamp says of which problem the model is, and is repeated in the message.
 
-Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better points only, and the
-start is the answer when there is none.
+Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better
+points only, and the start is the answer when there is none.
 """
 
 from __future__ import annotations
@@ -15,17 +16,18 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NamedTuple
 
-import casadi as ca
 import numpy as np
 
+from ...models.instance.grid import Floats
 from ...models.processes.deadline import Deadline
 from ...models.processes.side_by_side import leave_with_parent
 from ..solutions.readers.ampl import write_ampl_sol
+from .job import LEAST
+from .nl_model import NlModel, ca, read_nl
 
 # AMPL's solve codes: 0 solved, 100 solved?, 200 infeasible, 300 unbounded, 400 limit with point, 500 failure.
 _CODES: Final = {
@@ -47,10 +49,6 @@ _CODES: Final = {
 }
 _FAILURE: Final = 500
 _STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
-_FEASIBLE: Final = 1e-6
-"""Violation up to which a start counts as feasible: the solvers' own tolerance."""
-_LEAST: Final = 0.01
-"""Seconds that a solver is given when nothing is left: zero would be no limit to some."""
 _NO_POINT: Final = 1e49
 """Bonmin's objective when it has no incumbent is 1e50."""
 
@@ -94,56 +92,12 @@ class Stop(ca.Callback):
         return [int(self.wanted)]
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
-    """What a .nl file holds, as CasADi reads it: the problem, bounds, the start (zeros where the file has none), integrality."""
-
-    problem: dict[str, Any]
-    bounds: dict[str, Any]
-    start: np.ndarray[Any, Any]
-    discrete: list[bool]
-    rows: int
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        return len(self.start)
-
-    def value_of_start(self) -> float | None:
-        """The objective at the start, or None when the start is not feasible."""
-        evaluate = ca.Function("evaluate", [self.problem["x"]], [self.problem["f"], self.problem["g"]])
-        objective, rows = (np.array(value).ravel() for value in evaluate(self.start))
-        bounds = {name: np.array(values, dtype=float) for name, values in self.bounds.items()}
-        gaps = np.abs(self.start - np.round(self.start))[np.array(self.discrete, dtype=bool)]
-        excess = (
-            bounds["lbx"] - self.start,
-            self.start - bounds["ubx"],
-            bounds["lbg"] - rows,
-            rows - bounds["ubg"],
-            gaps,
-        )
-        return float(objective[0]) if max(part.max(initial=0.0) for part in excess) <= _FEASIBLE else None
-
-
-class Ending(NamedTuple):
+class AmplAnswer(NamedTuple):
     """The solver's own words, AMPL's solve code, and the point in .nl order, empty when there is none."""
 
     words: str
     code: int
-    point: np.ndarray[Any, Any]
-
-
-def read_model(path: Path) -> Model:
-    """The content of a .nl file."""
-    builder = ca.NlpBuilder()
-    builder.import_nl(str(path))
-    return Model(
-        problem={"x": ca.vertcat(*builder.x), "f": builder.f, "g": ca.vertcat(*builder.g)},
-        bounds={"lbx": builder.x_lb, "ubx": builder.x_ub, "lbg": builder.g_lb, "ubg": builder.g_ub},
-        start=np.array(builder.x_init, dtype=float),
-        discrete=list(builder.discrete),
-        rows=len(builder.g),
-    )
+    point: Floats
 
 
 def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
@@ -153,7 +107,8 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
             "ipopt.max_wall_time": seconds,
             "ipopt.tol": 1e-10,
             "ipopt.max_iter": 10000,
-            # Fixed integers make equations of the facets. Without a little room Ipopt then stops early and says optimal.
+            # Fixed integers make equations of the facets.
+            # Without a little room Ipopt then stops early and says optimal.
             "ipopt.bound_relax_factor": 1e-9,
             "ipopt.honor_original_bounds": "yes",
             "ipopt.sb": "yes",
@@ -169,50 +124,53 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
 
 
 def solve(
-    solver: str, model: Model, seconds: float, gap: float, started: Callable[[], object] = lambda: None
-) -> Ending:
+    solver: str, model: NlModel, seconds: float, gap: float, started: Callable[[], object] = lambda: None
+) -> AmplAnswer:
     """How the solver ended. `started` is called when it is about to begin.
 
     Must run in the main thread of a process of its own: it takes over the handling of SIGINT.
     """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
-    stop = Stop(model.columns, model.rows)
+    stop = Stop(len(model.start), len(model.row_lower))
     signal.signal(signal.SIGINT, stop.on_signal)  # Bonmin puts a handler of its own in its place
     best = None
     if solver == "ipopt":
         chosen["iteration_callback"] = stop
     else:
-        chosen["discrete"] = model.discrete
-        best = model.value_of_start()
+        chosen["discrete"] = model.discrete.tolist()
+        best = model.value_of_start
         chosen |= {} if best is None else {"bonmin.cutoff": best}
     run = ca.nlpsol("solver", solver, model.problem, chosen)
     started()
-    answer = run(x0=model.start, **model.bounds)
+    ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
+    answer = run(x0=model.start, **ends)
     words = str(run.stats()["return_status"])
     code = _CODES.get(words, _FAILURE)
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
     if solver == "bonmin" and float(answer["f"]) >= _NO_POINT:
         return _without_better(words, code, model, best)
-    return Ending(words, code, np.zeros(0) if code == 300 else np.array(answer["x"]).ravel())
+    return AmplAnswer(words, code, np.zeros(0) if code == 300 else np.array(answer["x"]).ravel())
 
 
-def _without_better(words: str, code: int, model: Model, best: float | None) -> Ending:
-    """The ending of a search by Bonmin that found nothing: the start is the best point, where it is feasible."""
+def _without_better(words: str, code: int, model: NlModel, best: float | None) -> AmplAnswer:
+    """The answer of a search by Bonmin that found nothing: the start, where it is feasible."""
     if best is None:
-        return Ending(words, 470 if code == 400 else code, np.zeros(0))
-    return Ending(f"{words}, nothing better than the start", 0 if code == 220 else code, model.start)
+        return AmplAnswer(words, 470 if code == 400 else code, np.zeros(0))
+    return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, model.start)
 
 
 def main(arguments: list[str]) -> int:
     """0 when a .sol was written; the solver's status stands in it."""
     solver, path, solution, deadline, gap, stamp = arguments
     leave_with_parent()
-    model = read_model(Path(path))
-    seconds = max(Deadline(float(deadline)).left(), _LEAST)
-    line = f"{solver}: {model.columns} columns, {model.rows} rows, at most {seconds:.3g} s"
-    ending = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201 - the log
-    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {ending.words}\n{stamp}"
-    write_ampl_sol(solution, message, ending.point, model.rows, ending.code, columns=model.columns)
+    model = read_nl(Path(path))
+    seconds = max(Deadline(float(deadline)).left(), LEAST)
+    columns, rows = len(model.start), len(model.row_lower)
+    line = f"{solver}: {columns} columns, {rows} rows, at most {seconds:.3g} s"
+    # What is printed is the log.
+    answer = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201
+    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {answer.words}\n{stamp}"
+    write_ampl_sol(solution, message, answer.point, rows, answer.code, columns=columns)
     return 0
 
 

@@ -11,14 +11,17 @@ from typing import Final, NamedTuple
 from ...models.processes.deadline import Deadline
 
 GRACE: Final = 0.5
-"""Seconds after its deadline, and the share of its time in addition, that a child has to hand over its best point before it is killed."""
 GRACE_SHARE: Final = 0.05
+"""Seconds after its deadline, and a share of its time, in which a child may hand over its best point.
+
+Then it is killed.
+"""
 PATIENCE: Final = 4.0
 """Seconds that it may take to answer Ctrl-C: half way it is interrupted again, then killed."""
 _TICK: Final = 0.1
 
 
-class Ending(NamedTuple):
+class ChildExit(NamedTuple):
     """How a child ended: its exit code (negative: a signal), and whether the user interrupted it."""
 
     code: int
@@ -30,14 +33,15 @@ class Ending(NamedTuple):
         return self.code == -signal.SIGKILL
 
 
-def run_child(command: list[str], log: Path, deadline: Deadline) -> Ending:
-    """How a child ended whose output went to `log`. Its standard input is a pipe that closes with this process.
+def run_child(command: list[str], log: Path, deadline: Deadline) -> ChildExit:
+    """How a child ended whose output went to `log`.
 
-    A deadline that has passed is as one that kills it. Once the deadline has passed, or the user interrupts, the child is interrupted (SIGINT) and may leave what it has. A second
-    Ctrl-C kills it at once and goes on as KeyboardInterrupt.
+    Its standard input is a pipe that closes with this process. A deadline that has passed is as one that
+    kills it. Once the deadline has passed, or the user interrupts, the child is interrupted (SIGINT) and may
+    leave what it has. A second Ctrl-C kills it at once and goes on as KeyboardInterrupt.
     """
     if deadline.passed():
-        return Ending(-signal.SIGKILL, interrupted=False)
+        return ChildExit(-signal.SIGKILL, interrupted=False)
     with log.open("wb") as output:
         child = subprocess.Popen(
             command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.PIPE, start_new_session=True
@@ -52,7 +56,7 @@ def run_child(command: list[str], log: Path, deadline: Deadline) -> Ending:
 
 @dataclass
 class _Watch:
-    """A running child: how often it was interrupted, and until when it may answer Ctrl-C, if that was pressed."""
+    """A running child: how often it was interrupted, and until when it may answer Ctrl-C."""
 
     child: subprocess.Popen[bytes]
     log: Path
@@ -61,10 +65,10 @@ class _Watch:
     asked: int = 0
     patience: Deadline | None = None
 
-    def until_it_ends(self) -> Ending:
+    def until_it_ends(self) -> ChildExit:
         while True:
             try:
-                return Ending(self.child.wait(_TICK), self.patience is not None)
+                return ChildExit(self.child.wait(_TICK), self.patience is not None)
             except subprocess.TimeoutExpired:
                 self._look()
             except KeyboardInterrupt:
@@ -73,9 +77,8 @@ class _Watch:
                 self.patience = Deadline.after(PATIENCE)
 
     def _look(self) -> None:
-        listens = (
-            self.log.stat().st_size > 0
-        )  # before its first output it does not, and has nothing to hand over
+        # Before its first output it does not listen, and has nothing to hand over.
+        listens = self.log.stat().st_size > 0
         end = self.kill if listens else self.deadline
         if end.passed() or (self.patience is not None and self.patience.passed()):
             self.child.kill()
@@ -84,6 +87,6 @@ class _Watch:
             self.asked += 1
 
     def _reasons(self) -> int:
-        """How often it should have been interrupted by now; more than once, for the first signal may have come too early."""
+        """How often it should have been interrupted by now; a first signal may come too early."""
         late = self.deadline.passed()
         return late if self.patience is None else late + 1 + self.patience.later(-PATIENCE / 2).passed()

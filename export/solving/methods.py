@@ -1,4 +1,4 @@
-"""The ways to a field that the package has: one table for `crossfield solve --method`, `crossfield run` and the docs."""
+"""The ways to a field: one table for `crossfield solve --method`, `crossfield run` and the docs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...models.search.improvement import first_field
 from ...models.search.power_field import power_field
 from ...models.search.search import search
 from ..solutions.solution import Solution
-from .local import Limits
+from .job import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
 from .windows import WINDOW_SOLVERS, search_windows
 
@@ -29,7 +29,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A field and how it was found: method, seconds, what was counted, and the solution file's facts where a solver gave it."""
+    """A field and how it was found: method, seconds, counts, and the solution where a solver gave it."""
 
     method: str
     field: CrossField
@@ -39,7 +39,7 @@ class Candidate:
     counts: tuple[tuple[str, int], ...] = ()
 
     def facts(self) -> dict[str, Any]:
-        """What a report says of it: energies in both norms, singularities, skew, and claims beside recomputed values."""
+        """What a report says of it: energies in both norms, singularities, skew, claims beside values."""
         answer = self.field
         facts: dict[str, Any] = {
             "method": self.method,
@@ -89,10 +89,10 @@ def _tell_nobody(_text: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a method is asked: the instance, a folder for files of solvers, limits of the whole, and options of the formulations.
+    """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
 
-    start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver: one of those that the
-    method can do with; None: the method's choice.
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver:
+    one of those that the method can do with; None: the method's choice.
     """
 
     instance: Instance
@@ -106,10 +106,10 @@ class Request:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to a field. find: the fields it comes to, one by one, for a later one may fail; the last one is its answer.
+    """A way to a field. find: the fields it comes to, one by one, for a later one may fail.
 
-    solvers: those that may be chosen for it; timed: whether it goes on up to the time limit, or ends when it is done; in_runs: whether
-    `run` tries it.
+    The last one is its answer. solvers: those that may be chosen for it; timed: whether it goes on up to the
+    time limit, or ends when it is done; in_runs: whether `run` tries it.
     """
 
     name: str
@@ -197,16 +197,37 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
 METHODS: Final = {
     method.name: method
     for method in (
-        Method("greedy", "the greedy strategy of BendFields, then the best angles: the baseline", _greedy, timed=False),
-        Method("power", "smooth exp(4 i theta), right angles; then the best angles for its jumps", _power, timed=False),
-        Method("search", "local search over jumps and singularities from the greedy field on, up to the time limit", _search),
         Method(
-            "windows", "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit", _windows,
-            solvers=tuple(WINDOW_SOLVERS), in_runs=False,
+            "greedy",
+            "the greedy strategy of BendFields, then the best angles: the baseline",
+            _greedy,
+            timed=False,
         ),
-        Method("two-stage", "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed", _two_stage),
+        Method(
+            "power",
+            "smooth exp(4 i theta), right angles; then the best angles for its jumps",
+            _power,
+            timed=False,
+        ),
+        Method(
+            "search",
+            "local search over jumps and singularities from the greedy field on, up to the time limit",
+            _search,
+        ),
+        Method(
+            "windows",
+            "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit",
+            _windows,
+            solvers=tuple(WINDOW_SOLVERS),
+            in_runs=False,
+        ),
+        Method(
+            "two-stage",
+            "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
+            _two_stage,
+        ),
     )
-}  # fmt: skip
+}
 """The table of methods; command line, runs, docs and tests are generated from it."""
 
 

@@ -1,4 +1,4 @@
-"""Everything at once: an instance, all its files, every field that can be had here, pictures, and a report."""
+"""Everything at once: an instance, its files, every field that can be had here, pictures, a report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..solutions.solution import Solution
-from .local import Limits
+from .job import Limits
 from .methods import METHODS, Candidate, Method, Progress, Request, finite, solution_facts
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
@@ -35,9 +35,10 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a run found. candidates: every field, best (lowest 2-norm energy) first; manifests: the written sets.
+    """What a run found. candidates: every field, best (lowest 2-norm energy) first.
 
-    failures: reasons by method; interrupted: the method, or `drawing`, that Ctrl-C ended, and the run with it; empty when none did.
+    Manifests: the written sets. failures: reasons by method; interrupted: the method, or `drawing`, that
+    Ctrl-C ended, and the run with it; empty when none did.
     """
 
     instance: Instance
@@ -109,8 +110,9 @@ def run(
     jobs: int = 1,
     progress: Progress = lambda _: None,
 ) -> Report:
-    """The report of a run; the folder then holds instance, solver files, the best field, pictures and report.json.
+    """The report of a run.
 
+    The folder then holds instance, solver files, the best field, pictures and report.json.
         DIR/models     every formulation in every format, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...

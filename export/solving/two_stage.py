@@ -1,4 +1,4 @@
-"""The two stages of section 5 of the paper: a MILP for the jumps, then the box-constrained QP for the angles."""
+"""The two stages of section 5 of the paper: a MILP for the jumps, then the box QP for the angles."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
 from ...models.search.improvement import first_field
 from ..solutions.solution import Solution
-from .local import Limits, solve
+from .job import Limits
+from .local import solve
 
 _ANGLES: Final = 0.2
-"""Share of the time that the second stage keeps, and the seconds that it needs at least: its process has to start."""
+"""Share of the time that the second stage keeps, and least seconds: its process has to start."""
 _ANGLES_LEAST: Final = 2.0
 
 
@@ -57,8 +58,8 @@ def find_jumps(
 ) -> Solution:
     """The solution of `milp-mccormick` by HiGHS: the first stage.
 
-    start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x 10 pixels.
-    limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
+    start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x
+    10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
     """
     limits = limits or Limits()
     deadline = Deadline.after(limits.seconds)
@@ -91,6 +92,6 @@ def two_stage(
 
 
 def jumps_until(deadline: Deadline) -> Deadline:
-    """When the first stage has to end, so that the second can end by the deadline: a fifth or 2 s before, but not sooner than half way."""
+    """When the first stage has to end: a fifth or 2 s before the deadline, but not sooner than half way."""
     left = deadline.left()
     return deadline.later(-min(max(_ANGLES * left, _ANGLES_LEAST), left / 2))

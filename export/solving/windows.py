@@ -1,7 +1,7 @@
-"""Large-neighbourhood search by exact solvers: windows of the grid are set free, all else fixed, and solved from the written file.
+"""Large-neighbourhood search: windows of the grid are set free, all else fixed, and solved exactly.
 
-Where `search` walks over the jumps of some hundred pixels, this proves what is best on some ten. Windows lie at random, round singularities
-and where the energy is high; once all of a size are solved, they grow.
+Where `search` walks over the jumps of some hundred pixels, this proves what is best on some ten. Windows lie
+at random, round singularities and where the energy is high; once all of a size are solved, they grow.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
 from ..solutions.solution import Solution
-from .local import Limits, solve
+from ..solvers_table import DRIVEN
+from .job import Limits
+from .local import solve
 
-WINDOW_SOLVERS: Final = {"bonmin": ("miqp-exact", 4), "highs": ("milp-mccormick", 5)}
-"""For each solver of windows what it solves, and the side of the first windows in pixels: what it closes within seconds."""
+WINDOW_SOLVERS: Final = {name: solver.window for name, solver in DRIVEN.items() if solver.window is not None}
+"""For each solver of windows what it solves, and the side of the first windows."""
 
 _WIDEST: Final = 8  # side at which a search ends: no solver here closes such a window
 _WINDOWS: Final = 4  # a round
@@ -43,9 +45,10 @@ Progress = Callable[[int, float], object]
 
 @dataclass(frozen=True)
 class WindowSearch:
-    """The field, how many windows were solved, how many of them to the end, how many lowered the energy, and how it ended.
+    """The field; how many windows were solved, to the end, and to a lower energy; how the search ended.
 
-    side: of the windows that were solved last, in pixels. ended: `time`, `interrupted`, or `windows`: all were solved, up to 8 x 8.
+    side: of the windows that were solved last, in pixels. ended: `time`, `interrupted`, or `windows`: all
+    were solved, up to 8 x 8.
     """
 
     field: CrossField
@@ -57,7 +60,7 @@ class WindowSearch:
 
 
 class _Task(NamedTuple):
-    """A window: the field round it, its free pixels (n,), the solver's name, the end of the search, and a folder for files."""
+    """A window: the field round it, its free pixels (n,), solver, end of the search, folder for files."""
 
     field: CrossField
     free: Bools
@@ -85,16 +88,17 @@ def search_windows(
 ) -> WindowSearch:
     """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
 
-    solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows. seconds: when to end;
-    jobs: processes. The seed decides on the first windows; how far each is solved, and so what follows, depends on time. Ctrl-C ends the
-    search after the windows at hand, a second one at once. Raises InputError for limits that are not positive and for another solver.
+    solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows.
+    seconds: when to end; jobs: processes. The seed decides on the first windows; how far each is solved, and
+    so what follows, depends on time. Ctrl-C ends the search after the windows at hand, a second one at once.
+    Raises InputError for limits that are not positive and for another solver.
     """
     if solver not in WINDOW_SOLVERS:
         raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
     if not seconds > 0 or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
     deadline = Deadline.after(seconds)
-    state = _State(field, WINDOW_SOLVERS[solver][1], np.random.default_rng(seed))
+    state = _State(field, WINDOW_SOLVERS[solver].side, np.random.default_rng(seed))
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
         try:
             with interruptible() as interrupted, side_by_side(_solved, jobs) as explore:
@@ -117,12 +121,15 @@ def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
 
 
 def _solved(task: _Task) -> _Found | None:
-    """A window, solved by an external solver from the file that is written for it; None where there was no time for it."""
+    """A window, solved by an external solver from the file that is written for it.
+
+    None where there was no time for it.
+    """
     deadline = task.deadline.within(_SECONDS)
     if deadline.later(-_SHORTEST).passed():
         return None
     piece = excerpt(task.field, task.free)
-    formulation, _ = WINDOW_SOLVERS[task.solver]
+    formulation = WINDOW_SOLVERS[task.solver].formulation
     problem = with_rest_fixed(formulate(piece.field.instance, formulation), piece.field, piece.free)
     limits = Limits(threads=1).until(deadline)
     with tempfile.TemporaryDirectory(dir=task.folder) as folder:
@@ -207,7 +214,10 @@ class _State:
         self._open[:] = True
 
     def _try(self, field: CrossField, free: Bools) -> bool:
-        """Go on from a field, its angles and jumps brought up to date, if it is lower; then windows near by are open again."""
+        """Go on from a field, its angles and jumps brought up to date, if it is lower.
+
+        Then windows near by are open again.
+        """
         state = FreeField.of(field)
         settle(state, Solver())
         better = state.bounded()

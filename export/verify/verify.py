@@ -1,9 +1,11 @@
-"""Every written file handed to every program that can be had for free: read, compared, evaluated, and on request solved.
+"""Every written file handed to every free program: read, compared, evaluated, and on request solved.
 
-For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its format. What a program reads
-is compared with the problem by name: sense, constant, costs, quadratic terms, types, bounds, rows; and as numbers at random points.
-With `seconds`, each solver solves it: the point is checked against the problem, its energy computed again, and the optima of one
-problem compared with each other across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes silently: what was not tried is a finding, with its reason.
+For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its
+format. What a program reads is compared with the problem by name: sense, constant, costs, quadratic terms,
+types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it: the point is
+checked against the problem, its energy computed again, and the optima of one problem compared with each other
+across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes
+silently: what was not tried is a finding, with its reason.
 """
 
 from __future__ import annotations
@@ -29,13 +31,12 @@ from ...models.instance.instance import QUARTER
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
-from ..solutions.readers.text import Status
+from ..solutions.readers.text import RawSolution, Status, values_for
 from ..solutions.solution import ROUND
-from ..solvers_table import EXTERNALS
+from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
-from .programs.reading import Evaluation, Meaning, Outcome, Points, load, save
-from .programs.registry import CONSUMERS, Consumer, absent, lacking
+from .programs.reading import Evaluation, Meaning, Points, load, save
 from .programs.worker import Worker
 
 RESULT: Final = "verify.json"
@@ -69,9 +70,10 @@ _BAD: Final = frozenset({Verdict.DIFFERS, Verdict.FAILED})
 class Finding:
     """What became of a file at a consumer: reading it, or solving it with one of its solvers.
 
-    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound; energy: the objective
-    again, with every other column at the value that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the
-    group of which the file holds a relaxation, whose optimum is no higher.
+    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound;
+    energy: the objective again, with every other column at the value that follows from angles and jumps.
+    group: where it is equal, so is the optimum; relaxes: the group of which the file holds a relaxation,
+    whose optimum is no higher.
     """
 
     problem: str
@@ -91,7 +93,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verification:
-    """All findings, the versions of the consumers that took part, and those that are absent with how to install them."""
+    """All findings, the versions of the programs that took part, and how to install those that are absent."""
 
     folder: Path
     findings: list[Finding] = field(default_factory=list)
@@ -126,7 +128,7 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """A file to be verified: what it should hold, unpacked where the consumers find it, and the points to compare at."""
+    """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
 
     manifest: Manifest
     problem: Problem
@@ -165,18 +167,18 @@ def verify(
     consumers: list[str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Verification:
-    """What became of all the files in a folder at all the consumers that are here; also written there as verify.json.
+    """What became of all the files in a folder at all the consumers that are here.
 
-    seconds: for each solve; None: nothing is solved. consumers: names, all by default. progress: called with each file and consumer.
-    Raises InputError when the folder holds no manifest, and what reading manifests raises.
+    Also written there as verify.json. seconds: for each solve; None: nothing is solved. consumers: names, all
+    by default. progress: called with each file and consumer. Raises InputError when the folder holds no
+    manifest, and what reading manifests raises.
     """
     folder = Path(folder)
-    wanted = [CONSUMERS[name] for name in consumers or CONSUMERS]
+    wanted = [PROGRAMS[name] for name in consumers or PROGRAMS]
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
-    gone = absent()
-    found = Verification(folder, absent={each.name: gone[each.name] for each in wanted if each.name in gone})
+    found = Verification(folder, absent={each.name: each.install for each in wanted if not each.present})
     with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
         subjects, broken = _subjects(manifests, Path(temporary))
         found.findings.extend(broken)
@@ -211,7 +213,8 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             if path.suffix == FORMATS[entry["format"]].suffix:
                 held = carried(problem, FORMATS[entry["format"]])
                 if entry["lifted"] != held.formulation.lifted:
-                    words = f"the manifest says of it {entry['lifted']!r}, and it holds {held.formulation.lifted!r}; export again"
+                    said, holds = entry["lifted"], held.formulation.lifted
+                    words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
                     broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
                 points = place / f"points_{len(held.blocks)}.npz"
                 if not points.exists():
@@ -251,7 +254,7 @@ def _points(problem: Problem) -> Points:
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:
-    """A field on the problem's instance: angles anywhere within their bounds, any jump within its bounds, or those that are data."""
+    """A random field on the problem's instance within all bounds; jumps that are data are kept."""
     rng, instance = np.random.default_rng(seed), problem.instance
     alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
     beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
@@ -263,19 +266,22 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 class _Bench:
     """A consumer at work: its child process, where that leaves arrays, and seconds for a solve."""
 
-    consumer: Consumer
+    program: Program
     worker: Worker
     result: Path
     seconds: float | None
     solved: set[tuple[str, str]] = field(default_factory=set)
 
     def findings(self, subject: _Subject) -> Iterator[Finding]:
-        """What the consumer makes of a file: of reading it, and of each of its solvers; two files of the same problem are solved once."""
+        """What the consumer makes of a file: of reading it, and of each of its solvers.
+
+        Two files of the same problem are solved once.
+        """
         read = self._read(subject)
         yield read
         if self.seconds is None:
             return
-        for solver in self.consumer.solvers:
+        for solver in self.program.solvers:
             key = (solver, subject.held.sha256)
             if read.verdict in {Verdict.AGREES, Verdict.NOT_TRIED} and key not in self.solved:
                 self.solved.add(key)
@@ -292,38 +298,34 @@ class _Bench:
         return self.worker.ask(task | {"seconds": seconds} | more, seconds)
 
     def _read(self, subject: _Subject) -> Finding:
-        algebra = subject.format in self.consumer.algebra
-        refusal = _refusal(self.consumer.name, subject, "read")
+        algebra = subject.format in self.program.algebra
+        refusal = _refusal(self.program.name, subject, "read")
         answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
         if answer["kind"] != "done":
             return self._unread(subject, answer, refusal)
         if refusal:
             words = f"it was read, though {refusal}"
-            return subject.finding(self.consumer.name, "read", Verdict.DIFFERS, words)
+            return subject.finding(self.program.name, "read", Verdict.DIFFERS, words)
         points = load(Points, subject.points)
         if algebra:
             model = load(Meaning, self.result)
-            wrong = difference(model, subject.held, self.consumer.tolerance, points.values)
+            wrong = difference(model, subject.held, self.program.tolerance, points.values)
         else:
             wrong = evaluation_difference(load(Evaluation, self.result), subject.held, points)
-        return subject.finding(
-            self.consumer.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong
-        )
+        return subject.finding(self.program.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong)
 
     def _unread(self, subject: _Subject, answer: dict[str, Any], refusal: str) -> Finding:
         if answer["kind"] == "too large":
-            return subject.finding(self.consumer.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] == "not told":
-            return subject.finding(self.consumer.name, "read", Verdict.NOT_TRIED, answer["words"])
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, answer["words"])
         if answer["kind"] == "refused" and refusal:
-            return subject.finding(self.consumer.name, "read", Verdict.REFUSED, refusal)
-        return subject.finding(self.consumer.name, "read", Verdict.FAILED, answer["words"])
+            return subject.finding(self.program.name, "read", Verdict.REFUSED, refusal)
+        return subject.finding(self.program.name, "read", Verdict.FAILED, answer["words"])
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
-        return (
-            f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.consumer.free}"
-        )
+        return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _Subject, solver: str) -> Finding:
         refusal = _refusal(solver, subject, "solve")
@@ -332,8 +334,8 @@ class _Bench:
         local = _refusal(solver, subject, "local")
         if local:
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, local)
-        if remedy := lacking(solver):
-            reason = f"{EXTERNALS[solver].title} is not installed: {remedy}"
+        if missing := SOLVERS[solver].missing:
+            reason = f"{SOLVERS[solver].title} is not installed: {missing}"
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, reason)
         assert self.seconds is not None
         begin = time.perf_counter()
@@ -342,33 +344,34 @@ class _Bench:
             return subject.finding(solver, "solve", Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] != "done":
             return subject.finding(solver, "solve", Verdict.FAILED, answer["words"])
-        return _judged(subject, solver, load(Outcome, self.result), time.perf_counter() - begin)
+        return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
 
 
-def _refusal(solver: str, subject: _Subject, step: Any) -> str:
-    """Why the solver refuses at that step, as the table of capabilities states it; empty when it does not."""
-    refusal = EXTERNALS[solver].refusal(subject.held, step) if solver in EXTERNALS else None
+def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
+    """Why the solver refuses at that stage, as the table of solvers states it; empty when it does not."""
+    refusal = SOLVERS[solver].refusal(subject.held, stage) if solver in SOLVERS else None
     return "" if refusal is None else refusal.reason
 
 
-def _judged(subject: _Subject, solver: str, outcome: Outcome, seconds: float) -> Finding:
-    """What a solver's answer is worth: its point is checked, its objective and the energy of its field computed again."""
-    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(outcome.bound)}
-    if not len(outcome.values):
-        limit = outcome.status == Status.LIMIT_WITHOUT_POINT
+def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Finding:
+    """What a solver's answer is worth: its point checked, objective and energy computed again."""
+    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
+    if not len(answer.values):
+        limit = answer.status == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
-        return subject.finding(solver, "solve", verdict, f"no point: {outcome.words}", **numbers)
-    point, wrong = _point(held, outcome)
+        return subject.finding(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
+    point, wrong = _point(held, answer)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
     numbers |= {"objective": objective, "energy": energy}
     worst = held.violation(point)
     if not wrong and worst.worst > FEASIBLE_WITHIN:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
-    proven = outcome.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    claim = outcome.objective
+    proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+    claim = answer.objective
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
-        wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"  # before the end its own variable for it may be loose
+        # Before the end a solver's own variable for it may be loose.
+        wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
     if wrong:
         return subject.finding(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
@@ -376,14 +379,14 @@ def _judged(subject: _Subject, solver: str, outcome: Outcome, seconds: float) ->
         solver,
         "solve",
         Verdict.AGREES if proven else Verdict.LIMIT,
-        "" if proven else outcome.words,
+        "" if proven else answer.message,
         proven=proven,
         **numbers,
     )
 
 
 def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
-    """What is wrong with an objective, given that of the point's own field: slacks of an optimum are tight, others may be loose."""
+    """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
     options = problem.formulation.options
     if (
         options.relax or options.facet == "printed"
@@ -398,14 +401,17 @@ def _finite(value: float | None) -> float | None:
     return None if value is None or abs(value) >= 1e19 else float(value)
 
 
-def _point(problem: Problem, outcome: Outcome) -> tuple[Floats, str]:
-    """The point by name, integers rounded; a column that the solver does not tell is at zero."""
-    values = dict(zip(outcome.columns, outcome.values.tolist(), strict=True))
-    names = names_of(column_names(problem))
-    point = np.array([values.get(name, 0.0) for name in names])
-    if not values.keys() & set(names):
-        return point, "it tells no column that we know"
-    return np.where(problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point), ""
+def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
+    """The point by name, integers rounded; a column that the solver does not tell is at zero.
+
+    And what is wrong with it.
+    """
+    names = np.array([name.encode() for name in names_of(column_names(problem))])
+    values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
+    point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
+    return np.where(
+        problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point
+    ), wrong
 
 
 def same(first: float, second: float) -> bool:
@@ -414,7 +420,7 @@ def same(first: float, second: float) -> bool:
 
 
 def compared(findings: list[Finding]) -> list[Finding]:
-    """The findings, those solves marked as different whose proven optimum, or whose bound, contradicts the best of their problem."""
+    """The findings; solves whose optimum or bound contradicts the best of their problem are different."""
     return [_against(finding, findings) for finding in findings]
 
 
@@ -428,7 +434,10 @@ def _against(finding: Finding, findings: list[Finding]) -> Finding:
 
 
 def _beside_others(finding: Finding, findings: list[Finding]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem; empty when it does not."""
+    """How a proven optimum or a bound contradicts the best point of the same problem.
+
+    Empty when it does not.
+    """
     best = _best(findings, finding.group)
     if best is None:
         return ""
@@ -440,7 +449,10 @@ def _beside_others(finding: Finding, findings: list[Finding]) -> str:
 
 
 def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
-    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when it does not."""
+    """How the proven optimum of a relaxation lies above a point of the problem itself.
+
+    Empty when it does not.
+    """
     best = _best(findings, finding.relaxes)
     lower = finding.objective if finding.proven else finding.bound
     if best is None or lower is None or lower <= best or same(lower, best):
@@ -449,7 +461,7 @@ def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
 
 
 def _as_relaxation(finding: Finding, findings: list[Finding]) -> str:
-    """What is told of the solve of a relaxation: beside the best point of the problem itself, where one was found."""
+    """What is told of the solve of a relaxation, beside the best point of the problem itself, if any."""
     best, told = _best(findings, finding.relaxes), f"; {finding.reason}" if finding.reason else ""
     beside = (
         f", no higher than {best:.9g} of the problem itself" if best is not None and finding.proven else ""

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.solving.nl_model import read_nl
 from crossfield.export.verify.comparison import of_problem
 from crossfield.export.verify.programs import asl as consumer_asl
-from crossfield.export.verify.programs import casadi as consumer_casadi
 from crossfield.export.verify.programs import highs as consumer_highs
 from crossfield.export.verify.programs import scip as consumer_scip
 from crossfield.export.verify.programs.reading import Meaning as Model
-from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.models.instance.grid import Floats
 
 __all__ = [
@@ -34,7 +34,7 @@ __all__ = [
 
 by_highs = consumer_highs.read
 by_scip = consumer_scip.read
-by_casadi = consumer_casadi.load
+by_casadi = read_nl
 scip_columns = consumer_scip.columns
 
 
@@ -69,7 +69,7 @@ def absence(program: str) -> str:
     if program in OTHERS:
         present, title, remedy = OTHERS[program]
     else:
-        entry = CONSUMERS[program]
+        entry = PROGRAMS[program]
         present, title, remedy = entry.present, entry.title, entry.install
     return "" if present else f"{title} is not installed: {remedy}"
 

@@ -16,7 +16,9 @@ from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
-from ...solving.local import SOLVERS, Limits, refusal, solve
+from ...solvers_table import DRIVEN, PROGRAMS
+from ...solving.job import Limits
+from ...solving.local import refusal, solve
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import changing
@@ -26,12 +28,7 @@ from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7
-"""Relative gap that a search is allowed: less than what counts as proven, for solvers whose points are a little infeasible."""
-TITLES: Final = {"highs": "HiGHS", "ipopt": "Ipopt", "bonmin": "Bonmin"}
-_PROVES: Final = (
-    "highs",
-    "bonmin",
-)  # optima of the convex problems it takes, without telling a bound of each
+"""Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
 _BETTER: Final = 1e-9  # relative: a lower objective than this is no better point
 
 Progress = Callable[[str], None]
@@ -48,10 +45,10 @@ def solve_library(
 ) -> list[dict[str, Any]]:
     """The new records, now in the ledger of the library, which is brought up to date in the end.
 
-    solvers: names of SOLVERS, all by default, each on the entries that it takes; time_limit: seconds of a run; up_to: last rung; by: who runs it.
-    Raises InputError for an unknown name.
+    solvers: names of solvers that are driven here, all by default, each on the entries that it takes.
+    time_limit: seconds of a run; up_to: last rung; by: who runs it. Raises InputError for an unknown name.
     """
-    chosen = _known(solvers or list(SOLVERS), SOLVERS, "solver")
+    chosen = _known(solvers or list(DRIVEN), DRIVEN, "solver")
     (last,) = _known([up_to or RUNGS[-1]], RUNGS, "rung")
     library, found = read_library(folder), []
     runs = list(_runs(library, chosen, RUNGS[: RUNGS.index(last) + 1], time_limit))
@@ -82,7 +79,7 @@ def _runs(
         problem = problem_of(library, document)
         have = ledger.of(document["name"], problem.sha256)
         for solver in solvers:
-            if not refusal(problem, SOLVERS[solver]) and not any(
+            if not refusal(problem, DRIVEN[solver]) and not any(
                 _covers(each, solver, limit) for each in have
             ):
                 yield document, solver
@@ -90,17 +87,18 @@ def _runs(
 
 def _covers(record: Record, solver: str, limit: float) -> bool:
     """Whether a record stands for a run of the solver for so long."""
-    same = record.solver == TITLES[solver] and record.version == _version(solver)
+    same = record.solver == DRIVEN[solver].title and record.version == _version(solver)
     return same and (record.status == "optimal" or (record.time_limit or 0.0) >= limit)
 
 
 def _version(solver: str) -> str:
-    package = SOLVERS[solver].package
+    """The version of its package, named where that is not the solver's own."""
+    program = PROGRAMS[DRIVEN[solver].program]
     try:
-        installed = version(package)
+        installed = version(program.needs)
     except PackageNotFoundError:
         return "not installed"
-    return installed if solver == "highs" else f"{package} {installed}"
+    return installed if program.name == solver else f"{program.needs} {installed}"
 
 
 def _run(
@@ -111,7 +109,7 @@ def _run(
     record = Record(
         document["name"],
         problem.sha256,
-        TITLES[solver],
+        DRIVEN[solver].title,
         _version(solver),
         "no point",
         threads=1,
@@ -148,13 +146,16 @@ def _ending(problem: Problem, solver: str, found: Solution) -> Ending:
 
 
 def _proves(problem: Problem, solver: str, found: Solution) -> bool:
-    """Whether the solver came to its end and that is a proof: its search is exact for convex problems, and it takes no others."""
+    """Whether the solver came to its end, and that is a proof of a global optimum."""
     ended = found.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    return ended and problem.convex and solver in _PROVES
+    return ended and problem.convex and DRIVEN[solver].proves != "local"
 
 
 def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:
-    """The dual bound that the solver tells, unless a feasible point contradicts it; where it tells none and proves an optimum, that less the gap it was allowed."""
+    """The dual bound that the solver tells, unless a feasible point contradicts it.
+
+    Where it tells none and proves an optimum: that less the gap it was allowed.
+    """
     if found.bound is not None:
         return None if contradicts(found.bound, known) else found.bound
     if found.objective is None or not _proves(problem, solver, found):

@@ -1,13 +1,13 @@
-"""Fields of low 1-norm energy by HiGHS, with limits on work and none on time, so that every build finds the same."""
+"""Fields of low 1-norm energy by HiGHS, limited in work, not in time: every build finds the same."""
 
 from __future__ import annotations
 
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from ....models.errors import SolutionError, SolverError
+from ....models.errors import SolutionError
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem, with_integers_fixed
 from ...bundle.starts import write_start
@@ -22,7 +22,10 @@ LP_UP_TO: Final = 1000
 
 
 def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
-    """Fields of lower 1-norm energy than a start where they are found: best angles for its jumps, and on the lower rungs a search over jumps."""
+    """Fields of lower 1-norm energy than a start, where they are found.
+
+    One has the best angles for its jumps; on the lower rungs another comes from a search over jumps.
+    """
     if start.instance.grid.size > LP_UP_TO:
         return []
     problem = linearised(start.instance)
@@ -50,20 +53,11 @@ def _solved(problem: Problem, nodes: int, start: CrossField | None) -> CrossFiel
 
 
 def _run(model: Path, first: Path, answer: Path, nodes: int) -> None:
-    import highspy
+    from ...solving.highs import leave, loaded, set_options, solved
 
-    # The threads of an earlier run in this process stay, and HiGHS refuses another number of them.
-    highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - as the function has it
-    highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
-    highs.setOptionValue("output_flag", "false")
-    for option, value in (("threads", 1), ("parallel", "off"), ("mip_rel_gap", 1e-6), ("mip_abs_gap", 1e-9)):
-        highs.setOptionValue(option, value)
+    highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
     if nodes:
-        highs.setOptionValue("mip_max_nodes", nodes)
-    if highs.readModel(str(model)) == highspy.HighsStatus.kError:
-        raise SolverError("HiGHS cannot read it", file=model)
+        set_options(highs, mip_max_nodes=nodes)
     if first.exists():
         highs.readSolution(str(first), 0)
-    if highs.run() == highspy.HighsStatus.kError:
-        raise SolverError("HiGHS cannot solve it", file=model)
-    highs.writeSolution(str(answer), 0)
+    leave(solved(highs, model), answer)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Bools, Floats
+from ...solvers_table import PROGRAMS
 from ...writing.canonical import Order
 
 Bytes = NDArray[np.bytes_]
@@ -41,15 +42,10 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 
 ADDED_COLUMNS: Final = {
     "crossfield": r"ONE",
-    "Gurobi": r"Constant|(?:MPS_)?Rg.*",
-    "CPLEX": r"Rg.*",
-    "SCIP": r"nlobjvar|quadobjvar|qmatrixvar|objconstvar",
-    "GLPK": r"~r_\d+",
-    "GAMS": r"objvar",
     "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE",
-}
-"""Patterns of the columns that programs add when they read or write a model: for a constant of the objective, for its part that is not
-linear, for the range of a row. A solution may hold them beside the columns of the problem."""
+} | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
+"""Patterns of the columns that programs add when they read or write a model: for a constant of the objective, for its part
+that is not linear, for the range of a row. A solution may hold them beside the columns of the problem."""
 
 _ADDED = re.compile("|".join(ADDED_COLUMNS.values()).encode(), re.DOTALL)
 

@@ -1,6 +1,7 @@
-"""The real AMPL Solver Library as a consumer of .nl, text and binary: Debian's gjh_asl_json, which tells what it reads as JSON.
+"""The AMPL Solver Library, for .nl: Debian's gjh_asl_json, which tells what it reads as JSON.
 
-It evaluates at the starting point of a file. A segment x at the end of a copy of the file is that point, and outweighs an earlier one.
+It evaluates at the starting point of a file. A segment x at the end of a copy of the file is that point, and
+outweighs an earlier one.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from ....models.instance.grid import Floats
+from .protocol import Refused, executable, file_names
 from .reading import Evaluation, Points
-from .registry import Refused, file_names, program
 
 _TOLD: Final = 1e-5
 """It prints bounds with six digits."""
@@ -24,15 +25,18 @@ _TOLD: Final = 1e-5
 
 def version() -> str:
     """Its version, and that of the library."""
-    said = subprocess.run([program("asl"), "-v"], check=False, capture_output=True, text=True)
+    said = subprocess.run([executable("asl"), "-v"], check=False, capture_output=True, text=True)
     found = re.search(r"Version (\S+).*ASL\((\d+)\)", said.stdout + said.stderr)
     return f"{found[1]} (ASL {found[2]})" if found else "unknown"
 
 
 def at_start(path: Path) -> dict[str, Any]:
-    """What the library says of an .nl file: statistics, bounds, and values at its starting point. Leaves a .json beside it."""
+    """What the library says of an .nl file: statistics, bounds, and values at its starting point.
+
+    Leaves a .json beside it.
+    """
     done = subprocess.run(
-        [program("asl"), str(path.with_suffix(""))],
+        [executable("asl"), str(path.with_suffix(""))],
         check=False,
         capture_output=True,
         text=True,

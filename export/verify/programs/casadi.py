@@ -2,68 +2,33 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pythons
-    import casadi
-
-from ....models.instance.grid import Floats
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...solving import casadi_driver
-from .reading import Evaluation, Outcome, Points
-from .registry import file_names
+from ...solving.nl_model import ca, read_nl
+from .protocol import file_names
+from .reading import Evaluation, Points, told
 
 
 def version() -> str:
     """Its version."""
-    return str(casadi.CasadiMeta.version())
-
-
-@dataclass(frozen=True, eq=False)
-class NlModel:
-    """A .nl file as CasADi reads it, in its order: bounds, integrality, start, and objective and rows at a point."""
-
-    lower: Floats
-    upper: Floats
-    row_lower: Floats
-    row_upper: Floats
-    discrete: list[bool]
-    start: Floats
-    function: Any
-
-    def evaluate(self, point: Floats) -> tuple[float, Floats]:
-        """Objective and rows at a point."""
-        objective, rows = self.function(point)
-        return float(objective), np.array(rows).ravel()
-
-
-def load(path: Path) -> NlModel:
-    """The .nl file as CasADi reads it."""
-    read = casadi.NlpBuilder()
-    read.import_nl(str(path))
-    function = casadi.Function("model", [casadi.vertcat(*read.x)], [read.f, casadi.vertcat(*read.g)])
-    ends = (read.x_lb, read.x_ub, read.g_lb, read.g_ub)
-    lower, upper, row_lower, row_upper = (np.array(casadi.DM(values), dtype=float).ravel() for values in ends)
-    start = np.array(casadi.DM(read.x_init)).ravel()
-    return NlModel(lower, upper, row_lower, row_upper, list(read.discrete), start, function)
+    return str(ca.CasadiMeta.version())
 
 
 def evaluate(path: Path, points: Points, renamed: Callable[[str], str] = str) -> Evaluation:
     """The .nl file as CasADi reads it; names come from .col and .row, through `renamed`."""
-    model = load(path)
+    model = read_nl(path)
     columns, rows = ([renamed(name) for name in names] for names in file_names(path))
     values = [model.evaluate(point) for point in points.of(columns)]
     return Evaluation(
         columns,
         model.lower,
         model.upper,
-        np.array(model.discrete, dtype=bool),
+        model.discrete,
         rows,
         model.row_lower,
         model.row_upper,
@@ -72,14 +37,13 @@ def evaluate(path: Path, points: Points, renamed: Callable[[str], str] = str) ->
     )
 
 
-def solve(path: Path, seconds: float, solver: str) -> Outcome:
+def solve(path: Path, seconds: float, solver: str) -> RawSolution:
     """The answer of Ipopt or Bonmin within the time."""
-    model = casadi_driver.read_model(path)
-    ending = casadi_driver.solve(solver, model, seconds, 0.0)
+    model = read_nl(path)
+    answer = casadi_driver.solve(solver, model, seconds, 0.0)
+    if not len(answer.point):
+        status = Status.INFEASIBLE if 200 <= answer.code < 300 else Status.LIMIT_WITHOUT_POINT
+        return told(status, answer.words)
+    status = Status.OPTIMAL_LOCAL if answer.code < 200 else Status.LIMIT_WITH_POINT
     columns, _ = file_names(path)
-    if not len(ending.point):
-        status = Status.INFEASIBLE if 200 <= ending.code < 300 else Status.LIMIT_WITHOUT_POINT
-        return Outcome(status, ending.words, columns, np.zeros(0))
-    status = Status.OPTIMAL_LOCAL if ending.code < 200 else Status.LIMIT_WITH_POINT
-    goal: Any = casadi.Function("goal", [model.problem["x"]], [model.problem["f"]])
-    return Outcome(status, ending.words, columns, ending.point, float(goal(ending.point)))
+    return told(status, answer.words, columns, answer.point, objective=model.evaluate(answer.point)[0])

@@ -1,7 +1,7 @@
 """CBC's executable as a consumer of LP and MPS. It knows nothing of products: hand it linear models only.
 
-What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the names, in the same
-order, by its table of all rows and columns.
+What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the
+names, in the same order, by its table of all rows and columns.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from . import highs as consumer_highs
-from .reading import Meaning, Outcome
-from .registry import NotTold, Refused, program
+from .protocol import NotTold, Refused, executable
+from .reading import Meaning, told
 
 
 def version() -> str:
@@ -29,7 +27,7 @@ def version() -> str:
 
 def _run(*arguments: str) -> str:
     done = subprocess.run(
-        [program("cbc"), *arguments], check=False, capture_output=True, text=True, errors="replace"
+        [executable("cbc"), *arguments], check=False, capture_output=True, text=True, errors="replace"
     )
     return done.stdout + done.stderr
 
@@ -53,32 +51,17 @@ def read(path: Path) -> Meaning:
     return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time; its solution file has eight digits."""
     answer = _fresh("cbc.sol")
-    limits = (
-        "ratio",
-        "0",
-        "allow",
-        "1e-9",
-        "primalT",
-        "1e-9",
-        "integerT",
-        "1e-9",
-        "sec",
-        f"{seconds:g}",
-        "timem",
-        "elapsed",
-    )
+    gaps = ("ratio", "0", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
+    limits = (*gaps, "sec", f"{seconds:g}", "timem", "elapsed")
     said = _run(str(path), *limits, "solve", "solution", answer.name)
     try:
         raw = read_raw(answer)
     except SolutionError as error:
         raise Refused(f"CBC leaves no answer: {error}") from error
     bound = re.search(r"^Lower bound: +(\S+)$", said, re.MULTILINE)
-    if raw.names is None or raw.status == Status.INFEASIBLE:
-        return Outcome(raw.status, raw.message, [], np.zeros(0))
-    names = [name.decode() for name in np.asarray(raw.names).tolist()]
-    return Outcome(
-        raw.status, raw.message, names, raw.values, raw.objective, float(bound[1]) if bound else None
-    )
+    if raw.status == Status.INFEASIBLE:
+        return told(raw.status, raw.message)
+    return replace(raw, bound=float(bound[1]) if bound else None)

@@ -1,4 +1,7 @@
-"""CPLEX as a consumer of LP and MPS, through its Python API. The community edition solves up to 1000 columns and rows."""
+"""CPLEX as a consumer of LP and MPS, through its Python API.
+
+The community edition solves up to 1000 columns and rows.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,10 @@ import cplex
 import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
-from .reading import Meaning, Outcome
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
 
 _SIZE_LIMIT = 1016
 _INFINITY = 1e20
@@ -35,7 +38,10 @@ def _load(path: Path) -> Any:
 
 
 def read(path: Path) -> Meaning:
-    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times; quadratic rows come after the others."""
+    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times.
+
+    Quadratic rows come after the others.
+    """
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
@@ -87,7 +93,7 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
     )
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     tolerances = model.parameters
@@ -114,7 +120,8 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     mixed = "MI" in model.problem_type[model.get_problem_type()]
     if not answer.is_primal_feasible():
         status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
-        return Outcome(status, words, names, np.zeros(0))
+        return told(status, words)
     status = Status.OPTIMAL_GLOBAL if "optimal" in words else Status.LIMIT_WITH_POINT
     bound = answer.MIP.get_best_objective() if mixed else None
-    return Outcome(status, words, names, np.array(answer.get_values()), answer.get_objective_value(), bound)
+    objective = answer.get_objective_value()
+    return told(status, words, names, answer.get_values(), objective=objective, bound=bound)

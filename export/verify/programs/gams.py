@@ -1,7 +1,8 @@
-"""GAMS as a consumer of its own language: the free gamspy_base compiles a model, CONVERT translates it, its solvers solve it.
+"""GAMS: the free gamspy_base compiles a model, CONVERT translates it, its solvers solve it.
 
-CONVERT writes an .nl file of its own, which CasADi evaluates: an independent way from our GAMS text to numbers. BARON comes as
-gamspy_baron, whose files have to lie among those of gamspy_base: both are linked into a folder of the child process.
+CONVERT writes an .nl file of its own, which CasADi evaluates: an independent way from our GAMS text to
+numbers. BARON comes as gamspy_baron, whose files have to lie among those of gamspy_base: both are linked into
+a folder of the child process.
 """
 
 from __future__ import annotations
@@ -14,14 +15,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from . import casadi as consumer_casadi
-from .reading import Evaluation, Outcome, Points
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Evaluation, Points, told
 
 _BARON_FILES: Final = ("baron", "libbaronnavvy64.so", "optbaron.def", "gmsba_us.run", "gmsba_ux.out")
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
@@ -48,7 +47,11 @@ def version() -> str:
 
 
 def _system(solver: str) -> Path:
-    """The folder of GAMS; for BARON a copy of it, by links where that works, with BARON's files and its entry in the table of solvers."""
+    """The folder of GAMS.
+
+    For BARON a copy of it, by links where that works, with BARON's files and its entry in the table of
+    solvers.
+    """
     base, baron = _package("gamspy_base"), _package("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
@@ -109,7 +112,10 @@ def our_name(name: str) -> str:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The GAMS model as CONVERT translates it and CasADi reads it. Columns that stand in no term are not in GAMS's model."""
+    """The GAMS model as CONVERT translates it and CasADi reads it.
+
+    Columns that stand in no term are not in GAMS's model.
+    """
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():
@@ -130,7 +136,7 @@ _MODEL_STATUS: Final = {
 _NORMAL: Final = 1
 
 
-def solve(path: Path, seconds: float, solver: str) -> Outcome:
+def solve(path: Path, seconds: float, solver: str) -> RawSolution:
     """The answer of one of GAMS's solvers within the time, from the CSV that our models write."""
     answer = Path("answer.csv").resolve()
     answer.unlink(missing_ok=True)
@@ -154,7 +160,6 @@ def solve(path: Path, seconds: float, solver: str) -> Outcome:
         raw = read_raw(answer)
     except SolutionError as error:
         raise Refused(f"no answer: {words}; {error}") from error
-    if raw.names is None or not raw.has_point or status in {Status.ERROR, Status.INFEASIBLE}:
-        return Outcome(status, words, [], np.zeros(0))
-    names = [name.decode() for name in np.asarray(raw.names).tolist()]
-    return Outcome(status, words, names, raw.values, raw.objective, float(bound[1]) if bound else None)
+    if status in {Status.ERROR, Status.INFEASIBLE}:
+        return told(status, words)
+    return replace(raw, status=status, message=words, bound=float(bound[1]) if bound else None)

@@ -1,7 +1,7 @@
 """GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
 
-What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective is a row there as well,
-and columns are indexed: alpha[1,2].
+What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
+is a row there as well, and columns are indexed: alpha[1,2].
 """
 
 from __future__ import annotations
@@ -14,27 +14,32 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
+from ...solvers_table import PROGRAMS
 from ...writing.terms import terms
-from .reading import Evaluation, Meaning, Outcome, Points
-from .registry import CONSUMERS, Refused, program
+from .protocol import Refused, executable
+from .reading import Evaluation, Meaning, Points, told
 
-_KINDS: Final = {"lp": "--lp", "mps": "--freemps"}
+_KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
 
 
 def version() -> str:
     """Its version."""
-    said = subprocess.run([program("glpk"), "--version"], check=False, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        [executable("glpk"), "--version"], check=False, capture_output=True, text=True
+    ).stdout
     found = re.search(r"(\d+\.\d+)", said)
     return found[1] if found else "unknown"
 
 
 def _run(path: Path, *arguments: str) -> str:
     kind = path.suffix.removeprefix(".")
-    given = ["--model", str(path), "--data", str(path.with_suffix(".dat"))] if kind == "mod" else [_KINDS[kind], str(path)]  # fmt: skip
+    given = [_KINDS[kind], str(path)]
+    if kind == "mod":
+        given += ["--data", str(path.with_suffix(".dat"))]
     done = subprocess.run(
-        [program("glpk"), *given, *arguments],
+        [executable("glpk"), *given, *arguments],
         check=False,
         capture_output=True,
         text=True,
@@ -96,7 +101,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
         model.row_upper,
         model.objective(given),
         model.activities(given),
-        rounding=CONSUMERS["glpk"].tolerance,
+        rounding=PROGRAMS["glpk"].tolerance,
         may_lack=True,
     )
 
@@ -117,7 +122,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
 
 
 def _ours(names: list[str], path: Path) -> list[str]:
-    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as the model prints answers."""
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
     printed = re.search(r"_%0(\d+)d", path.read_text())
     assert printed
     return [_our_name(name, int(printed[1])) for name in names]
@@ -129,7 +134,7 @@ def _our_name(name: str, digits: int) -> str:
 
 
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
-    """Bounds of rows or columns: a letter (free, lower, upper, double, s for fixed) at place `at` of a line, and its numbers.
+    """Bounds of rows or columns: a letter (free, lower, upper, double, s: fixed) at place `at`, and numbers.
 
     Rows without a line are free; columns have at least 0, and at most 1 in a model with integers.
     """
@@ -146,7 +151,7 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
 _STATUS: Final = {"o": Status.OPTIMAL_GLOBAL, "f": Status.LIMIT_WITH_POINT, "n": Status.INFEASIBLE}
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
     said = _run(path, "--tmlim", str(max(1, round(seconds))), "--wglp", "model.glp", "-w", "answer.txt")
     names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
@@ -159,6 +164,6 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     if head[1] == "bas":
         status = Status.OPTIMAL_GLOBAL if head[4:6] == ["f", "f"] else Status.LIMIT_WITHOUT_POINT
     if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return Outcome(status, words, names, np.zeros(0))
+        return told(status, words)
     values = np.array([float(line[place]) for line in answer if line[0] == "j"])
-    return Outcome(status, words, names, values, float(head[-1]))
+    return told(status, words, names, values, objective=float(head[-1]))

@@ -10,10 +10,10 @@ from typing import Any
 import gurobipy
 import numpy as np
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
-from .reading import Meaning, Outcome
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
 
 _SIZE_LIMIT = 10010
 
@@ -92,7 +92,7 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     with _loaded(path) as model:
         for option, value in (
@@ -111,14 +111,7 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
         names = [v.VarName for v in variables]
         if not model.SolCount:
             without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-            return Outcome(without, f"status {model.Status}", names, np.zeros(0))
-        discrete = model.IsMIP or model.IsQCP
-        values = np.array(model.getAttr("X", variables))
-        return Outcome(
-            status,
-            f"status {model.Status}",
-            names,
-            values,
-            model.ObjVal,
-            model.ObjBound if discrete else None,
-        )
+            return told(without, f"status {model.Status}")
+        values = model.getAttr("X", variables)
+        bound = model.ObjBound if model.IsMIP or model.IsQCP else None
+        return told(status, f"status {model.Status}", names, values, objective=model.ObjVal, bound=bound)

@@ -8,24 +8,24 @@ from typing import Any
 import highspy
 import numpy as np
 
-from ...solutions.readers.text import Status
+from ....models.errors import SolverError
+from ...solutions.readers.text import RawSolution, Status
+from ...solving import highs as driver
 from ...writing.terms import terms
-from .reading import Meaning, Outcome
-from .registry import Refused
+from .protocol import Refused
+from .reading import Meaning, told
 
 
 def version() -> str:
     """Its version."""
-    highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
-    return str(highs.version())
+    return driver.version()
 
 
 def _load(path: Path) -> Any:
-    highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
-    highs.setOptionValue("output_flag", "false")
-    if highs.readModel(str(path)) == highspy.HighsStatus.kError:
-        raise Refused("HiGHS cannot read it")
-    return highs
+    try:
+        return driver.loaded(path)
+    except SolverError as error:
+        raise Refused(str(error)) from error
 
 
 def read(path: Path) -> Meaning:
@@ -59,22 +59,20 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     highs = _load(path)
-    options = {"time_limit": seconds, "mip_rel_gap": 0.0, "mip_abs_gap": 1e-9, "threads": 1}
+    driver.set_options(highs, time_limit=seconds, mip_rel_gap=0.0, mip_abs_gap=1e-9, threads=1)
     if not highs.getModel().hessian_.dim_:  # its QP method ends in an error with such tolerances
-        options |= {"mip_feasibility_tolerance": 1e-9, "primal_feasibility_tolerance": 1e-9}
-    for option, value in options.items():
-        highs.setOptionValue(option, value)
-    if highs.run() == highspy.HighsStatus.kError:
-        raise Refused("HiGHS answers with an error (model status Not Set)")
+        driver.set_options(highs, mip_feasibility_tolerance=1e-9, primal_feasibility_tolerance=1e-9)
+    try:
+        driver.solved(highs, path)
+    except SolverError as error:
+        raise Refused(str(error)) from error
     words, info = highs.modelStatusToString(highs.getModelStatus()), highs.getInfo()
     status = _STATUS.get(highs.getModelStatus(), Status.ERROR)
-    values = np.array(highs.getSolution().col_value)
+    names, values, bound = highs.getLp().col_names_, highs.getSolution().col_value, driver.dual_bound(highs)
     if status == Status.LIMIT_WITH_POINT and not info.primal_solution_status:
-        status, values = Status.LIMIT_WITHOUT_POINT, np.zeros(0)
-    mixed = len(highs.getLp().integrality_) > 0
-    bound = info.mip_dual_bound if mixed else None
+        return told(Status.LIMIT_WITHOUT_POINT, words, bound=bound)
     objective = info.objective_function_value if len(values) else None
-    return Outcome(status, words, list(highs.getLp().col_names_), values, objective, bound)
+    return told(status, words, names, values, objective=objective, bound=bound)

@@ -1,18 +1,21 @@
-"""What a model file means to the program that read it, as plain arrays. comparison.py says how that differs from the problem.
+"""What a model file means to the program that read it, as plain arrays.
 
-Two forms. A `Meaning` is the algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS give it. An
-`Evaluation` is the behaviour: values of objective and rows at points, as readers of .nl and GAMS give it.
+Comparison.py says how that differs from the problem. Two forms. A `Meaning` is the algebra: costs, quadratic
+terms and rows by coefficient, as readers of LP and MPS give it. An `Evaluation` is the behaviour: values of
+objective and rows at points, as readers of .nl and GAMS give it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 
 from ....models.instance.grid import Bools, Floats, Ints
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
 
 
@@ -20,7 +23,8 @@ from ...writing.terms import Terms, terms
 class Meaning:
     """A quadratic model: costs, limits and coefficients in the order of `columns` and `rows`.
 
-    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column); row_quadratic at (row, i, j).
+    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column);
+    row_quadratic at (row, i, j).
     """
 
     columns: list[str]
@@ -40,7 +44,10 @@ class Meaning:
 
     @classmethod
     def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
-        """The model of these columns and rows; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
+        """The model of these columns and rows.
+
+        `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out.
+        """
         for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
             found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
             given |= {f"{name}_at": found.at, name: found.value}
@@ -91,8 +98,9 @@ def places(have: list[str], wanted: list[str]) -> Ints:
 class Evaluation:
     """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
 
-    integer is None where the program does not tell it, discrete then counts them. What is not told of the values is NaN.
-    rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term are left out.
+    integer is None where the program does not tell it, discrete then counts them. What is not told of the
+    values is NaN. rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term
+    are left out.
     """
 
     columns: list[str]
@@ -126,22 +134,25 @@ class Points:
         return self.values[:, places(self.names, columns)]
 
 
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a solver answers: status (a solution_text.Status), its words, objective, dual bound, and a point by column name."""
+def told(
+    status: Status,
+    words: str,
+    columns: Sequence[str] = (),
+    values: Sequence[float] | Floats = (),
+    *,
+    objective: float | None = None,
+    bound: float | None = None,
+) -> RawSolution:
+    """What a program answers through an interface of its own, in the form in which files are read."""
+    names = np.array([name.encode() for name in columns], dtype=np.bytes_)
+    return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
 
-    status: str
-    words: str
-    columns: list[str]
-    values: Floats
-    objective: float | None = None
-    bound: float | None = None
+
+_TOLD: Final = "the program itself"
+T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
 
 
-T = TypeVar("T", Meaning, Evaluation, Points, Outcome)
-
-
-def save(given: Meaning | Evaluation | Points | Outcome, path: Path) -> None:
+def save(given: Meaning | Evaluation | Points | RawSolution, path: Path) -> None:
     """Write the arrays to a .npz."""
     arrays: dict[str, Any] = {
         name: np.asarray(value) for name, value in vars(given).items() if value is not None
@@ -152,9 +163,10 @@ def save(given: Meaning | Evaluation | Points | Outcome, path: Path) -> None:
 def load(kind: type[T], path: Path) -> T:
     """What `save` wrote."""
     with np.load(path, allow_pickle=False) as archive:
-        arrays = dict(archive)
-    values = {name: _plain(value) for name, value in arrays.items()}
-    return kind(**({"integer": None} if kind is Evaluation else {}) | values)
+        values = {name: _plain(value) for name, value in archive.items()}
+    if "status" in values:
+        values["status"] = Status(values["status"])
+    return kind(**dict.fromkeys(field.name for field in fields(kind)) | values)
 
 
 def _plain(value: Any) -> Any:

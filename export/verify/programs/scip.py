@@ -1,7 +1,8 @@
 """SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
-A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed variable. SCIP evaluates no nonlinear row at a point, but it
-judges points: at a feasible one the objective is within a hair of ours when a hair more is feasible and a hair less is not.
+A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
+variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is
+within a hair of ours when a hair more is feasible and a hair less is not.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 import pyscipopt
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import Terms, terms
-from .reading import Evaluation, Meaning, Outcome, Points
-from .registry import Refused, file_names
+from .protocol import Refused, file_names
+from .reading import Evaluation, Meaning, Points, told
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
 _CONSTANT: Final = "objconstvar"
@@ -108,7 +109,7 @@ def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The .nl or OSiL file as SCIP reads it: columns, and its judgement of the objective at the feasible points. Linear rows are evaluated."""
+    """The .nl or OSiL file as SCIP reads it: columns, linear rows, its judgement of the objective."""
     scip = _load(path)
     variables = {v.name: v for v in scip.getVars()}
     rows = {row.name: row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS}
@@ -183,7 +184,7 @@ _STATUS: Final = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     scip = _load(path)
     for option, value in (
@@ -200,8 +201,9 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     status = _STATUS.get(words, Status.ERROR)
     if not scip.getNSols():
         without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-        return Outcome(without, words, [], np.zeros(0), bound=scip.getDualbound())
+        return told(without, words, bound=scip.getDualbound())
     best = scip.getBestSol()
     ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     values = np.array([scip.getSolVal(best, v) for v in ours])
-    return Outcome(status, words, [v.name for v in ours], values, scip.getObjVal(), scip.getDualbound())
+    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound()}
+    return told(status, words, [v.name for v in ours], values, **numbers)

@@ -1,7 +1,7 @@
-"""A consumer in a child process: `python -m crossfield.export.verify.programs.worker NAME`, one task a line, one answer a line, both JSON.
+"""A program in a child process, this module with its name: a task a line, an answer a line, both JSON.
 
-A crash or a hang of a program takes the child alone: `Worker` notes it for that task and starts another child for the next.
-Arrays go through .npz files in the worker's folder. What a program prints goes to a log.
+A crash or a hang of a program takes the child alone: `Worker` notes it for that task and starts another child
+for the next. Arrays go through .npz files in the worker's folder. What a program prints goes to a log.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, Self
 
+from .protocol import NotTold, Refused, TooLarge
 from .reading import Points, load, save
-from .registry import NotTold, Refused, TooLarge
 
 GRACE: Final = 20.0
-"""Seconds that a task may take beyond the limit of its solve: for reading, and for solvers that look at the clock rarely."""
+"""Seconds that a task may take beyond its limit: for reading, and for solvers slow to look at the clock."""
 
 
 class Worker:
-    """A consumer's child process and its folder; `ask` it, and close it."""
+    """A program's child process and its folder; `ask` it, and close it."""
 
-    def __init__(self, consumer: str, folder: Path) -> None:
+    def __init__(self, program: str, folder: Path) -> None:
         """Start nothing yet."""
-        self._consumer = consumer
+        self._program = program
         self._folder = folder
         self._child: subprocess.Popen[str] | None = None
         self._answers: queue.Queue[str] = queue.Queue()
@@ -68,7 +68,7 @@ class Worker:
             self._folder.mkdir(parents=True, exist_ok=True)
             # -P: a folder `crossfield` or a file casadi.py where the user happens to be is not meant.
             self._child = subprocess.Popen(
-                [sys.executable, "-P", "-m", "crossfield.export.verify.programs.worker", self._consumer],
+                [sys.executable, "-P", "-m", "crossfield.export.verify.programs.worker", self._program],
                 cwd=self._folder,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -112,7 +112,7 @@ _LOG: Final = "log.txt"
 
 
 def answer_to(module: Any, task: dict[str, Any]) -> dict[str, Any]:
-    """The answer of a consumer's module to a task, its arrays saved where the task says."""
+    """The answer of a program's module to a task, its arrays saved where the task says."""
     try:
         if task["step"] == "version":
             return {"kind": "done", "words": module.version()}
@@ -139,12 +139,12 @@ def _result(module: Any, task: dict[str, Any]) -> Any:
 
 def main(arguments: list[str]) -> int:
     """0 when there are no more tasks."""
-    (consumer,) = arguments
+    (program,) = arguments
     answers = os.fdopen(os.dup(1), "w")
     with Path(_LOG).open("wb") as log:
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)
-    module = import_module(f"crossfield.export.verify.programs.{consumer}")
+    module = import_module(f"crossfield.export.verify.programs.{program}")
     for line in sys.stdin:
         answers.write(json.dumps(answer_to(module, json.loads(line))) + "\n")
         answers.flush()

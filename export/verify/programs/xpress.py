@@ -11,10 +11,10 @@ import numpy as np
 with warnings.catch_warnings(action="ignore"):  # it tells which licence it uses
     import xpress
 
-from ...solutions.readers.text import Status
+from ...solutions.readers.text import RawSolution, Status
 from ...writing.terms import terms
-from .reading import Meaning, Outcome
-from .registry import Refused, TooLarge
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
 
 _INFINITY = 1e20
 _ROWS, _COLUMNS = 1, 2
@@ -100,11 +100,12 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> Outcome:
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     for option, value in (
-        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9), ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
+        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
         model.setControl(option, value)
@@ -117,7 +118,8 @@ def solve(path: Path, seconds: float, _solver: str) -> Outcome:
     words = str(found).removeprefix("SolStatus.")
     status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
     if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return Outcome(status, words, names, np.zeros(0))
+        return told(status, words)
     mixed = model.attributes.mipents or model.attributes.qconstraints
     bound = model.attributes.bestbound if mixed else None
-    return Outcome(status, words, names, np.array(model.getSolution()), model.attributes.objval, bound)
+    objective = model.attributes.objval
+    return told(status, words, names, model.getSolution(), objective=objective, bound=bound)

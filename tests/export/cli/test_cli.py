@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.solving.local import SOLVERS
+from crossfield.export.solvers_table import DRIVEN
 from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.sketch.samples import SAMPLES
@@ -368,10 +368,10 @@ def test_list_says_which_go_together(crossfield):
     listed = json.loads(crossfield("list", "--json"))
     assert [row["name"] for row in listed["formulations"]] == list(FORMULATIONS)
     assert [row["name"] for row in listed["formats"]] == list(FORMATS)
-    assert all(set(SOLVERS) < set(row) for row in listed["solvers"])
+    assert all(set(DRIVEN) < set(row) for row in listed["solvers"])
     assert [row["name"] for row in listed["methods"]] == list(METHODS)
     text = crossfield("list")
-    for name in (*FORMULATIONS, *FORMATS, *SOLVERS, *(row["name"] for row in listed["readers"])):
+    for name in (*FORMULATIONS, *FORMATS, *DRIVEN, *(row["name"] for row in listed["readers"])):
         assert name in text
 
 

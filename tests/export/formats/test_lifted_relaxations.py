@@ -9,8 +9,8 @@ import pytest
 from crossfield.export.bundle.manifest import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.solving.local import solver_for
-from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.export.verify.verify import Verdict, compared, verify
 
 LIFTED = ("minlp-quartic", "minlp-cubic")
@@ -83,7 +83,7 @@ def starts(instance):
 def test_a_solver_is_chosen_that_reads_the_products(two):
     """HiGHS would solve the weaker problem of the .mps; it does so when it is asked for, and the facts tell."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
-    assert solver_for(problem).format == "nl"
+    assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
     assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.weakened is False
 
@@ -92,8 +92,8 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 @pytest.mark.oracles
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, and a contradiction if both were called optima of one problem."""
-    if not CONSUMERS["scip"].present:
-        pytest.skip(f"SCIP is not installed: {CONSUMERS['scip'].install}")
+    if not PROGRAMS["scip"].present:
+        pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
     found = verify(tmp_path, seconds=4.0, consumers=["scip", "highs"])
     assert found.bad == []

@@ -26,11 +26,11 @@ from cases import CASES, make_field, make_instance, make_problem, names_of, poin
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.solutions.solution import read_solution
+from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
 from crossfield.export.verify.programs import glpk as consumer_glpk
 from crossfield.export.verify.programs import scip as consumer_scip
 from crossfield.export.verify.programs.reading import Meaning, Points
-from crossfield.export.verify.programs.registry import CONSUMERS
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
 from crossfield.export.writing.curvature import probtype
@@ -172,7 +172,7 @@ def test_verify_hands_them_to_their_readers(tmp_path: Path):
     found = verify(tmp_path, consumers=["scip", "glpk"], seconds=0.3)
     assert found.bad == []
     read = {(f.consumer, f.file.split(".", 1)[1]): f.verdict for f in found.findings if f.step == "read"}
-    if CONSUMERS["glpk"].present:
+    if PROGRAMS["glpk"].present:
         agrees = {
             name for (consumer, name), verdict in read.items() if (consumer, verdict) == ("glpk", "agrees")
         }

@@ -53,7 +53,7 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     np.testing.assert_array_equal(read.upper, problem.upper[order])
     np.testing.assert_array_equal((read.row_lower, read.row_upper), limits_of(problem))
     np.testing.assert_array_equal(read.start, points[0][order])
-    assert read.discrete == problem.integer[order].tolist()
+    assert read.discrete.tolist() == problem.integer[order].tolist()
     for point in points:
         objective, rows = read.evaluate(point[order])
         expected = values_at(problem, point)

@@ -109,7 +109,7 @@ def test_values_of_pyomos_nl_are_ours(label: str, tmp_path: Path):
     index = {name: place for place, name in enumerate(names_of(column_names(problem)))}
     width = 3 if "far" in label else 2
     order = [index[_wide(our_name(variable), width)] for variable in info.variables]
-    assert read.discrete == problem.integer[order].tolist()
+    assert read.discrete.tolist() == problem.integer[order].tolist()
     np.testing.assert_array_equal(read.lower, problem.lower[order])
     np.testing.assert_array_equal(read.upper, problem.upper[order])
     for point in points_of(problem):

@@ -16,7 +16,8 @@ import pytest
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
-from crossfield.export.solving.local import SOLVERS, solver_for
+from crossfield.export.solvers_table import DRIVEN
+from crossfield.export.solving.local import solver_for
 from crossfield.export.solving.run import plan
 from crossfield.models.errors import (
     InputError,
@@ -193,7 +194,7 @@ def test_bonmin_and_highs_agree_on_a_milp():
 def test_three_solvers_agree_on_a_qp():
     instance = random_instance(5, 6, 6)
     problem = formulated(instance, "qp-fixed")
-    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in SOLVERS]
+    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in DRIVEN]
     assert found == pytest.approx([least_squares(instance, cf.greedy(instance).p)] * 3, abs=1e-6)
 
 
@@ -212,7 +213,7 @@ def split(label):
     return label.removesuffix(", relaxed"), label.endswith(", relaxed")
 
 
-PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in SOLVERS]
+PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in DRIVEN]
 DONE = [(label, solver) for label, solver, answer in PAIRS if answer == "yes"]
 REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer != "yes"]
 
@@ -251,7 +252,7 @@ def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, rea
 def test_the_table_is_not_trivial():
     assert len(DONE) > 15
     assert len(REFUSED) > 15
-    assert {solver for _, solver in DONE} == set(SOLVERS)
+    assert {solver for _, solver in DONE} == set(DRIVEN)
 
 
 def test_the_preferred_solver_fits_the_class(small):

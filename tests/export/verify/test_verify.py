@@ -15,10 +15,10 @@ from cases import MASKS, make_field, make_instance
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solvers_table import EXTERNALS, takes
+from crossfield.export.solutions.readers.text import RawSolution
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.verify.programs import worker as consumer_worker
-from crossfield.export.verify.programs.reading import Outcome, load
-from crossfield.export.verify.programs.registry import CONSUMERS, lacking
+from crossfield.export.verify.programs.reading import load
 from crossfield.export.verify.programs.worker import Worker
 from crossfield.export.verify.verify import Verdict, Verification, same, verify
 from crossfield.models.errors import InputError
@@ -33,14 +33,12 @@ from loops import for_each
 pytestmark = pytest.mark.oracles
 
 SECONDS = 0.3
-SOLVERS = {solver: entry.name for entry in CONSUMERS.values() for solver in entry.solvers}
-"""Each solver and the consumer that runs it."""
 needing = pytest.mark.needs
 each_solver = pytest.mark.parametrize(
     "solver",
     [
-        pytest.param(name, marks=[needing(consumer), *([needing(name)] if name == "baron" else [])])
-        for name, consumer in SOLVERS.items()
+        pytest.param(name, marks=[needing(solver.program), *([needing(name)] if solver.package else [])])
+        for name, solver in SOLVERS.items()
     ],
 )
 
@@ -87,10 +85,10 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Verifi
 
 
 @pytest.mark.parametrize("instance", LARGER)
-@each_of(CONSUMERS)
+@each_of(PROGRAMS)
 def test_every_file_means_the_problem(verified: Callable[[str], Verification], consumer: str, instance: str):
     """Each file of the consumer's formats is read and agrees, or is refused for a reason of the table."""
-    entry, verification = CONSUMERS[consumer], verified(instance)
+    entry, verification = PROGRAMS[consumer], verified(instance)
     read = {f.file: f.verdict for f in verification.findings if f.consumer == consumer and f.step == "read"}
     files = [path.name for path in verification.folder.iterdir() if path.suffix[1:] in entry.formats]
     assert sorted(read) == sorted(files)
@@ -102,7 +100,7 @@ def test_every_file_means_the_problem(verified: Callable[[str], Verification], c
 def refuses(path: Path, solver: str) -> bool:
     problem = read_manifest(path.with_suffix(".manifest.json")).problem()
     held = carried(problem, FORMATS[path.suffix[1:]])
-    return solver in EXTERNALS and EXTERNALS[solver].refusal(held, "read") is not None
+    return solver in SOLVERS and SOLVERS[solver].refusal(held, "read") is not None
 
 
 @pytest.mark.parametrize("instance", LARGER)
@@ -122,7 +120,7 @@ def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     write_all(on_grid(1, 2), tmp_path, PROVEN, start=make_field(on_grid(1, 2)))
     found = [f for f in verify(tmp_path, seconds=250).findings if f.step == "solve"]
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
-    present = {solver for solver in SOLVERS if CONSUMERS[SOLVERS[solver]].present and not lacking(solver)}
+    present = {name for name, solver in SOLVERS.items() if not solver.missing}
     assert {f.consumer for f in found if f.verdict == Verdict.AGREES} == present
 
 
@@ -132,7 +130,7 @@ def test_the_result_lies_in_the_folder(verified: Callable[[str], Verification]):
     document = json.loads((found.folder / "verify.json").read_text(), parse_constant=pytest.fail)
     assert document == json.loads(json.dumps(found.document()))
     assert document["ok"] is True
-    assert set(document["versions"]) | set(document["absent"]) == set(CONSUMERS)
+    assert set(document["versions"]) | set(document["absent"]) == set(PROGRAMS)
     assert all(re.search(r"\d+\.\d+", words) for words in document["versions"].values())
     assert len(document["findings"]) == len(found.findings)
 
@@ -207,7 +205,7 @@ def forge(manifest: Path, path: Path, data: bytes) -> None:
 def test_a_wrong_file_is_noticed_by_every_consumer(spoiled: Verification, name: str):
     formulation, kind, *_ = WRONG[name]
     found = {f.consumer: f for f in spoiled.findings if f.problem == f"{name} {formulation}"}
-    expected = {entry.name for entry in CONSUMERS.values() if kind in entry.formats and entry.present}
+    expected = {entry.name for entry in PROGRAMS.values() if kind in entry.formats and entry.present}
     assert set(found) == expected
     blind = blind_to(name)
     for consumer, finding in found.items():
@@ -270,7 +268,7 @@ def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_absent_consumers_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
-    monkeypatch.setitem(CONSUMERS, "xpress", replace(CONSUMERS["xpress"], needs="no_such_package"))
+    monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
     found = verify(tmp_path, consumers=["highs", "xpress"])
     assert found.absent == {"xpress": "pip install xpress"}
     assert {f.consumer for f in found.findings} == {"highs"}
@@ -346,7 +344,7 @@ def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Work
     """A child process of each consumer."""
     folder = tmp_path_factory.mktemp("workers")
     with ExitStack() as stack:
-        yield {name: stack.enter_context(Worker(name, folder / name)) for name in CONSUMERS}
+        yield {name: stack.enter_context(Worker(name, folder / name)) for name in PROGRAMS}
 
 
 CLAIMS = [
@@ -378,7 +376,7 @@ def test_claims_are_true(
         assert {f.verdict for f in mine} & {Verdict.AGREES, Verdict.LIMIT, Verdict.NOT_TRIED}
     elif taking.answer == "no" and (path := verification.folder / f"small.{name}.{taking.format}").exists():
         optimum = min(f.objective for f in found if f.objective is not None)
-        assert not proves(workers[SOLVERS[solver]], path, solver, optimum, tmp_path / "result.npz")
+        assert not proves(workers[SOLVERS[solver].program], path, solver, optimum, tmp_path / "result.npz")
 
 
 def proves(worker: Worker, path: Path, solver: str, optimum: float, result: Path) -> bool:
@@ -386,14 +384,14 @@ def proves(worker: Worker, path: Path, solver: str, optimum: float, result: Path
     task = {"step": "solve", "path": str(path), "solver": solver, "seconds": 1, "result": str(result)}
     if worker.ask(task, 1)["kind"] != "done":
         return False
-    outcome = load(Outcome, result)
+    outcome = load(RawSolution, result)
     if not outcome.status.startswith("optimal") or outcome.objective is None:
         return False
     return same(outcome.objective, optimum)
 
 
 def test_reasons_have_a_remedy_or_name_the_limit():
-    for entry in EXTERNALS.values():
+    for entry in SOLVERS.values():
         for refusal in entry.refusals.values():
             assert len(refusal.reason) > 20
             assert "\n" not in refusal.reason
