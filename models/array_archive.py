@@ -61,8 +61,8 @@ class Expected:
 def pack_arrays(arrays: Arrays) -> bytes:
     """The bytes of a compressed .npz that depend on the arrays alone, not on the clock.
 
-    numpy.savez_compressed gives steady bytes too, but promises neither them nor, up to numpy 2.1, a way to refuse
-    pickles; its members are 20 bytes longer.
+    numpy.savez_compressed gives steady bytes too, but promises neither them nor, up to numpy 2.1, a way to
+    refuse pickles; its members are 20 bytes longer.
     """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -71,8 +71,8 @@ def read_sketch(
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
     size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
-    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`), in the
-    parts that curvature lines run through; an open drawing gets the whole rectangle.
+    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
+    in the parts that curvature lines run through; an open drawing gets the whole rectangle.
     mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
     from half its area on.
@@ -258,7 +258,7 @@ def _mask_on_grid(
 
 
 def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
-    """The pixels to solve for: the given mask or the inside of the outline, less what other strokes cut out."""
+    """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
     cut = others.amount >= CUT
     if given is not None:
         return given & ~cut
