@@ -134,9 +134,9 @@ def write_problem(
 ) -> Manifest:
     """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
 
-    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats written at once. Raises
-    OutputError, and InputError for an unknown format and for a problem that no manifest records: with columns fixed, or with
-    products lifted beforehand.
+    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats
+    written at once. Raises OutputError, and InputError for an unknown format and for a problem that no
+    manifest records: with columns fixed, or with products lifted beforehand.
     """
     _check_recordable(problem)
     with _pool(jobs) as pool:
@@ -149,7 +149,8 @@ def write_problem(
 def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
     """Threads that write files: nearly all the time is spent in NumPy, zlib and hashlib, where threads run side by side.
 
-    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is whole.
+    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
+    whole.
     """
     with ThreadPoolExecutor(checked(jobs)) as pool:
         try:
@@ -281,7 +282,8 @@ def _formulated(instance: Instance, name: str, start: CrossField | None, options
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
     """The jumps that a formulation takes as data, None where it has them as variables: those of `start`, by default of the improved greedy field.
 
-    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions are of one problem.
+    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions
+    are of one problem.
     """
     recipe = FORMULATIONS.get(name)
     if recipe is None or not recipe.fixed:

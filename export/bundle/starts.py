@@ -7,10 +7,11 @@
     scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
     slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
-Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS has the columns of these
-files: with products lifted where they are lifted, and ONE. SCIP reads a nonlinear objective as a variable of its own, under three
-names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl); all three are in its file with the value of what is not linear in the
-objective, and SCIP passes over the ones it does not know.
+Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS
+has the columns of these files: with products lifted where they are lifted, and ONE. SCIP reads a nonlinear
+objective as a variable of its own, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl); all
+three are in its file with the value of what is not linear in the objective, and SCIP passes over the ones it
+does not know.
 """
 
 from __future__ import annotations
@@ -155,8 +156,8 @@ def start_of(problem: Problem, field: CrossField) -> Start:
 def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float:
     """The objective of the start now in the file, in that solver's format.
 
-    Raises InputError for a solver that has no format of starts, UnsupportedBySolverError for one that does not take the problem;
-    InstanceError when the field is on another instance, OutputError.
+    Raises InputError for a solver that has no format of starts, UnsupportedBySolverError for one that does
+    not take the problem; InstanceError when the field is on another instance, OutputError.
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")

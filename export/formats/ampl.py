@@ -7,12 +7,14 @@
     minimize energy: sum{(r,c,h) in E} ( ...
     subject to c14{(r,c,h) in E}: s[r,c,h] >= ...
 
-What depends on the sketch stands in the .dat: I, S_c with theta and w, the weights, and the jumps where they are data. Only what AMPL and GNU MathProg share is used: no `solve`, `param pi` computed, strings in quotes,
-`mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear formulations, and evaluates every expression
-of the others once variables are turned into parameters, as the tests do. AMPL itself is not free; no test runs it.
+What depends on the sketch stands in the .dat: I, S_c with theta and w, the weights, and the jumps where they
+are data. Only what AMPL and GNU MathProg share is used: no `solve`, `param pi` computed, strings in quotes,
+`mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear formulations, and
+evaluates every expression of the others once variables are turned into parameters, as the tests do. AMPL
+itself is not free; no test runs it.
 
-Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod ends with comments that print an
-answer under our names, as a solution file that is read back.
+Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
+ends with comments that print an answer under our names, as a solution file that is read back.
 """
 
 from __future__ import annotations
@@ -50,7 +52,8 @@ SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .mod file. header: lines of comment, without the comment sign.
 
-    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns
+    fixed.
     """
     problem = form.problem
     check_indexed(problem, "mod", "nl, lp or mps")

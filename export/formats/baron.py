@@ -12,8 +12,9 @@
      + 2*((alpha_00_00 - ...)^2 + ...)       as declared, squares kept, one summand a line; negative numbers in brackets (B6)
     STARTING_POINT{ ... }
 
-Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of its own sections, and no rows (B5).
-No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections and grammar: BARON's user manual, section 4.
+Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of
+its own sections, and no rows (B5). No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections
+and grammar: BARON's user manual, section 4.
 """
 
 from __future__ import annotations

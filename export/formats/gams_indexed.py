@@ -6,11 +6,12 @@
     north(side), east(side)                  the way to pixel j: alpha_i is alpha(r,c), alpha_j is alpha(r-north(side),c+east(side))
     c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, printed from its declaration
 
-GAMS computes windows and jump bounds from theta by our formulas, in the same doubles. Lag and lead count places in an ordered set, hence the
-padded labels in their natural order; a neighbour outside the grid has no label and no pair. Names are not told apart by case (G4), so the
-set is S_c and not S. `beta` and `gamma` are functions of GAMS, but a declared symbol of that name wins, so that variables keep the
-names of the paper (tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of the scalar
-layout (gams.py).
+GAMS computes windows and jump bounds from theta by our formulas, in the same doubles. Lag and lead count
+places in an ordered set, hence the padded labels in their natural order; a neighbour outside the grid has no
+label and no pair. Names are not told apart by case (G4), so the set is S_c and not S. `beta` and `gamma` are
+functions of GAMS, but a declared symbol of that name wins, so that variables keep the names of the paper
+(tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
+the scalar layout (gams.py).
 """
 
 from __future__ import annotations
@@ -41,8 +42,9 @@ SECOND: Final = "r-north(side),c+east(side)"
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file in indexed layout, block by block.
 
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
-    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns fixed.
+    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
+    levels. Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with
+    columns fixed.
     """
     problem, instance = form.problem, form.problem.instance
     check_indexed(problem, "gms in indexed layout", "the scalar layout")

@@ -9,14 +9,15 @@
     solve m using minlp minimizing objvar;   the type by what is in the model (G9)
     $ifThen set RESULTS ... $endIf           after `gams x.gms --RESULTS=x.csv`: the answer as lines name,value
 
-Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is a cosine. Numbers are
-shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No `$include`, no `$call`, and `put` only behind
-the switch RESULTS, because NEOS refuses them (G19).
+Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is
+a cosine. Numbers are shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No
+`$include`, no `$call`, and `put` only behind the switch RESULTS, because NEOS refuses them (G19).
 
-The CSV starts with model_status, solver_status (GAMS's numbers: 1 optimal, 2 locally optimal, 8 integer solution, 4, 5, 10
-infeasible, ...; 1 normal completion, 2 iterations, 3 time, ...) and objective; then all columns in order. Values have 16 digits,
-which is what put gives (nr=2, nd=15, nw=24: R7), with a blank where a minus would stand. Without a solution they are
-the start, so look at the status first; the same holds for a column in no term, which is not in GAMS's model (G11).
+The CSV starts with model_status, solver_status (GAMS's numbers: 1 optimal, 2 locally optimal, 8 integer
+solution, 4, 5, 10 infeasible, ...; 1 normal completion, 2 iterations, 3 time, ...) and objective; then all
+columns in order. Values have 16 digits, which is what put gives (nr=2, nd=15, nw=24: R7), with a blank where
+a minus would stand. Without a solution they are the start, so look at the status first; the same holds for a
+column in no term, which is not in GAMS's model (G11).
 
 G-numbers: docs/format-rules.md.
 """
@@ -73,7 +74,8 @@ WIDTH: Final = 160
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file in scalar layout, block by block.
 
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as levels.
+    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
+    levels.
     """
     problem, names = form.problem, form.names
     blocks = {

@@ -1,4 +1,4 @@
-"""What indexed GAMS and AMPL share: equations over index sets, printed from the declaration in the notation of the paper."""
+"""What indexed GAMS and AMPL share: equations over index sets, in the notation of the paper."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _text(pieces: list[Piece]) -> str:
 
 
 def check_indexed(problem: Problem, layout: str, instead: str) -> None:
-    """Nothing, when data say all of the problem; else raises UnsupportedByFormatError, and so for a weight that solvers would drop."""
+    """Nothing, or UnsupportedByFormatError: for columns fixed, and for a weight that solvers would drop."""
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(f"{layout} has no place for columns fixed one by one; write {instead}")

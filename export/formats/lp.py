@@ -15,8 +15,9 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
     Generals / Binaries                never Integers (L5)
     End
 
-A constant is carried by the column ONE fixed to 1 (L1, L2); one term a line, so that no line is long (L30). A model without rows gets
-the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip. L-numbers: docs/format-rules.md.
+A constant is carried by the column ONE fixed to 1 (L1, L2); one term a line, so that no line is long (L30). A
+model without rows gets the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip. L-numbers:
+docs/format-rules.md.
 """
 
 from __future__ import annotations

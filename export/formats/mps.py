@@ -105,8 +105,9 @@ def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterato
 def _incident(family: Bound, term: Term) -> list[tuple[int, Ints | None, Term]]:
     """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
 
-    None where row and column have the same number. Pairs are numbered by their first pixel, the upper before the right one,
-    so that the rows of a pixel are those of its pairs to the left, upwards, to the right and downwards, in this order.
+    None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
+    the right one, so that the rows of a pixel are those of its pairs to the left, upwards, to the right and
+    downwards, in this order.
     """
     instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":

@@ -13,9 +13,10 @@ The order of columns and rows is that of `writing.nl_layout`. Header, line by li
     longest names of rows, columns
     0 0 0 0 0                          no defined variables (N7)
 
-Segments: C (rows), O, x (start), r, b, k (cumulative column counts, N4), J, G; none empty (N3), no comments (N6). Opcodes: o0 + , o2 * ,
-o5 power, o16 minus, o46 cos, o54 sum of three or more (N14). The objective is written as declared, factored, with its constant inside;
-of a nonlinear row the linear part stands in J and the constant in r. Binary: one letter, little-endian int32 and float64.
+Segments: C (rows), O, x (start), r, b, k (cumulative column counts, N4), J, G; none empty (N3), no comments
+(N6). Opcodes: o0 + , o2 * , o5 power, o16 minus, o46 cos, o54 sum of three or more (N14). The objective is
+written as declared, factored, with its constant inside; of a nonlinear row the linear part stands in J and
+the constant in r. Binary: one letter, little-endian int32 and float64.
 """
 
 from __future__ import annotations

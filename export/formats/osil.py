@@ -9,12 +9,14 @@
     <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               the full coefficient, without one-half; idx -1 is the objective (O1, O2)
     <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms of the objective beyond quadratic, as declared, one <nl> (O2)
 
-What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are. Indices count from 0, in the order of
-our columns and rows. Counts stand before the lists. What the file holds is said in <description>, not in comments.
+What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
+Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
+is said in <description>, not in comments.
 
-Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so each stands once; `mult` of variables and
-rows is not taken, so each has its line; <sum> and <product> take any number of arguments, <square> and <cos> one; a constant of the objective becomes
-a fixed variable `objconstvar`. O-numbers: docs/format-rules.md.
+Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
+each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
+any number of arguments, <square> and <cos> one; a constant of the objective becomes a fixed variable
+`objconstvar`. O-numbers: docs/format-rules.md.
 """
 
 from __future__ import annotations

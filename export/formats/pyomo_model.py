@@ -1,8 +1,9 @@
 """A problem as a Pyomo model: for people who go on in Pyomo, and a second opinion on the files.
 
-Every term and row is the declaration itself, evaluated over Pyomo variables. Components are named as in the files, `alpha[row, column]`,
-`p1[row, column, side]` with side `u` (upper neighbour) or `r` (right one), row families by their tag, the objective `obj`.
-Python work grows with the number of pixels here: it is meant for small sketches, `write` for large ones.
+Every term and row is the declaration itself, evaluated over Pyomo variables. Components are named as in the
+files, `alpha[row, column]`, `p1[row, column, side]` with side `u` (upper neighbour) or `r` (right one), row
+families by their tag, the objective `obj`. Python work grows with the number of pixels here: it is meant for
+small sketches, `write` for large ones.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ _FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
 def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
     """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
 
-    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has None there.
+    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has
+    None there.
     start: a field whose complete point is set as the value of every variable. Raises InstanceError when it is
     on another instance.
     """
@@ -68,7 +70,7 @@ def places(instance: Instance, over: IndexSet) -> list[Place]:
 
 
 def _domain(form: Canonical, block: Block) -> Any:
-    """Pyomo's domain of a block; bounds are given beside it, so that a binary column fixed at 0 or 1 stays binary."""
+    """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary, for bounds stand beside."""
     if not block.integer:
         return pyo.Reals
     return pyo.Binary if form.layout.binary[block.columns].all() else pyo.Integers

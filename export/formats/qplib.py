@@ -14,12 +14,14 @@
                                    start, duals of rows (with rows), duals of bounds
     count, then `i name`           names of variables, and of rows
 
-Everything counts from 1. Objective and rows are x'Qx/2 + bx with a *lower triangular* Q, not the triangle of a symmetric one: a square's entry and
-a product's entry are both twice the coefficient. So says qplib.zib.de/doc.html (Q_row,col = 0 for row < col); Jij-Inc/ommx#1207 and #1209 found it
-so in all 453 instances against their GAMS models. No line is comment alone and none is empty, for not every reader skips those.
+Everything counts from 1. Objective and rows are x'Qx/2 + bx with a *lower triangular* Q, not the triangle of
+a symmetric one: a square's entry and a product's entry are both twice the coefficient. So says
+qplib.zib.de/doc.html (Q_row,col = 0 for row < col); Jij-Inc/ommx#1207 and #1209 found it so in all 453
+instances against their GAMS models. No line is comment alone and none is empty, for not every reader skips
+those.
 
-Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic programming instances,
-Mathematical Programming Computation 11 (2019).
+Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic
+programming instances, Mathematical Programming Computation 11 (2019).
 """
 
 from __future__ import annotations

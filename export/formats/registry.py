@@ -1,7 +1,7 @@
 """The table of file formats, and the one function that writes a problem to a file.
 
-A format states what it carries; what it cannot carry is lifted, which is exact for whole jumps and said to be a relaxation for others,
-or refused by name before the first byte.
+A format states what it carries; what it cannot carry is lifted, which is exact for whole jumps and said to be
+a relaxation for others, or refused by name before the first byte.
 """
 
 from __future__ import annotations
@@ -77,8 +77,10 @@ def _bar(form: Canonical, header: list[str], start: Floats | None, _dialect: str
 class Format:
     """A file format: what it carries and how it is written.
 
-    degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default first;
-    starts: whether a starting point has a place in it; default: whether it is written when no format is asked for.
+    degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
+    first;
+    starts: whether a starting point has a place in it; default: whether it is written when no format is asked
+    for.
     """
 
     name: str
@@ -191,9 +193,10 @@ def write(
 
     .nl gets .row and .col beside it, .mod its .dat.
 
-    dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point is the starting point
-    where the format has a place for one. Same problem, same bytes. Raises UnsupportedByFormatError before a byte is written,
-    InputError for an unknown suffix or dialect, OutputError.
+    dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point
+    is the starting point where the format has a place for one. Same problem, same bytes. Raises
+    UnsupportedByFormatError before a byte is written, InputError for an unknown suffix or dialect,
+    OutputError.
     """
     path = Path(path)
     entry = format_of(path)

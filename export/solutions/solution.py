@@ -1,7 +1,7 @@
 """A solution: what a solver's file says, mapped by name onto a problem and checked against the instance.
 
-Nothing in the file is believed: integers are rounded, objective and violations are computed again from the declaration, and a claim that
-they contradict is not passed on.
+Nothing in the file is believed: integers are rounded, objective and violations are computed again from the
+declaration, and a claim that they contradict is not passed on.
 """
 
 from __future__ import annotations
@@ -28,18 +28,20 @@ ROUND: Final = 1e-5
 """An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
 
 LARGEST: Final = 1e8
-"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a column's, and could not be squared
-or be a jump of 32 bits."""
+"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a
+column's, and could not be squared or be a jump of 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A point of a problem with what was claimed and what was recomputed.
 
-    problem: as the file's columns have it (with products lifted, where the format needed it); point: float (columns,), or None.
-    claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual bound, where one is known.
-    status is what remains of the claim. rounded: the furthest that rounding moved an integer column. tolerance: how far the point may be
-    off before it contradicts the claim, in units of a column. interrupted: whether the user ended the search.
+    problem: as the file's columns have it (with products lifted, where the format needed it); point: float
+    (columns,), or None.
+    claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual
+    bound, where one is known. status is what remains of the claim. rounded: the furthest that rounding moved
+    an integer column. tolerance: how far the point may be off before it contradicts the claim, in units of a
+    column. interrupted: whether the user ended the search.
     """
 
     problem: Problem
@@ -133,7 +135,7 @@ def read_solution(
 
 
 def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
-    """What the solver was given; where there are names and no manifest says it, those of lifted products tell."""
+    """What the solver was given: by the manifest, or else by the names of lifted products."""
     if raw.names is None:
         return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
     forms = {each.sha256: each for each in held.values()}
@@ -181,7 +183,7 @@ def _check_range(point: Floats, problem: Problem) -> None:
 
 
 def _by_position(raw: RawSolution, form: Canonical) -> Floats:
-    """The point of a file without names; a column that the solver's model lacks, for it stands in no term, may be anything."""
+    """The point of a file without names; a column in no term, which the solver's model lacks, is anything."""
     problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
     point[order] = values_in_order(len(order), form.row_count(raw.order), raw)

@@ -77,7 +77,8 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
 def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
     """What differs between the algebra of a file and the problem, the first thing only; empty when nothing does.
 
-    tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are compared as well.
+    tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
+    compared as well.
     """
     expected = of_problem(problem)
     for kind in ("columns", "rows"):

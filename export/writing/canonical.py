@@ -1,7 +1,8 @@
-"""The canonical form: what stands between a problem and everything that writes its files or reads their answers.
+"""The canonical form between a problem and what writes its files or reads their answers.
 
-Which columns the files have (ONE among them), of which kind they are, what they cost, what limits the rows, in which order each kind of
-file lists the columns: every answer is given here, once. MathOptInterface's bridges and linopy's `matrices` are the model.
+Which columns the files have (ONE among them), of which kind they are, what they cost, what limits the rows,
+in which order each kind of file lists the columns: every answer is given here, once. MathOptInterface's
+bridges and linopy's `matrices` are the model.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from .records import Texts, check_coefficients, of_bytes
 Kind = Literal["continuous", "binary", "integer"]
 
 Order = Literal["nl", "lp", "mps", "mod"]
-"""Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put ONE first and last, and of a .mod GLPK numbers
-the columns as it meets them."""
+"""Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put ONE first and last,
+and of a .mod GLPK numbers the columns as it meets them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Canonical:
-    """A problem as files hold it: products lifted already where the format needs that (`formats.registry.carried`)."""
+    """A problem as files hold it, with products lifted where the format needs that (`registry.carried`)."""
 
     problem: Problem
 
@@ -51,7 +52,8 @@ class Canonical:
     def has_one(self) -> bool:
         """Whether LP and MPS have the column ONE, fixed to 1.
 
-        They have it for a constant, which is its cost, and for a model without rows, whose only row is `c_ONE: ONE = 1`.
+        They have it for a constant, which is its cost, and for a model without rows, whose only row is
+        `c_ONE: ONE = 1`.
         """
         return not self.problem.rows or self.constant != 0
 
@@ -62,7 +64,10 @@ class Canonical:
 
     @cached_property
     def costs(self) -> Floats:
-        """Cost of every column, shape (columns,); zero where it has none. Raises UnsupportedByFormatError for an extreme one."""
+        """Cost of every column, shape (columns,), zero for most.
+
+        Raises UnsupportedByFormatError for an extreme one.
+        """
         index, coefficient = self.problem.merged_objective(1)
         costs = np.zeros(self.problem.columns)
         costs[index[:, 0]] = coefficient
@@ -70,7 +75,10 @@ class Canonical:
         return costs
 
     def products(self) -> tuple[Ints, Floats]:
-        """The objective's products: columns (k, 2) and coefficients (k,). Raises UnsupportedByFormatError for an extreme one."""
+        """The objective's products: columns (k, 2) and coefficients (k,).
+
+        Raises UnsupportedByFormatError for an extreme one.
+        """
         index, coefficient = self.problem.merged_objective(2)
         check_coefficients(coefficient, "the objective")
         return index, coefficient

@@ -30,7 +30,7 @@ def of_objective(problem: Problem) -> tuple[str, str]:
 
 
 def _is_convex(family: Bound) -> bool:
-    """Whether each summand of a quadratic family is convex: its own small Hessian has no negative eigenvalue."""
+    """Whether each summand of a quadratic family has a Hessian without negative eigenvalue."""
     products = family.of_degree(2)
     if not products:
         return True
@@ -64,8 +64,8 @@ def of_rows(problem: Problem) -> str:
 def probtype(problem: Problem) -> str | None:
     """QPLIB's three letters, of objective, variables and constraints; None for what is beyond quadratic.
 
-    L linear, D convex and diagonal, C convex, Q any; C continuous, B binary, M with binaries, I integer, G with integers; N none, B bounds,
-    L linear, C convex, Q any.
+    L linear, D convex and diagonal, C convex, Q any; C continuous, B binary, M with binaries, I integer, G
+    with integers; N none, B bounds, L linear, C convex, Q any.
     """
     if max(problem.objective_degree, problem.row_degree) > 2:
         return None

@@ -1,8 +1,9 @@
 """Expressions of a declaration as text, in their factored form: one walk for every algebraic language.
 
-The walk knows precedence, signs and brackets. A language says how symbols, constants and powers look. What holds no variable
-is *data*: the walk hands its largest such pieces over as a whole, so that a language may print them or evaluate them. The result is
-a list of pieces, bytes for what all records share and parts (records.py) for what differs.
+The walk knows precedence, signs and brackets. A language says how symbols, constants and powers look. What
+holds no variable is *data*: the walk hands its largest such pieces over as a whole, so that a language may
+print them or evaluate them. The result is a list of pieces, bytes for what all records share and parts
+(records.py) for what differs.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def is_data(family: Bound, expression: sp.Expr) -> bool:
 
 
 def split(family: Bound, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
-    """A sum or a product in two: what is data as one expression, None without any, and its other parts in order."""
+    """A sum or a product in two: its data as one expression (or None), and its other parts in order."""
     data = [part for part in chain.args if is_data(family, part)]
     others = [part for part in chain.args if part not in data]
     return (chain.func(*data) if data else None), others

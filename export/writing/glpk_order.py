@@ -1,7 +1,8 @@
-"""The order in which GLPK numbers the columns of our .mod: block by block, and in a block as the statements of the model name them first.
+"""The order in which GLPK numbers the columns of our .mod: in a block, as the model names them first.
 
-Every pair names its second pixel before its first one: (14) and (16) have both on the right side, and GLPK adds from the back. Then the
-strokes follow, and of the skew all pixels. Order: GLPK 5.0, `glpsol -m x.mod -d x.dat --wglp` names the columns it numbers.
+Every pair names its second pixel before its first one: (14) and (16) have both on the right side, and GLPK
+adds from the back. Then the strokes follow, and of the skew all pixels. Order: GLPK 5.0, `glpsol -m x.mod -d
+x.dat --wglp` names the columns it numbers.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Names of columns and rows: `alpha_012_034`, `p1_012_034_u`, `c14_012_034_r`.
 
-Block or row tag, row and column of the pixel (for a pair: of its first pixel), and for a pair `u` for the upper or `r` for the right
-neighbour. Zero-padded to the grid's width: at most 15 characters, no leading e, i or n, unique without regard to case
-(docs/format-rules.md, W6), so that a solver's log can be read and every solution file maps back without the model.
+Block or row tag, row and column of the pixel (for a pair: of its first pixel), and for a pair `u` for the
+upper or `r` for the right neighbour. Zero-padded to the grid's width: at most 15 characters, no leading e, i
+or n, unique without regard to case (docs/format-rules.md, W6), so that a solver's log can be read and every
+solution file maps back without the model.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ def problem_name(problem: Problem) -> str:
 class Names:
     """Names of a problem's columns and rows as pieces of records: a tag, and words for where the elements lie.
 
-    The words are the same for all blocks and families over an index set, so that there are few of them and each is made once.
+    The words are the same for all blocks and families over an index set, so that there are few of them and
+    each is made once.
     """
 
     def __init__(self, problem: Problem) -> None:

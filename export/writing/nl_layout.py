@@ -1,7 +1,7 @@
-"""Order of columns and rows in an .nl file: nine groups of columns, and nonlinear rows first (docs/format-rules.md, N1, N2).
+"""Order in an .nl file: nine groups of columns, nonlinear rows first (docs/format-rules.md, N1, N2).
 
-Nonlinear in objective and rows; in rows alone; in the objective alone; linear. The first three are split into continuous and integer, the
-last into continuous, binary and integer.
+Nonlinear in objective and rows; in rows alone; in the objective alone; linear. The first three are split into
+continuous and integer, the last into continuous, binary and integer.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Layout:
 
     @cached_property
     def binary(self) -> Bools:
-        """True for integer columns within [0, 1], which the header counts as binary (N1): one that is fixed at 0 or 1 too."""
+        """True for integer columns within [0, 1], fixed ones too: the header counts them as binary (N1)."""
         problem = self.problem
         found: Bools = problem.integer & (problem.lower >= 0) & (problem.upper <= 1)
         return found

@@ -1,9 +1,10 @@
 """Blocks of equal records as bytes: one template, holes filled by NumPy, no Python per record.
 
-A record is a list of parts: literal bytes, words from a table (names, numbers) or decimal integers. A block of records is a matrix of
-bytes, one row a record. Literals are laid out once; a hole is filled for all records of the block by one strided copy of whole words.
-Where the words of a block differ in length they are padded with NUL, and the padding is dropped in one step; names of one
-family all have one length, so that most blocks have none. Memory is one block however many records there are.
+A record is a list of parts: literal bytes, words from a table (names, numbers) or decimal integers. A block
+of records is a matrix of bytes, one row a record. Literals are laid out once; a hole is filled for all
+records of the block by one strided copy of whole words. Where the words of a block differ in length they are
+padded with NUL, and the padding is dropped in one step; names of one family all have one length, so that most
+blocks have none. Memory is one block however many records there are.
 """
 
 from __future__ import annotations
@@ -166,7 +167,8 @@ def filled(parts: Pieces, count: int) -> Bytes:
 class _Template:
     """The pieces of a record, and the matrix of bytes of the block at hand: literals stay, holes are filled anew.
 
-    A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes, which is rare.
+    A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
+    which is rare.
     """
 
     def __init__(self, parts: Sequence[Piece | OnlyWhere]) -> None:
@@ -222,7 +224,8 @@ class _Template:
     def _chosen(self, present: Sequence[Bools]) -> Bytes:
         """The bytes of the records at hand without the pieces that they lack.
 
-        Few patterns of presence occur: what stands side by side in one of them is moved for all of its records at once.
+        Few patterns of presence occur: what stands side by side in one of them is moved for all of its
+        records at once.
         """
         pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
         there = np.bincount(pattern)

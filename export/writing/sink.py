@@ -1,10 +1,11 @@
 """Bytes on their way to a file: counted and hashed as they pass, or compressed, in threads beside the writer.
 
-zlib, hashlib and the system let other threads run while they work, so that a file takes as long as the slowest of its steps, or as long as
-all of them shared by the cores. A small file begins no thread.
+zlib, hashlib and the system let other threads run while they work, so that a file takes as long as the
+slowest of its steps, or as long as all of them shared by the cores. A small file begins no thread.
 
-A compressed file is one gzip member without name and time. It is made of pieces that are compressed on their own and end on a byte boundary
-(Z_FULL_FLUSH), as pigz does it, so that the pieces of one file go to all cores; piece by piece the bytes depend on the content alone.
+A compressed file is one gzip member without name and time. It is made of pieces that are compressed on their
+own and end on a byte boundary (Z_FULL_FLUSH), as pigz does it, so that the pieces of one file go to all
+cores; piece by piece the bytes depend on the content alone.
 """
 
 from __future__ import annotations

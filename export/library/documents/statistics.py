@@ -1,6 +1,7 @@
 """What is counted of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
 
-The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to the instance.
+The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to
+the instance.
 """
 
 from __future__ import annotations
