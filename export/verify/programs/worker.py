@@ -48,11 +48,12 @@ class Worker:
         child = self._running()
         assert child.stdin is not None
         limit = seconds + GRACE
-        try:
+        with suppress(BrokenPipeError):  # of a child that is dead already: its end says how it died
             child.stdin.write(json.dumps(task) + "\n")
             child.stdin.flush()
+        try:
             answer = self._answers.get(timeout=limit)
-        except (OSError, queue.Empty):
+        except queue.Empty:
             self._stop()
             return {"kind": "failed", "words": f"took longer than {limit:g} s and was ended"}
         if answer:
@@ -99,7 +100,7 @@ class Worker:
             child.kill()
         child.wait()
         if child.stdin is not None:
-            with suppress(BrokenPipeError):  # a task that the child did not take any more
+            with suppress(BrokenPipeError):  # what was not yet written goes with the child
                 child.stdin.close()
 
     def _last_words(self) -> str:

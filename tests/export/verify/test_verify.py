@@ -253,11 +253,14 @@ def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     """A consumer's process that is killed, and one that does not answer: both are answers, and the next task gets a new child."""
     with Worker("highs", tmp_path / "highs") as worker:
         assert re.match(r"\d+\.", worker.ask({"step": "version"}, 250)["words"])
-        child = worker._child
-        assert child is not None
-        child.kill()
-        assert "SIGKILL" in worker.ask({"step": "version"}, 250)["words"]
-        assert worker.ask({"step": "version"}, 250)["kind"] == "done"
+        for dead_before_it_is_asked in (False, True):
+            child = worker._child
+            assert child is not None
+            child.kill()
+            if dead_before_it_is_asked:
+                child.wait()
+            assert "SIGKILL" in worker.ask({"step": "version"}, 250)["words"]
+            assert worker.ask({"step": "version"}, 250)["kind"] == "done"
         monkeypatch.setattr(consumer_worker, "GRACE", 0.0)
         late = worker.ask({"step": "version"}, 1e-6)
         assert late["kind"] == "failed"
