@@ -1,5 +1,5 @@
 """`python -m crossfield`: the command line."""
 
-from .export.cli import main
+from .export.cli.app import main
 
 main()

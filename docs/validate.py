@@ -1,6 +1,7 @@
-"""Make docs/validation.md: one small instance to proven optimality through every route: `python docs/validate.py` (some four minutes).
+"""Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a file that was written, a program that read it, and its answer, checked by `crossfield verify --solve`.
+Every row is a file that was written, a program that read it, and its answer, checked by `crossfield verify
+--solve`.
 """
 
 from __future__ import annotations
@@ -14,14 +15,13 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.capabilities import EXTERNALS, takes
-from crossfield.export.consumers import CONSUMERS
-from crossfield.export.manifest import write_all
-from crossfield.export.starts import STARTS
-from crossfield.export.tables import smallest_problems
-from crossfield.export.verify import Finding, Verdict, Verification, verify
-from crossfield.models.formulations import FORMULATIONS
-from crossfield.models.instance import GAUGES, Gauge, Instance
+from crossfield.export.bundle.manifest import write_all
+from crossfield.export.bundle.starts import STARTS
+from crossfield.export.cli.tables import smallest_problems
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
+from crossfield.export.verify.verify import Finding, Verdict, Verification, verify
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import markdown, said
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -75,7 +75,7 @@ def run(gauge: Gauge, facet: str, formulations: tuple[str, ...], seconds: float)
 
 def route(finding: Finding) -> list[str]:
     """A row about a solve."""
-    title = EXTERNALS[finding.consumer].title
+    title = SOLVERS[finding.consumer].title
     value = "" if finding.objective is None else f"{finding.objective:.9f}"
     bound = "" if finding.bound is None else f"{finding.bound:.9f}"
     words = {
@@ -95,7 +95,10 @@ def routes(main: Run) -> list[str]:
         found = main.of(name)
         proven = [f.objective for f in found if f.proven and f.objective is not None]
         agree = (
-            f"{len(proven)} routes prove an optimum; the furthest two are {max(proven) - min(proven):.1e} apart."
+            (
+                f"{len(proven)} routes prove an optimum; "
+                f"the furthest two are {max(proven) - min(proven):.1e} apart."
+            )
             if proven
             else "No route proves an optimum in the time."
         )
@@ -106,7 +109,7 @@ def routes(main: Run) -> list[str]:
             agree,
             markdown(("solver", "file", "objective", "bound", "s", "result"), [route(f) for f in tried]),
         ]
-        reasons = sorted({f"- {EXTERNALS[f.consumer].title}: {f.verdict}: {f.reason}." for f in rest})
+        reasons = sorted({f"- {SOLVERS[f.consumer].title}: {f.verdict}: {f.reason}." for f in rest})
         parts += ["\n".join(reasons)] if reasons else []
     return parts
 
@@ -125,6 +128,24 @@ def same_problem(main: Run) -> str:
             proven = any(f.proven for f in main.of(name))
             rows.append([words, f"`{name}`", f"{best:.9f}", "yes" if proven else "no"])
     return markdown(("problem", "formulation", "best objective", "proven"), rows)
+
+
+def in_short(main: Run, runs: list[Run]) -> str:
+    """How many files were read, how many as meant, and for how many formulations an optimum is proven."""
+    found = [f for each in runs for f in each.result.findings if f.step == "read"]
+    read = sum(f.verdict == Verdict.AGREES for f in found)
+    wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
+    values = [
+        [f.objective for f in main.of(name) if f.proven and f.objective is not None] for name in FORMULATIONS
+    ]
+    proven = [each for each in values if each]
+    apart = max(max(each) - min(each) for each in proven)
+    return (
+        f"{len(PROGRAMS)} programs read {read} files as they were meant, and {wrong} otherwise. "
+        f"Of the {len(FORMULATIONS)} formulations {len(proven)} are proven optimal "
+        f"by {min(map(len, proven))} to {max(map(len, proven))} routes each. "
+        f"The proven optima of one formulation are at most {apart:.1e} apart."
+    )
 
 
 def errata(runs: list[Run]) -> str:
@@ -155,7 +176,7 @@ def errata(runs: list[Run]) -> str:
 def readings(runs: list[Run]) -> str:
     """How many files each program read, and with what result."""
     rows = []
-    for name, entry in CONSUMERS.items():
+    for name, entry in PROGRAMS.items():
         found = [f for each in runs for f in each.result.findings if f.consumer == name and f.step == "read"]
         counts = [
             str(sum(f.verdict == verdict for f in found))
@@ -174,17 +195,13 @@ def readings(runs: list[Run]) -> str:
 def capabilities() -> str:
     """Who takes what, with the reasons below."""
     marks = {"yes": "yes", "local": "local", "no": "-"}
-    rows = [
-        [f"`{p.name}`", *(marks[takes(p, name).answer] for name in EXTERNALS)] for p in smallest_problems()
-    ]
+    rows = [[f"`{p.name}`", *(marks[takes(p, name).answer] for name in SOLVERS)] for p in smallest_problems()]
     reasons = [
         f"- {entry.title}, {trait}: {refusal.reason}."
-        for entry in EXTERNALS.values()
+        for entry in SOLVERS.values()
         for trait, refusal in entry.refusals.items()
     ]
-    return f"{markdown(('formulation', *(e.title for e in EXTERNALS.values())), rows)}\n\n" + "\n".join(
-        reasons
-    )
+    return f"{markdown(('formulation', *(e.title for e in SOLVERS.values())), rows)}\n\n" + "\n".join(reasons)
 
 
 def main() -> None:
@@ -198,15 +215,19 @@ def main() -> None:
         if (gauge, facet) != ("strokes", "hull")
     ]
     runs = [main_run, *rest]
-    grid = f"{SHAPE[0]} x {SHAPE[1]} pixels, {STROKES} of them with a stroke in a random direction (seed {SEED}), w_beta = 0.001"
+    grid = f"{SHAPE[0]} x {SHAPE[1]} pixels, {STROKES} of them with a stroke "
+    grid += f"in a random direction (seed {SEED}), w_beta = 0.001"
     parts = [
         "# One instance, all routes",
         said("python docs/validate.py"),
         (
-            f"An instance of {grid}, in all formulations and all formats, handed to every program that can be had for free. Objectives are recomputed "
-            f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each solve, on one thread where that can be set. "
+            f"An instance of {grid}, in all formulations and all formats, handed to every program "
+            "that can be had for free. Objectives are recomputed "
+            f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each "
+            "solve, on one thread where that can be set. "
             "Optima must agree to 1e-6. `crossfield verify DIR --solve` does the same for any folder."
         ),
+        in_short(main_run, runs),
         "## Reading",
         readings(runs),
         "## The same problem in several formulations",
@@ -214,7 +235,8 @@ def main() -> None:
         *routes(main_run),
         "## Gauge and facet",
         (
-            "The misprints of the paper as numbers. With the printed facet (26) the optimum falls below the energy of the field it stands for; with the "
+            "The misprints of the paper as numbers. With the printed facet (26) the optimum falls "
+            "below the energy of the field it stands for; with the "
             "printed box (1) it rises."
         ),
         errata(runs),
@@ -224,7 +246,7 @@ def main() -> None:
         "## Starting points",
         markdown(
             ("solver", "suffix", "how"),
-            [[EXTERNALS[name].title, entry.suffix, entry.use] for name, entry in STARTS.items()],
+            [[SOLVERS[name].title, entry.suffix, entry.use] for name, entry in STARTS.items()],
         ),
     ]
     (DOCS / "validation.md").write_text("\n\n".join(parts) + "\n")

@@ -2,16 +2,54 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
+from typing import Final
+
+LONGEST: Final = 1000
+"""Characters of a message, its file aside."""
+QUOTED: Final = 80
+"""Characters of a text from a file inside of a message."""
+_HEAD: Final = (
+    0.7  # part of a shortened text that is its beginning; the rest is its end, where the remedy stands
+)
+
+
+def printable(text: str) -> str:
+    """The text on one line, safe for a terminal: control,
+    bidirectional and other invisible characters as their escapes.
+    """
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(map(_visible, line))
+
+
+def _visible(character: str) -> str:
+    if character == " " or unicodedata.category(character)[0] not in "CZ":
+        return character
+    return character.encode("unicode_escape").decode("ascii")
+
+
+def shortened(text: object, most: int = QUOTED) -> str:
+    """A text from a file for a message: printable,
+    with its middle left out when it is longer than `most` characters.
+    """
+    try:
+        whole = str(text)
+    except ValueError:  # a whole number of more digits than Python writes
+        whole = "a number of thousands of digits"
+    beyond = len(whole) > 2 * most  # do not make megabytes printable to show a line of them
+    line = printable(whole[:most] + "..." + whole[-most:] if beyond else whole)
+    head = int(_HEAD * most)
+    return line if len(line) <= most else f"{line[:head]} ... {line[head + 5 - most :]}"
 
 
 class CrossfieldError(Exception):
     """Base of all errors that crossfield raises on purpose."""
 
     def __init__(self, message: str, *, file: str | Path | None = None) -> None:
-        """Keep the message on one line, led by the file it is about."""
-        line = " ".join(message.split())
-        super().__init__(f"{file}: {line}" if file is not None else line)
+        """Keep the message on one line that is safe to print, led by the file it is about."""
+        line = shortened(message, LONGEST)
+        super().__init__(f"{printable(str(file))}: {line}" if file is not None else line)
         self.file = file
 
 

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
+import re
+import secrets
+import shutil
+import socket
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from typing import IO
+from typing import IO, Final
 
 from .errors import InputError, OutputError
+
+PART: Final = ".part"
+"""Ending of the names of temporary neighbours, which begin with a dot."""
+_MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
+_LONGEST: Final = 100  # characters of a name that a neighbour's name repeats
 
 
 @contextmanager
@@ -21,15 +31,15 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
     Raises OutputError when the folder cannot be written or the disk is full.
     """
     path = Path(path)
+    temporary = neighbour(path)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        remove_dead(path.parent)
+        stream = temporary.open("xb")
     except OSError as error:
         raise OutputError(f"cannot be written: {_reason(error)}; choose another folder", file=path) from error
-    temporary = Path(name)
     try:
-        with os.fdopen(handle, "wb") as stream:
+        with stream:
             yield stream
-        temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
         raise OutputError(
@@ -39,6 +49,47 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
         temporary.unlink(missing_ok=True)
 
 
+def neighbour(path: Path) -> Path:
+    """A name beside `path` that no other writer uses: it tells the machine and the process."""
+    return path.with_name(f".{path.name[:_LONGEST]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}{PART}")
+
+
+@lru_cache(maxsize=1024)
+def remove_dead(folder: Path) -> None:
+    """Remove the temporary files and folders that killed processes of this machine have left in a folder;
+    looked for once in a process.
+
+    Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and
+    of other machines.
+    """
+    for entry in os.scandir(folder):
+        mark = _MARK.fullmatch(entry.name)
+        if mark is None or mark[1] != _machine() or _lives(int(mark[2])):
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            shutil.rmtree(entry.path, ignore_errors=True)
+        else:
+            Path(entry.path).unlink(missing_ok=True)
+
+
+def _machine() -> str:
+    """Eight digits for the name of this machine."""
+    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+
+
+def _lives(process: int) -> bool:
+    """Whether a process may be running."""
+    if os.name == "nt":  # signal 0 would end it there
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
 def write_bytes(path: str | Path, data: bytes) -> Path:
     """The path, now holding `data`. Raises OutputError."""
     with replacing(path) as stream:
@@ -46,11 +97,21 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     return Path(path)
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """The whole content of a file. Raises InputError when it is missing, a folder, or unreadable."""
+def read_bytes(path: str | Path, most: int | None = None) -> bytes:
+    """The whole content of a file.
+
+    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes.
+
+    With `most` it must be a plain file, because nothing else tells its length.
+    """
     try:
+        status = Path(path).stat()
+        if most is not None and not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+            raise InputError("cannot be read: is no plain file", file=path)
+        if most is not None and status.st_size > most:
+            raise InputError(f"has {status.st_size} bytes; at most {most} are read", file=path)
         return Path(path).read_bytes()
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {_reason(error)}", file=path) from error
 
 
@@ -69,5 +130,5 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()
+def _reason(error: OSError | ValueError) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

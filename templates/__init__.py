@@ -1,4 +1,8 @@
-"""Jinja2 layouts of model files. Layout only: every line of bulk is streamed in."""
+"""Layouts of texts, in Jinja2.
+
+models: of model files; library: texts of a library; site: its pages. Layout only: every line of bulk is
+streamed in.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,8 @@ _MARK: Final = "\0"  # in no template and in no text that an instance may hold
 
 
 def stream(name: str, blocks: Mapping[str, Iterable[bytes]], **context: object) -> Iterator[bytes]:
-    """The bytes of a template, each block in the place of its `{{ block.key }}`; a block is read only when its place comes.
+    """The bytes of a template, each block in the place of its `{{ block.key }}`;
+    a block is read only when its place comes.
 
     Raises jinja2.UndefinedError for a name that the template uses and nobody gave.
     """

@@ -1,19 +1,23 @@
-"""Puts this folder on the path, so that test modules can import `cases` and `oracles`; says which tests were left out, and why."""
+"""Puts the folder `support` on the path, so that test modules can import `cases` and `oracles`;
+says which tests were left out, and why.
+"""
 
 import os
 import sys
 from collections import Counter
 from pathlib import Path
 
-# pytest-xdist gives every core a test; linear algebra with as many threads in each would only wait for one another.
+# pytest-xdist gives every core a test; linear algebra with as many threads in each would only wait for one
+# another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-# The same examples in every run: a chance find must not decide whether a change passes. `--hypothesis-profile=fuzz` draws others.
-# Neither must the clock: how long an example takes on a busy machine says nothing.
+# The same examples in every run: a chance find must not decide whether a change passes.
+# `--hypothesis-profile=fuzz` draws others. Neither must the clock: how long an example takes on a busy
+# machine says nothing.
 settings.register_profile(
     "same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -27,7 +31,9 @@ FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Marks who needs a program; leaves out, after -m and -k have chosen, who needs an absent one; and counts who is left out."""
+    """Marks who needs a program; leaves out, after -m and -k have chosen, who needs an absent one;
+    and counts who is left out.
+    """
     for item in items:
         for fixture in FIXTURES.keys() & set(item.fixturenames):
             item.add_marker(pytest.mark.needs(FIXTURES[fixture]))

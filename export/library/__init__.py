@@ -1,1 +1,5 @@
-"""The instance library: built from a specification, checked, given better points, and shown as a static site."""
+"""Instances in the manner of MINLPLib and QPLIB.
+
+Folders in the order of the work: plan, documents, ledger, building, checking, contributions, site.
+Nothing of the package uses a library but the command line.
+"""

@@ -1,7 +1,7 @@
 """The benchmark of export: `python tests/bench` measures and writes docs/performance.md.
 
-Every measurement is a process of its own, one at a time; ours and the peers take turns on the same instance. A peer goes on to the next size
-as long as that would take it about a minute and bearable memory.
+Every measurement is a process of its own, one at a time; ours and the peers take turns on the same instance.
+A peer goes on to the next size as long as that would take it about a minute and bearable memory.
 """
 
 from __future__ import annotations
@@ -24,8 +24,16 @@ ROOT = HERE.parents[1]
 SIZES = (64, 128, 256, 512)
 PEERS = ("linopy", "highs", "pyoptinterface", "pyomo")
 FORMULATIONS = (
-    "minlp-parity", "minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqcp-bilinear-l1", "miqp-mccormick", "milp-mccormick", "qp-fixed", "miqp-exact",
-)  # fmt: skip
+    "minlp-parity",
+    "minlp-quartic",
+    "minlp-cubic",
+    "miqcp-bilinear",
+    "miqcp-bilinear-l1",
+    "miqp-mccormick",
+    "milp-mccormick",
+    "qp-fixed",
+    "miqp-exact",
+)
 MILP = "milp-mccormick"
 LONG = 75.0
 """Seconds that the next size may be expected to take a peer."""

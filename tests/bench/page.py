@@ -81,14 +81,32 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     lines = [
         "# How fast files are written",
         "",
-        "Written by `python tests/bench`; every number is measured in a process of its own, one at a time. The instance is a full square of pixels, a",
-        "fifth of them with a stroke. Seconds go from the instance to the closed file (names, SHA-256 and, for .nl, the files of names included),",
-        "the median of three runs, or of one when it takes more than 5 s. Every run writes new files. *CPU* is the time of all threads: where other programs shared the cores, it is",
+        "[All pages](index.md).",
+        "",
+        in_short(at, sizes, targets(at, sizes, names, middle, pixels)),
+        "",
+        (
+            "Written by `python tests/bench`; every number is measured in a process of its own, "
+            "one at a time. The instance is a full square of pixels, a"
+        ),
+        (
+            "fifth of them with a stroke. Seconds go from the instance to the closed file (names, "
+            "SHA-256 and, "
+            "for .nl, the files of names included),"
+        ),
+        (
+            "the median of three runs, or of one when it takes more than 5 s. Every run writes new files. "
+            "*CPU* is the time of all threads: where other programs shared the cores, it is"
+        ),
         "the number to compare. Peak memory is that of the whole process, libraries included.",
         "",
         f"{given['processor']}, {given['system']}. Python {given['Python']}, "
         + ", ".join(f"{name} {given[name]}" for name in PACKAGES)
-        + f". Load average while measuring: {min(f['load'] for f in at.found.values()):.1f} to {max(f['load'] for f in at.found.values()):.1f}.",
+        + (
+            ". Load average while measuring: "
+            f"{min(f['load'] for f in at.found.values()):.1f} to "
+            f"{max(f['load'] for f in at.found.values()):.1f}."
+        ),
         "",
         "## Targets",
         "",
@@ -96,8 +114,15 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
         *reasons(at, sizes[-2], sizes[-1], middle),
         "## LP and MPS of `milp-mccormick` beside the peers",
         "",
-        "Peers build their model from whole arrays where they can (linopy, HiGHS), and write without our names: their files are smaller. A peer stops at the",
-        "size before it would take more than about a minute. gurobipy's free licence ends at 2000 columns, so it is not here.",
+        (
+            "Peers build their model from whole arrays where they can (linopy, HiGHS), "
+            "and write without our names: their files are smaller. A peer stops at the"
+        ),
+        (
+            "size before it would take more than about a minute. gurobipy's free licence ends at "
+            "2000 columns, "
+            "so it is not here."
+        ),
         "",
     ]
     for suffix in ("lp", "mps"):
@@ -111,6 +136,27 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     lines += against_pyomo(at, names, middle)
     lines += ["## Where the time goes", "", *where(at, sizes[-2]), *others(at, sizes, pixels)]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
+    """How many targets are met, how fast LP and MPS are written, and what all formats take.
+    lines: the table of targets.
+    """
+    size = sizes[-2]
+    speeds = {
+        suffix.upper(): found["bytes"] / 1e6 / found["seconds"]
+        for suffix in ("lp", "mps")
+        if (found := at("ours", size, suffix))
+    }
+    told = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
+    all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
+    took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
+    return (
+        f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} targets are met; "
+        "the first table has them all. "
+        f"At {size} x {size} pixels the writers make {told or 'what was not measured'}. All formats of the "
+        f"largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
+    )
 
 
 def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
@@ -130,8 +176,10 @@ def pyomo_reason(at: Page, size: int) -> str:
     if not (mine and other):
         return ""
     return (
-        f"- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files, and equal products are found by sorting. `qp-fixed` in LP, {size} x {size}, "
-        f"is {mine['bytes'] / 1e6:.1f} MB at {mine['bytes'] / 1e6 / mine['seconds']:.0f} MB/s, `{MILP}` {other['bytes'] / 1e6:.1f} MB at {other['bytes'] / 1e6 / other['seconds']:.0f} MB/s."
+        "- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files, "
+        f"and equal products are found by sorting. `qp-fixed` in LP, {size} x {size}, "
+        f"is {mine['bytes'] / 1e6:.1f} MB at {mine['bytes'] / 1e6 / mine['seconds']:.0f} MB/s, "
+        f"`{MILP}` {other['bytes'] / 1e6:.1f} MB at {other['bytes'] / 1e6 / other['seconds']:.0f} MB/s."
     )
 
 
@@ -144,10 +192,14 @@ def linopy_reason(at: Page, size: int) -> str:
     if not (mine and theirs and made and hashed and written):
         return ""
     return (
-        f"- linopy, LP: it is handed whole arrays of column numbers here, past its own expressions, it hashes nothing, and its file has numbered names: "
-        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. A tenth of its time is {theirs['seconds'] / 10:.3f} s; "
-        f"on two cores ours can take no less than the half of its {mine['cpu']:.3f} CPU seconds ({mine['cpu'] / 2:.3f} s), "
-        f"of which making the text alone takes {made['cpu']:.3f}, SHA-256 for the manifest, in one thread from end to end, {hashed['cpu']:.3f} and writing {written['cpu']:.3f}."
+        "- linopy, LP: it is handed whole arrays of column numbers here, past its own expressions, "
+        "it hashes nothing, and its file has numbered names: "
+        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. A tenth of its time is "
+        f"{theirs['seconds'] / 10:.3f} s; "
+        f"on two cores ours can take no less than the half of its {mine['cpu']:.3f} CPU seconds "
+        f"({mine['cpu'] / 2:.3f} s), "
+        f"of which making the text alone takes {made['cpu']:.3f}, SHA-256 for the manifest, "
+        f"in one thread from end to end, {hashed['cpu']:.3f} and writing {written['cpu']:.3f}."
     )
 
 
@@ -157,8 +209,10 @@ def write_reason(at: Page, size: int, suffix: str) -> str:
     if not (mine and hashed and written):
         return ""
     return (
-        f"- One write, {suffix.upper()} {size}: it takes {written['seconds']:.3f} s, for nothing is computed. SHA-256 alone, which works through a file from end to end in one "
-        f"thread, takes {hashed['seconds'] / written['seconds']:.1f} times as long; all our CPU seconds, shared evenly by two cores, would take {mine['cpu'] / 2 / written['seconds']:.1f} times as long."
+        f"- One write, {suffix.upper()} {size}: it takes {written['seconds']:.3f} s, "
+        "for nothing is computed. SHA-256 alone, which works through a file from end to end in one "
+        f"thread, takes {hashed['seconds'] / written['seconds']:.1f} times as long; all our CPU seconds, "
+        f"shared evenly by two cores, would take {mine['cpu'] / 2 / written['seconds']:.1f} times as long."
     )
 
 
@@ -174,7 +228,11 @@ def growth_reason(at: Page, half: int, big: int) -> str:
         ", ".join(f"{suffix} {times(value)}" for suffix, value in found.items() if value)
         for found in (made, copies)
     )
-    return f"- Growth: making the text grows {making} times in CPU seconds; one write of the finished bytes grows {writing} times in seconds, which is the system's part."
+    return (
+        f"- Growth: making the text grows {making} times in CPU seconds; "
+        f"one write of the finished bytes grows {writing} times in seconds, "
+        "which is the system's part."
+    )
 
 
 def times(value: float | None) -> str:
@@ -199,7 +257,9 @@ def targets(
 
 
 def target(what: str, values: dict[str, float | None], met: str, limit: float, unit: str = "") -> list[str]:
-    """A line: what is measured, the target (a word of MET and a limit), the values known, and whether they meet it."""
+    """A line: what is measured, the target (a word of MET and a limit), the values known,
+    and whether they meet it.
+    """
     known = {name: value for name, value in values.items() if value is not None}
     text = ", ".join(f"{name} {value:.3g}{unit}".strip() for name, value in known.items())
     reached = bool(known) and all(MET[met](value, limit) for value in known.values())
@@ -317,7 +377,10 @@ def against_pyomo(at: Page, names: Sequence[str], size: int) -> list[str]:
 def where(at: Page, size: int) -> list[str]:
     """What making, hashing and writing cost, and the sections of a file."""
     lines = [
-        f"`{MILP}`, {size} x {size}. CPU seconds: the bytes alone, their SHA-256, one write of them, and the whole as it is.",
+        (
+            f"`{MILP}`, {size} x {size}. CPU seconds: the bytes alone, their SHA-256, one write of them, "
+            "and the whole as it is."
+        ),
         "",
     ]
     rows = []
@@ -344,7 +407,10 @@ def where(at: Page, size: int) -> list[str]:
                 ]
             )
     lines += [
-        "By section, in file order. The first sections include the algebra (SymPy, some 10 ms a family, whatever the size).",
+        (
+            "By section, in file order. The first sections include the algebra (SymPy, some 10 ms a family, "
+            "whatever the size)."
+        ),
         "",
     ]
     return lines + table(["", "section", "seconds", "MB", "MB/s"], rows)

@@ -1,7 +1,8 @@
-"""One measurement in its own process: `python work.py JSON` prints seconds, CPU seconds, bytes and peak memory as JSON.
+"""One measurement in its own process: `python work.py JSON` prints seconds, CPU seconds,
+bytes and peak memory as JSON.
 
-A task is a function that prepares what is not measured and gives the function that is. The same small model goes through it first,
-so that imports and compiled expressions, which a process pays once, count for nobody.
+A task is a function that prepares what is not measured and gives the function that is. The same small model
+goes through it first, so that imports and compiled expressions, which a process pays once, count for nobody.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from crossfield.export.formats import FORMATS, carried, write
-from crossfield.models.instance import Instance
-from crossfield.models.problem import Problem, formulate
+from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.export.writing.canonical import Canonical
+from crossfield.models.formulations.problem import Problem, formulate
+from crossfield.models.instance.instance import Instance
 
 Measured = Callable[[], object]
 WARM = 6
@@ -64,12 +66,12 @@ def rendered(instance: Instance, formulation: str, suffix: str, path: Path, dial
 def chunks_of(problem: Problem, suffix: str, dialect: str) -> Any:
     """The chunks of a file."""
     held = carried(problem, FORMATS[suffix])
-    return FORMATS[suffix].generate(held, [], None, dialect or FORMATS[suffix].dialects[0])
+    return FORMATS[suffix].generate(Canonical(held), [], None, dialect or FORMATS[suffix].dialects[0])
 
 
 def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """Pyomo: building the model, and its own writer with numbered names."""
-    from crossfield.export.pyomo_model import to_pyomo
+    from crossfield.export.formats.pyomo_model import to_pyomo
 
     def run() -> None:
         problem = formulated(formulation, instance)
@@ -82,7 +84,9 @@ def pyomo(instance: Instance, formulation: str, suffix: str, path: Path) -> Meas
 
 
 def linopy(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """linopy: building the model from whole arrays, and its LP writer or, for MPS, that of HiGHS behind it."""
+    """linopy: building the model from whole arrays, and its LP writer or, for MPS,
+    that of HiGHS behind it.
+    """
     import linopy as lib
     import xarray as xr
 
@@ -205,8 +209,8 @@ def copied(
 
 def everything(instance: Instance, formulation: str, suffix: str, path: Path, jobs: int = 1) -> Measured:
     """Every format of one formulation, or of all, as `crossfield export` writes them."""
-    from crossfield.export.manifest import write_all
-    from crossfield.models.formulations import FORMULATIONS
+    from crossfield.export.bundle.manifest import write_all
+    from crossfield.models.formulations.catalogue import FORMULATIONS
 
     names = [formulation] if formulation != "all" else list(FORMULATIONS)
     dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
@@ -221,7 +225,9 @@ TITLES = {
 
 
 def sections(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
-    """Seconds and bytes of each section, as its chunks come; preparation counts for the section that needs it first."""
+    """Seconds and bytes of each section, as its chunks come;
+    preparation counts for the section that needs it first.
+    """
 
     def run() -> dict[str, Any]:
         found: dict[str, list[float]] = {}
@@ -247,7 +253,7 @@ def hashed(instance: Instance, formulation: str, suffix: str, path: Path) -> Mea
 
 def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """A drawing as a bitmap of four times the size to an instance."""
-    from crossfield.models.sketch import read_sketch
+    from crossfield.models.sketch.read import read_sketch
     from PIL import Image, ImageDraw
 
     size = instance.grid.height
@@ -266,7 +272,7 @@ def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Me
 
 def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> Measured:
     """A solution file, `highs` or `ampl`, to a field: read, mapped, rounded, cut into angles and jumps."""
-    from crossfield.export.solution import read_solution
+    from crossfield.export.solutions.solution import read_solution
 
     problem = formulated(formulation, instance)
     point = np.random.default_rng(1).normal(size=problem.columns)
@@ -277,8 +283,8 @@ def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> M
 
 def write_highs(path: Path, problem: Problem, point: Any) -> None:
     """A solution file as HiGHS writes it."""
-    from crossfield.export.names import Names
-    from crossfield.export.records import render, words
+    from crossfield.export.writing.names import Names
+    from crossfield.export.writing.records import render, words
 
     head = (
         f"Model status\nOptimal\n\n# Primal solution values\nFeasible\nObjective 0\n# Columns {len(point)}\n"
@@ -294,8 +300,8 @@ def write_highs(path: Path, problem: Problem, point: Any) -> None:
 
 def write_ampl(path: Path, problem: Problem, point: Any) -> None:
     """A solution file as the AMPL Solver Library writes it."""
-    from crossfield.export.nl import Layout
-    from crossfield.export.records import render, words
+    from crossfield.export.formats.nl import Layout
+    from crossfield.export.writing.records import render, words
 
     counts = (3, 1, 1, 0, problem.row_count, 0, len(point), len(point))
     with path.open("wb") as stream:
@@ -336,7 +342,9 @@ def peak_memory() -> int:
 
 
 def measured(task: str, size: int, folder: str, *, once: bool = False, **given: Any) -> dict[str, Any]:
-    """What a task took: after the small model, and after what is not measured. Median of three, or one run when it is long.
+    """What a task took: after the small model, and after what is not measured.
+
+    Median of three, or one run when it is long.
 
     once: one run, and no small model first.
     """
@@ -354,7 +362,9 @@ def measured(task: str, size: int, folder: str, *, once: bool = False, **given: 
 
 
 def remove_written(path: Path) -> None:
-    """Every run writes new files: to replace one, a file system may send the new blocks to the disk at once, as ext4 does."""
+    """Every run writes new files: to replace one, a file system may send the new blocks to the disk at once,
+    as ext4 does.
+    """
     for old in (path, path.with_suffix(".row"), path.with_suffix(".col"), path.with_name("copy")):
         old.unlink(missing_ok=True)
     shutil.rmtree(path.with_name("set"), ignore_errors=True)

@@ -1,0 +1,243 @@
+"""The folders of the package, what each uses, and their picture, for docs/architecture.md:
+`python docs/make.py architecture`.
+
+What lives in a folder is the first line of the docstring in its `__init__.py`; what it uses are its imports.
+Only the order of the folders and their places in the picture stand here.
+"""
+
+from __future__ import annotations
+
+import ast
+from html import escape
+from pathlib import Path
+from textwrap import wrap
+from typing import Final
+
+PARTS: Final = ("models", "export", "templates")
+GROUND: Final = "models"
+"""At its top what every folder uses, and so left out of the table."""
+
+ORDER: Final = (
+    "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations",
+    "models/search", "templates",
+    "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions",
+    "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",
+    "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
+    "export/library/building", "export/library/checking", "export/library/contributions",
+    "export/library/site", "export/cli",
+)  # fmt: skip
+"""From the ground up: a folder uses only folders that stand before it."""
+
+
+def folders(root: Path) -> list[str]:
+    """Every folder of the package below its parts, as `export/formats`."""
+    found = (path.parent for part in PARTS for path in (root / part).rglob("__init__.py"))
+    return sorted(path.relative_to(root).as_posix() for path in found)
+
+
+def first_line(root: Path, folder: str) -> str:
+    """What lives in a folder: the first line of its docstring."""
+    text = ast.get_docstring(ast.parse((root / folder / "__init__.py").read_text(encoding="utf-8"))) or ""
+    return text.partition("\n")[0]
+
+
+def uses(root: Path, folder: str) -> list[str]:
+    """The other folders from which the modules of a folder import, the ground left out."""
+    found = set()
+    for path in (root / folder).glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                found.update(targets(root, folder, node))
+    return sorted(found - {folder, GROUND})
+
+
+def targets(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
+    """The folders to which a relative import leads."""
+    base = (root / folder).joinpath(*[".."] * (node.level - 1), *(node.module or "").split(".")).resolve()
+    if not base.is_dir():
+        return {base.parent.relative_to(root).as_posix()}
+    return {
+        (base / name.name if (base / name.name).is_dir() else base).relative_to(root).as_posix()
+        for name in node.names
+    }
+
+
+def table(root: Path) -> list[list[str]]:
+    """Rows: folder, what lives there, what it uses; in the order from the ground up."""
+    return [
+        [
+            f"`{folder}/`",
+            first_line(root, folder),
+            ", ".join(f"`{other}`" for other in uses(root, folder)) or "-",
+        ]
+        for folder in ORDER
+    ]
+
+
+# The picture: five columns; the data goes right in the first row and back in the third.
+
+WIDE, HIGH, GAP, LEFT = 168, 84, 78, 30
+WHOLE: Final = 5 * WIDE + 4 * GAP
+WIDTH: Final = WHOLE + 2 * LEFT
+PLACES: Final = {
+    "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
+    "export/writing": (3, 320), "export/formats": (4, 320),
+    "models/search": (1, 470), "templates": (3, 470), "export/bundle": (4, 470),
+    "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
+    "export/solving": (4, 620),
+}  # fmt: skip
+FLOW: Final = (
+    ("models/sketch", "models/instance", "strokes,", "mask"),
+    ("models/instance", "models/formulations", "Instance", ""),
+    ("models/formulations", "export/writing", "Problem", ""),
+    ("export/writing", "export/formats", "names,", "records"),
+    ("export/formats", "export/bundle", ".nl .gms .lp .mps", ""),
+    ("export/bundle", "export/solving", "files, manifest", ""),
+    ("export/solving", "export/solutions", "solution", "file"),
+    ("export/solutions", "models/field", "Solution", ""),
+    ("models/field", "export/pictures", "CrossField", ""),
+    ("models/instance", "models/search", "Instance", ""),
+    ("templates", "export/formats", "layouts", ""),
+    ("models/search", "models/field", "CrossField", ""),
+)
+"""Where data goes: from, to, and what it is called."""
+INK: Final = {
+    "models": ("#e3edf9", "#3d6ea8"),
+    "export": ("#e6f3e6", "#4b8b50"),
+    "templates": ("#f8efdc", "#b08a3c"),
+}
+STYLE: Final = """text { font-family: Inter, 'Segoe UI', Helvetica, Arial, sans-serif; fill: #223; }
+.name { font-weight: 600; font-size: 14px; } .what { font-size: 12px; }
+.data { font-size: 11.5px; font-style: italic; fill: #555; }
+.flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }"""
+
+
+TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7"
+orient="auto-start-reverse">
+<path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>"""
+
+
+def picture(root: Path) -> str:
+    """The rooms and the way of data through them, as SVG."""
+    height = 790
+    parts = [
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
+            f'height="{height}" role="img">'
+        ),
+        "<title>The folders of crossfield and the way of data through them</title>",
+        f"<style>{STYLE}</style>",
+        TIP,
+        f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
+        *bars(root),
+        *(box(root, folder) for folder in PLACES),
+        *(arrow(*step) for step in FLOW),
+        outside("a sketch: SVG, bitmap, .scap", 270, down=True),
+        outside("pictures, report", 662, down=False),
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def bars(root: Path) -> list[str]:
+    """The folders that use all of the flow, above it, and the ground below it."""
+    library = [folder for folder in ORDER if folder.startswith("export/library/")]
+    step = (WHOLE - 24 + 8) / len(library)
+    return [
+        bar(root, "export/cli", 20, 50),
+        bar(root, "export/library", 82, 84),
+        *(
+            chip(folder.rpartition("/")[2], LEFT + 12 + at * step, 130, step - 8)
+            for at, folder in enumerate(library)
+        ),
+        bar(root, "export/verify", 178, 50),
+        chip("programs", LEFT + WHOLE - 132, 191, 120),
+        bar(root, GROUND, 725, 50),
+        written("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 755, "end"),
+    ]
+
+
+def bar(root: Path, folder: str, y: int, height: int) -> str:
+    """A folder over the whole width."""
+    what = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
+    said = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{what}</text>'
+    return panel(folder, LEFT, y, WHOLE, height) + said
+
+
+def chip(text: str, x: float, y: float, width: float) -> str:
+    """The name of a folder inside another one."""
+    return (
+        f'<rect x="{x:.1f}" y="{y}" width="{width:.1f}" height="24" rx="12" fill="#ffffff" stroke="#4b8b50"/>'
+        f'<text class="what" text-anchor="middle" x="{x + width / 2:.1f}" y="{y + 16}">{text}</text>'
+    )
+
+
+def panel(folder: str, x: float, y: float, width: float, height: float) -> str:
+    """A box in the colour of its part."""
+    fill, line = INK[folder.partition("/")[0]]
+    return (
+        f'<rect x="{x}" y="{y}" width="{width}" height="{height}" rx="8" fill="{fill}" '
+        f'stroke="{line}" stroke-width="1.4"/>'
+    )
+
+
+def corner(folder: str) -> tuple[int, int]:
+    """Top left corner of a room."""
+    column, y = PLACES[folder]
+    return LEFT + column * (WIDE + GAP), y
+
+
+def box(root: Path, folder: str) -> str:
+    """A room with its name and what lives there."""
+    x, y = corner(folder)
+    lines = "".join(
+        f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
+    )
+    return panel(folder, x, y, WIDE, HIGH) + (
+        f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
+        f'<text class="what" x="{x + 12}" y="{y + 27}">{lines}</text>'
+    )
+
+
+def arrow(begin: str, end: str, above: str, below: str) -> str:
+    """An arrow between two rooms, with the names of the data."""
+    (x, y), (to_x, to_y) = corner(begin), corner(end)
+    if y == to_y:
+        side = 1 if to_x > x else -1
+        start, stop = (x + WIDE, to_x - 3) if side > 0 else (x, to_x + WIDE + 3)
+        middle, level = (start + stop) / 2, y + HIGH / 2
+        words = written(above, middle, level - 8) + (written(below, middle, level + 18) if below else "")
+        return f'<path class="flow" d="M{start} {level}H{stop}"/>{words}'
+    if to_x == x:
+        middle, downwards = x + WIDE / 2, to_y > y
+        start, stop = (y + HIGH, to_y - 3) if downwards else (y, to_y + HIGH + 3)
+        return (
+            f'<path class="flow" d="M{middle} '
+            f'{start}V{stop}"/>{written(above, middle + 8, (start + stop) / 2 + 4, "start")}'
+        )
+    return slanted(x, y, to_x, to_y, above)
+
+
+def slanted(x: float, y: float, to_x: float, to_y: float, above: str) -> str:
+    """An arrow to a room in another row and another column."""
+    if to_y < y:  # up between two rows
+        leave, enter, lane = x + WIDE - 30, to_x + 30, y - 26
+        words = written(above, (leave + enter) / 2, lane - 6)
+        return f'<path class="flow" d="M{leave} {y}V{lane}H{enter}V{to_y + HIGH + 3}"/>{words}'
+    level, middle = y + HIGH / 2, to_x + WIDE / 2
+    words = written(above, (x + WIDE + middle) / 2, level - 8)
+    return f'<path class="flow" d="M{x + WIDE} {level}H{middle}V{to_y - 3}"/>{words}'
+
+
+def written(text: str, x: float, y: float, anchor: str = "middle") -> str:
+    """The name of some data."""
+    return f'<text class="data" text-anchor="{anchor}" x="{x}" y="{y}">{escape(text)}</text>'
+
+
+def outside(text: str, y: int, *, down: bool) -> str:
+    """What comes in at the first room, or goes out beside the last one."""
+    if down:
+        middle = LEFT + WIDE / 2
+        return f'{written(text, LEFT, y, "start")}<path class="flow" d="M{middle} {y + 10}V317"/>'
+    x, _ = corner("export/pictures")
+    return f'<path class="flow" d="M{x} {y}H{x - 50}"/>{written(text, x - 58, y + 4, "end")}'

@@ -1,0 +1,374 @@
+"""Sets of files: one problem in several formats, with the instance and a manifest beside them.
+
+    bottle_n024.instance.json (or .npz)              the instance, once per folder
+    bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
+    bottle_n024.milp-mccormick.manifest.json         what these are; all that is needed, with the instance, to read a solution
+
+Names come from the instance and the formulation alone, so that a later export replaces an earlier one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.errors import (
+    CrossfieldError,
+    FormulationError,
+    InputError,
+    InstanceError,
+    UnsupportedByFormatError,
+)
+from ...models.field.field import CrossField
+from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.problem import Problem, formulate, lifted
+from ...models.input_limits import MAX_BYTES
+from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
+from ...models.instance.grid import Ints
+from ...models.instance.instance import Instance
+from ...models.processes.side_by_side import checked
+from ...models.storage import make_folder, read_bytes, write_bytes
+from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
+from ..solvers_table import smallest, takers
+from ..writing.canonical import Canonical
+
+FORMAT: Final = "crossfield-manifest"
+VERSION: Final = 1
+LARGE: Final = 1 << 16
+"""Instances of more pixels are written as .npz instead of JSON."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a set of files is: the checked document, and where it lies."""
+
+    document: dict[str, Any]
+    path: Path
+
+    @property
+    def formulation(self) -> str:
+        """Name of the formulation."""
+        return str(self.document["formulation"])
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the set."""
+        return self.path.parent
+
+    def instance(self) -> Instance:
+        """The instance beside the manifest. Raises InputError when it is missing, InstanceError when it is another one."""
+        path = self.folder / self.document["instance"]["file"]
+        instance = read_instance(path)
+        if instance.sha256 != self.document["instance"]["sha256"]:
+            raise InstanceError(
+                "is another instance than the one the manifest was written for; export again", file=path
+            )
+        return instance
+
+    def problem(self) -> Problem:
+        """The problem that the files hold. Raises InputError, InstanceError, FormulationError."""
+        instance = self.instance()
+        try:
+            problem = formulate(
+                instance, self.formulation, p=self._jumps(instance), **self.document["options"]
+            )
+        except FormulationError as error:
+            raise FormulationError(str(error), file=self.path) from error
+        if problem.sha256 != self.document["sha256"]:
+            raise InstanceError(
+                "does not fit its own instance, options and jumps; export again", file=self.path
+            )
+        if self.document["columns"] != _columns(problem):
+            raise InstanceError(
+                "lists columns in another order than they have today; export again", file=self.path
+            )
+        return problem
+
+    def held(self, problem: Problem) -> dict[str, Problem]:
+        """By format, the problem as the files hold it: itself, or with its products lifted."""
+        return {
+            file["format"]: lifted(problem) if file["lifted"] else problem for file in self.document["files"]
+        }
+
+    def _jumps(self, instance: Instance) -> Ints | None:
+        if self.document["jumps"] is None:
+            return None
+        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        listed = np.array(self.document["jumps"], dtype=np.int64).reshape(-1, 2)
+        if (listed[:, 0] >= len(jumps)).any():
+            raise InstanceError(
+                "lists a jump of a pair that the instance does not have; export again", file=self.path
+            )
+        jumps[listed[:, 0]] = listed[:, 1]
+        return jumps
+
+
+def read_manifest(path: str | Path) -> Manifest:
+    """The manifest in a file. Raises InputError when it cannot be read, InstanceError when it breaks its schema."""
+    try:
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
+        check_version(document, FORMAT, VERSION)
+        return Manifest(check_schema(document, "manifest", __package__), Path(path))
+    except UnicodeDecodeError as error:
+        raise InstanceError("is not JSON; give the .manifest.json that export wrote", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+
+
+def write_problem(
+    problem: Problem,
+    folder: str | Path,
+    formats: Iterable[str] = DEFAULTS,
+    *,
+    start: CrossField | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+    jobs: int = 1,
+) -> Manifest:
+    """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
+
+    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats
+    written at once. Raises OutputError, and InputError for an unknown format and for a problem that no
+    manifest records: with columns fixed, or with products lifted beforehand.
+    """
+    _check_recordable(problem)
+    with _pool(jobs) as pool:
+        return _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress).begin(
+            problem
+        )()
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that write files: nearly all the time is spent in NumPy, zlib and hashlib, where threads run side by side.
+
+    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
+    whole.
+    """
+    with ThreadPoolExecutor(checked(jobs)) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+@dataclass(frozen=True)
+class _Sets:
+    """What sets of files have in common: threads, folder, formats, start, dialects by format, and whether files are compressed."""
+
+    pool: ThreadPoolExecutor
+    folder: Path
+    formats: tuple[str, ...]
+    start: CrossField | None
+    dialects: dict[str, str]
+    compress: bool
+
+    def __post_init__(self) -> None:
+        """Check that the formats are known."""
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+
+    def begin(self, problem: Problem) -> Callable[[], Manifest]:
+        """Hand the files of a problem to the threads; a function that waits for them and gives their manifest."""
+        stem = self.folder / f"{problem.instance.name}.{problem.name}"
+        files = {name: self._submit(problem, stem, name) for name in self.formats}
+
+        def manifest() -> Manifest:
+            written: list[Written] = []
+            refused: dict[str, str] = {}
+            for name, file in files.items():
+                try:
+                    written.append(file.result())
+                except UnsupportedByFormatError as error:
+                    refused[name] = str(error)
+            document = _document(problem, _instance_file(problem.instance, self.folder), written, refused)
+            path = stem.with_name(f"{stem.name}.manifest.json")
+            write_bytes(path, _as_bytes(document))
+            return Manifest(document, path)
+
+        return manifest
+
+    def _submit(self, problem: Problem, stem: Path, name: str) -> Future[Written]:
+        path = stem.with_name(f"{stem.name}{FORMATS[name].suffix}{'.gz' if self.compress else ''}")
+        return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
+
+
+def _check_recordable(problem: Problem) -> None:
+    if not is_recordable(problem):
+        raise InputError(
+            f"a manifest cannot record {problem.name} with columns fixed or products lifted; write it as a single file"
+        )
+
+
+def is_recordable(problem: Problem) -> bool:
+    """Whether formulation, options and jumps say all of a problem: no columns are fixed and no products were lifted beforehand."""
+    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
+    return plain.sha256 == problem.sha256
+
+
+def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+    """The manifest, now in the folder with the instance, of a problem of which one format was just written there.
+
+    Files of the same problem that a manifest there lists stay listed. Raises OutputError.
+    """
+    path = folder / f"{problem.instance.name}.{problem.name}.manifest.json"
+    document = _document(problem, _instance_file(problem.instance, folder), [written], {})
+    try:
+        earlier = read_manifest(path).document
+    except CrossfieldError:
+        earlier = {"sha256": ""}
+    if earlier["sha256"] == problem.sha256:
+        others = [file for file in earlier["files"] if file["name"] not in written.files]
+        document |= {"files": others + document["files"], "refused": earlier["refused"]}
+    write_bytes(path, _as_bytes(document))
+    return Manifest(document, path)
+
+
+def _as_bytes(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1) + "\n").encode()
+
+
+def write_all(
+    instance: Instance,
+    folder: str | Path,
+    formulations: Iterable[str] = tuple(FORMULATIONS),
+    formats: Iterable[str] = DEFAULTS,
+    *,
+    start: CrossField | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Manifest]:
+    """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
+
+    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says
+    which.
+    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written
+    at once.
+    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
+    .gz.
+    progress: called with each name. Raises InputError for an unknown format, FormulationError for an unknown
+    formulation, InstanceError for a start on another instance, and OutputError.
+    """
+    manifests = []
+    with _pool(jobs) as pool:
+        sets = _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress)
+        waiting = {}
+        for name in formulations:
+            waiting[name] = sets.begin(_formulated(instance, name, start, options or {}))
+        for name in list(waiting):
+            progress(name)
+            manifests.append(waiting.pop(name)())
+    return manifests
+
+
+def _formulated(instance: Instance, name: str, start: CrossField | None, options: dict[str, Any]) -> Problem:
+    recipe = FORMULATIONS.get(name)
+    chosen = {key: value for key, value in options.items() if recipe is None or key in recipe.settable}
+    return formulate(instance, name, p=fixed_jumps(instance, name, start), **chosen)
+
+
+def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
+    """The jumps that a formulation takes as data, None where it has them as variables: those of `start`, by default of the improved greedy field.
+
+    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions
+    are of one problem.
+    """
+    recipe = FORMULATIONS.get(name)
+    if recipe is None or not recipe.fixed:
+        return None
+    from ...models.search.improvement import first_field
+
+    return (start or first_field(instance)).p
+
+
+def _instance_file(instance: Instance, folder: Path) -> str:
+    """Name of the instance's file in the folder, written unless the very same instance is there."""
+    name = f"{instance.name}.instance.{'npz' if instance.grid.size > LARGE else 'json'}"
+    try:
+        unchanged = (folder / name).exists() and read_instance(folder / name).sha256 == instance.sha256
+    except CrossfieldError:
+        unchanged = False
+    if not unchanged:
+        write_instance(instance, folder / name)
+    return name
+
+
+def _document(
+    problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
+) -> dict[str, Any]:
+    instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
+    form = Canonical(problem)
+    files = [
+        {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
+        for entry in written
+        for name, facts in entry.files.items()
+    ]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "generator": generator(),
+        "instance": {
+            "file": instance_file,
+            "name": instance.name,
+            "gauge": instance.gauge,
+            "sha256": instance.sha256,
+        },
+        "formulation": formulation.name,
+        "paper": formulation.paper,
+        "options": asdict(options),
+        "class": problem.problem_class,
+        "convex": problem.convex,
+        "counts": {
+            "columns": problem.columns,
+            "binary": sum(block.count for block in form.blocks("binary")),
+            "integer": sum(block.count for block in form.blocks("integer")),
+            "rows": problem.row_count,
+            "pixels": instance.grid.size,
+            "pairs": len(instance.grid.first),
+            "stroke_pixels": len(instance.theta),
+        },
+        "columns": _columns(problem),
+        "rows": [
+            {
+                "name": family.family.tag,
+                "over": family.family.over,
+                "count": family.count,
+                "paper": family.family.paper,
+            }
+            for family in problem.rows
+        ],
+        "jumps": _nonzero(problem),
+        "sha256": problem.sha256,
+        "files": files,
+        "refused": refused,
+        "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
+    }
+
+
+def _columns(problem: Problem) -> list[dict[str, Any]]:
+    """Blocks of columns in order."""
+    return [
+        {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
+        for block in problem.blocks.values()
+    ]
+
+
+def _nonzero(problem: Problem) -> list[list[int]] | None:
+    """[pair, jump] of every pair whose jump is data and not zero; None where jumps are variables."""
+    if problem.jumps is None:
+        return None
+    at = np.nonzero(problem.jumps)[0]
+    listed: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
+    return listed

@@ -1,0 +1,192 @@
+"""Starting points as each solver takes them beside an LP, MPS or .nl file: complete and feasible.
+
+    layout
+    list    .mst   lines `name value`                                  Gurobi: model.read(...), or InputFile
+    cplex   .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
+    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: --read_solution_file, readSolution
+    scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
+    slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
+
+Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS
+has the columns of these files: with products lifted where they are lifted, and ONE. SCIP reads a nonlinear
+objective as a variable of its own, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl); all
+three are in its file with the value of what is not linear in the objective, and SCIP passes over the ones it
+does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ...models.errors import InputError, UnsupportedByFormatError, UnsupportedBySolverError
+from ...models.field.field import CrossField
+from ...models.formulations.problem import Problem
+from ...models.instance.grid import Floats
+from ..formats.registry import FORMATS, carried
+from ..solvers_table import SOLVERS, takes
+from ..writing.canonical import Canonical
+from ..writing.names import ONE
+from ..writing.records import Decimals, Pieces, number, render, words
+from ..writing.sink import save
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A complete point of a problem as a format holds it: names and values of all columns, ONE included, and its objective."""
+
+    problem: Problem
+    point: Floats
+
+    @cached_property
+    def form(self) -> Canonical:
+        """The columns and rows of LP and MPS."""
+        return Canonical(self.problem)
+
+    @property
+    def objective(self) -> float:
+        """The objective, recomputed."""
+        return self.problem.objective_value(self.point)
+
+    def lines(self, before: bytes = b"", *, zeros: bool = True) -> Iterator[bytes]:
+        """A line `name value` for every column, shortest round trip; zeros: for those at 0 too."""
+        names, values = self.form.names.all, self.point
+        if not zeros:
+            at = np.nonzero(values)[0]
+            names, values = names.at(at), values[at]
+        yield from render([before, names, b" ", words(values), b"\n"], len(values))
+        if self.form.has_one:
+            yield before + ONE + b" 1\n"
+
+    def activities(self) -> Iterator[bytes]:
+        """A line `name value` for every row, constants on its right side."""
+        names = self.form.names
+        for family in self.problem.rows:
+            values = words(family.values(self.point) + family.limit)
+            yield from render([names.row(family), b" ", values, b"\n"], family.count)
+        if not self.problem.rows:
+            yield b"c_ONE 1\n"
+
+
+def _list(start: Start) -> Iterator[bytes]:
+    yield f"# MIP start, objective {number(start.objective)}\n".encode()
+    yield from start.lines()
+
+
+def _cplex(start: Start) -> Iterator[bytes]:
+    name = quoteattr(start.problem.instance.name)
+    yield (
+        '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n'
+        '<CPLEXSolutions version="1.2">\n'
+        '<CPLEXSolution version="1.2">\n'
+        f'<header problemName={name} solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>\n'
+        "<variables>\n"
+    ).encode()
+    count = start.problem.columns
+    names, index, values = start.form.names.all, Decimals(np.arange(count)), words(start.point)
+    parts: Pieces = [b'<variable name="', names, b'" index="', index, b'" value="', values, b'"/>\n']
+    yield from render(parts, count)
+    if start.form.has_one:
+        yield b'<variable name="%b" index="%d" value="1"/>\n' % (ONE, count)
+    yield b"</variables>\n</CPLEXSolution>\n</CPLEXSolutions>\n"
+
+
+def _highs(start: Start) -> Iterator[bytes]:
+    yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
+    yield f"Objective {number(start.objective)}\n# Columns {start.form.column_count}\n".encode()
+    yield from start.lines()
+    yield b"# Rows %d\n" % start.form.row_count("mps")
+    yield from start.activities()
+
+
+def _scip(start: Start) -> Iterator[bytes]:
+    yield f"solution status: unknown\nobjective value: {number(start.objective)}\n".encode()
+    yield from start.lines()
+    for name, part in _objective_variables(start).items():
+        yield f"{name} {number(part)}\n".encode()
+
+
+def _objective_variables(start: Start) -> dict[str, float]:
+    """The variables that stand for an objective in SCIP, at what is not linear in it; none where nothing is."""
+    problem, point = start.problem, start.point
+    if problem.objective_degree < 2:
+        return {}
+    curved = sum(float(np.sum(family.values(point))) for family in problem.objective if family.degree > 1)
+    found = {"nlobjvar": curved}
+    if problem.objective_degree == 2:
+        index, cost = problem.merged_objective(1)
+        squares = start.objective - float(point[index[:, 0]] @ cost) - start.form.constant
+        found |= {"quadobjvar": squares, "qmatrixvar": squares}
+    return found
+
+
+def _slx(start: Start) -> Iterator[bytes]:
+    yield f"NAME {start.problem.instance.name}\n".encode()
+    yield from start.lines(b" C ")
+    yield b"ENDATA\n"
+
+
+LAYOUTS: Final[dict[str, Callable[[Start], Iterator[bytes]]]] = {
+    "list": _list, "cplex": _cplex, "highs": _highs, "scip": _scip, "slx": _slx,
+}  # fmt: skip
+"""What makes a starting point, by the layout that the table of solvers names."""
+
+STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solver.start is not None}
+"""The files of starting points, by solver."""
+
+
+def start_of(problem: Problem, field: CrossField) -> Start:
+    """The complete point of a field in the columns of the LP and MPS files; those of the .nl file where LP and MPS hold nothing.
+
+    Raises InstanceError when the field is on another instance.
+    """
+    try:
+        held = carried(problem, FORMATS["mps"])
+    except UnsupportedByFormatError:
+        held = problem
+    return Start(held, held.point(field))
+
+
+def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float:
+    """The objective of the start now in the file, in that solver's format.
+
+    Raises InputError for a solver that has no format of starts, UnsupportedBySolverError for one that does
+    not take the problem; InstanceError when the field is on another instance, OutputError.
+    """
+    if solver not in STARTS:
+        raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
+    taking = takes(problem, solver)
+    if taking.answer == "no":
+        raise UnsupportedBySolverError(f"{solver} does not take {problem.name}: {taking.reason}")
+    start = start_of(problem, field)
+    if STARTS[solver].convex and not start.problem.convex:
+        raise UnsupportedBySolverError(
+            f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
+        )
+    save(Path(path), LAYOUTS[STARTS[solver].layout](start))
+    return start.objective
+
+
+def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
+    """The files now in the folder, by solver: `stem.gurobi.mst` and so on, for the solvers that take the problem.
+
+    None for a problem without integers, where these files mean nothing. Raises as `write_start`.
+    """
+    if not problem.integer.any():
+        return {}
+    convex = start_of(problem, field).problem.convex
+    solvers = [
+        name
+        for name, entry in STARTS.items()
+        if takes(problem, name).answer != "no" and (convex or not entry.convex)
+    ]
+    paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
+    for name, path in paths.items():
+        write_start(problem, field, path, name)
+    return paths

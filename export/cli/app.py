@@ -1,0 +1,420 @@
+"""The command line: the verbs of the package, with progress, tables, exit codes and one-line errors.
+
+Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far, and
+a run with a report of what there is: that is fine too, and said on standard error. Where there is nothing to
+keep, the exit code is 1. Heavy libraries are imported inside the commands.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, NoReturn
+
+import typer
+
+from ...models.errors import CrossfieldError, InputError, shortened
+from .help_texts import Command
+from .inputs import known, load, options_of
+from .library_command import library
+from .options import (
+    BetaNorm,
+    Facet,
+    Folder,
+    Formats,
+    GamsLayout,
+    Gap,
+    GaugeName,
+    Jobs,
+    Json,
+    Mask,
+    Names,
+    NlForm,
+    Output,
+    Quiet,
+    Relax,
+    SecondsEach,
+    Size,
+    Start,
+    StrokeNorm,
+    Threads,
+    What,
+)
+from .output import (
+    INTERRUPTED,
+    complain,
+    degrade,
+    progress,
+    say,
+    say_json,
+    show_lists,
+    show_manifests,
+    show_report,
+    show_samples,
+)
+from .solve_command import solve_command, tell_solution
+from .verify_command import verify_command
+
+if TYPE_CHECKING:
+    from ...models.field.field import CrossField
+    from ...models.instance.instance import Instance
+
+app = typer.Typer(
+    name="crossfield",
+    help="Turn a concept sketch into an optimization problem in files for any solver, and a solver's answer"
+    " into a cross field: two line directions at every pixel.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+command = partial(app.command, cls=Command)
+
+_STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    *,
+    debug: Annotated[  # noqa: ARG001
+        bool, typer.Option("--debug", help="Show the traceback of an error.")
+    ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Show the version.", is_eager=True)] = False,
+) -> None:
+    """Options before the command; `invoke` looks at --debug."""
+    if version:
+        from importlib.metadata import version as installed
+
+        say(f"crossfield {installed('crossfield')}")
+        raise typer.Exit
+
+
+@command("run")
+def run_command(
+    sketch: What,
+    output: Folder,
+    *,
+    size: Size = None,
+    mask: Mask = None,
+    gauge: GaugeName = None,
+    facet: Facet = None,
+    time_limit: SecondsEach = 60.0,
+    gap: Gap = 1e-6,
+    threads: Threads = 0,
+    jobs: Jobs = 1,
+    gams_layout: GamsLayout = None,
+    nl_form: NlForm = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Do everything for one sketch: write all solver files, try methods, keep the best field, draw it.
+
+    The methods are {methods of a run}. report.json has all facts. Ctrl-C ends the run with the best field so
+    far; a second one ends at once.
+    """
+    from ..solving.job import Limits
+    from ..solving.run import plan, run
+
+    limits = Limits(time_limit, gap, threads)
+    with progress(quiet=quiet) as show:
+        show("reading the sketch")
+        instance = load(sketch, size, mask, gauge)
+    if not (quiet or as_json):
+        say(plan(limits))
+    with progress(quiet=quiet) as show:
+        report = run(
+            instance,
+            output,
+            limits=limits,
+            options={"facet": facet},
+            dialects=_dialects(gams_layout, nl_form),
+            jobs=jobs,
+            progress=show,
+        )
+    if as_json:
+        say_json(report.document())
+    elif not quiet:
+        show_report(report, output)
+    if report.interrupted:
+        complain(f"interrupted: {report.interrupted}; the report says what there is")
+
+
+@command("instance")
+def instance_command(
+    sketch: What,
+    output: Output,
+    *,
+    size: Size = None,
+    mask: Mask = None,
+    gauge: GaugeName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels."""
+    from ...models.instance.file import write_instance
+
+    _require_suffix(output, (".json", ".npz"))
+    with progress(quiet=quiet) as show:
+        show("reading the sketch")
+        instance = load(sketch, size, mask, gauge)
+        write_instance(instance, output)
+    if not quiet:
+        say(f"{output}: {instance.summary}")
+
+
+@command("export")
+def export_command(
+    instance: What,
+    output: Folder,
+    *,
+    formulation: Names = None,
+    file_format: Formats = None,
+    size: Size = None,
+    mask: Mask = None,
+    gauge: GaugeName = None,
+    facet: Facet = None,
+    stroke_norm: StrokeNorm = None,
+    beta_norm: BetaNorm = None,
+    relax: Relax = False,
+    start: Start = None,
+    gams_layout: GamsLayout = None,
+    nl_form: NlForm = None,
+    compress: Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")] = False,
+    jobs: Jobs = 1,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Write an instance as files for solvers, in every formulation and format.
+
+    Beside the files of each formulation lies its manifest (.manifest.json), which `crossfield read` needs to
+    read a solver's answer.
+    """
+    from ...models.field.file import read_field
+    from ...models.formulations.catalogue import FORMULATIONS
+    from ..bundle.manifest import write_all
+    from ..bundle.starts import write_starts
+    from ..formats.registry import DEFAULTS, FORMATS
+
+    formulations, formats = (
+        known(formulation, FORMULATIONS, "formulation"),
+        known(file_format or list(DEFAULTS), FORMATS, "format"),
+    )
+    with progress(quiet=quiet) as show:
+        loaded = load(instance, size, mask, gauge)
+        field = None if start is None else read_field(start, on=loaded)
+        manifests = write_all(
+            loaded,
+            output,
+            formulations,
+            formats,
+            start=field,
+            options=options_of(facet, stroke_norm, beta_norm, relax=relax),
+            dialects=_dialects(gams_layout, nl_form),
+            compress=compress,
+            jobs=jobs,
+            progress=show,
+        )
+        if field is not None:
+            show("starting points")
+            for manifest in manifests:
+                write_starts(
+                    manifest.problem(), field, output, manifest.path.name.removesuffix(".manifest.json")
+                )
+    if as_json:
+        say_json([manifest.document for manifest in manifests])
+    elif not quiet:
+        show_manifests(manifests, output)
+
+
+command("solve")(solve_command)
+
+
+@command("read")
+def read_command(
+    solution: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOLUTION",
+            help="A solution file of {answers}, plain or .gz; which of them is seen from its content.",
+        ),
+    ],
+    manifest: Annotated[
+        Path,
+        typer.Option(
+            "--manifest",
+            metavar="FILE",
+            help="The .manifest.json that `crossfield export` wrote beside the file that was solved.",
+        ),
+    ],
+    output: Output,
+    *,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            "--tolerance",
+            metavar="X",
+            min=0,
+            help="How far the answer may break a row or a bound, and how far, relatively, its objective may be"
+            " off, before it is refused.",
+        ),
+    ] = 1e-5,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Read a solver's solution file back as a cross field, and check it.
+
+    Objective and violations are computed again from the instance. Where they contradict what the file claims,
+    or the solver says that its values are no answer, no field is written and the exit code is 1.
+    """
+    from ...models.errors import SolutionError
+    from ...models.field.file import write_field
+    from ..bundle.manifest import read_manifest
+    from ..solutions.solution import read_solution
+
+    _require_suffix(output, (".npz", ".json", ".rawfield"))
+    with progress(quiet=quiet) as show:
+        show("reading the solution")
+        described = read_manifest(manifest)
+        problem = described.problem()
+        found = read_solution(solution, problem, held=described.held(problem), tolerance=tolerance)
+        if found.point is None:
+            raise InputError(
+                f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution
+            )
+        if not found.doubt:
+            write_field(found.field, output)
+    tell_solution(found, None if found.doubt else output, quiet=quiet, as_json=as_json)
+    if found.doubt:
+        raise SolutionError(
+            f"{found.doubt}; no field was written (--tolerance X allows for more)", file=solution
+        )
+
+
+@command("draw")
+def draw_command(
+    what: Annotated[
+        Path, typer.Argument(metavar="FIELD|INSTANCE", help="File (.npz, .json) of a field or an instance.")
+    ],
+    output: Output,
+    *,
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds."),
+    ] = None,
+    title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Draw a field or an instance as PNG, SVG or PDF."""
+    from ...models.field.field import CrossField
+    from ..pictures.draw import SUFFIXES, draw
+
+    _require_suffix(output, tuple(SUFFIXES))
+    with progress(quiet=quiet) as show:
+        show("reading")
+        subject = _field_or_instance(what)
+        show("drawing")
+        draw(
+            subject,
+            output,
+            kind=kind or ("field" if isinstance(subject, CrossField) else "instance"),
+            title=title,
+        )
+    if not quiet:
+        say(str(output))
+
+
+command("verify")(verify_command)
+
+
+@command("list")
+def list_command(*, as_json: Json = False) -> None:
+    """List formulations, formats, solvers and methods, and which go together."""
+    from .tables import tables
+
+    found = tables()
+    if as_json:
+        say_json({name: rows for name, (_, rows) in found.items()})
+    else:
+        show_lists(found)
+
+
+@command("samples")
+def samples_command(*, as_json: Json = False) -> None:
+    """List the built-in samples."""
+    from .tables import sample_rows
+
+    rows = sample_rows()
+    if as_json:
+        say_json(rows)
+    else:
+        show_samples(rows)
+
+
+app.add_typer(library, name="library")
+
+
+def main() -> NoReturn:
+    """Run the command line and leave with its exit code; SIGTERM leaves nothing half done either."""
+    degrade()
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    sys.exit(invoke(sys.argv[1:]))
+
+
+def invoke(arguments: list[str]) -> int:
+    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage; an error is one line.
+
+    With --debug the error itself is raised.
+    """
+    try:
+        app(arguments, prog_name="crossfield")
+    except SystemExit as stop:
+        if stop.code != _STOPPED:
+            return int(stop.code or 0)
+        complain(INTERRUPTED)
+    except Exception as error:
+        if "--debug" in arguments:
+            raise
+        complain(_line(error))
+    return 1
+
+
+def _line(error: Exception) -> str:
+    """What is said of an error."""
+    if isinstance(error, CrossfieldError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; choose a smaller --size"
+    if isinstance(error, OSError):
+        what = (error.strerror or str(error)).lower()
+        return f"{error.filename or 'a file'}: {what}; check the path and the free space"
+    what = f"{type(error).__name__}: {shortened(error)}"
+    return f"this should not happen, please report it: {what} (crossfield --debug ... shows where)"
+
+
+def _field_or_instance(path: Path) -> CrossField | Instance:
+    from ...models.field.file import read_field
+    from ...models.instance.file import read_instance
+
+    if not path.is_file():
+        raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
+    _require_suffix(path, (".npz", ".json"))
+    try:
+        return read_field(path)
+    except CrossfieldError as as_field:
+        try:
+            return read_instance(path)
+        except CrossfieldError as as_instance:
+            first, second = (str(error).removeprefix(f"{path}: ") for error in (as_field, as_instance))
+            raise InputError(f"is no field ({first}) and no instance ({second})", file=path) from as_field
+
+
+def _require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
+    if path.suffix.lower() not in allowed:
+        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise InputError(f"has {has}, which does not say what it is; use {', '.join(allowed)}", file=path)
+
+
+def _dialects(gams_layout: str | None, nl_form: str | None) -> dict[str, str]:
+    return {name: value for name, value in (("gms", gams_layout), ("nl", nl_form)) if value}

@@ -1,0 +1,64 @@
+"""What users name on the command line: sketches, samples, instances, names of tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...models.errors import InputError
+
+if TYPE_CHECKING:
+    from ...models.instance.instance import Gauge, Instance
+
+
+def load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
+    """The instance, of a size that can be written. Raises InputError."""
+    import numpy as np
+
+    from ...models.sketch.read import available_memory, check_memory
+
+    instance = _found(what, size, mask, gauge)
+    check_memory(int(np.count_nonzero(instance.mask)), available_memory())
+    return instance
+
+
+def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
+    """The instance of an instance file, a sketch file or a built-in sample, in this order."""
+    from ...models.instance.file import read_instance
+    from ...models.sketch.read import DEFAULT_SIZE, read_sketch
+    from ...models.sketch.samples import SAMPLES, sample
+
+    path = Path(what)
+    pixels = DEFAULT_SIZE if size is None else size
+    if not path.is_file() and what in SAMPLES:
+        if mask is not None:
+            raise InputError(f"the sample {what} has its own mask; leave --mask out")
+        return sample(what, pixels, gauge or "strokes")
+    if not path.exists():
+        raise InputError(
+            "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
+        )
+    if path.suffix.lower() not in {".json", ".npz"}:
+        return read_sketch(path, size=pixels, mask=mask, gauge=gauge or "strokes")
+    if size is not None or mask is not None:
+        raise InputError(
+            "is an instance, which has its own grid and mask; leave --size and --mask out", file=what
+        )
+    instance = read_instance(path)
+    return instance if gauge is None else instance.with_gauge(gauge)
+
+
+def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:
+    """The names, each of which is in the table; all of the table when there are none."""
+    for name in names or ():
+        if name not in table:
+            raise InputError(f"there is no {kind} {name!r}; choose one of {', '.join(table)}")
+    return list(dict.fromkeys(names or table))
+
+
+def options_of(
+    facet: str | None, stroke_norm: int | None, beta_norm: int | None, *, relax: bool
+) -> dict[str, Any]:
+    """The options of a formulation as the user gave them; None: not given."""
+    return {"facet": facet, "stroke_norm": stroke_norm, "beta_norm": beta_norm, "relax": relax or None}

@@ -1,0 +1,168 @@
+"""Arguments and options that several commands share; their help is filled from the tables in braces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from ...models.errors import InputError
+from ...models.processes.side_by_side import MOST, checked
+
+
+def _permitted(count: int, what: str, least: int) -> int:
+    """The number, if so many threads or processes may be asked for."""
+    try:
+        return checked(count, what, least=least)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _jobs(count: int) -> int:
+    return _permitted(count, "jobs", 1)
+
+
+def _threads(count: int) -> int:
+    return _permitted(count, "threads", 0)
+
+
+What = Annotated[
+    str,
+    typer.Argument(
+        metavar="SKETCH|SAMPLE|INSTANCE",
+        help="A drawing (SVG, .scap) or bitmap; a built-in sample: {samples}; or a file of `instance`.",
+    ),
+]
+Folder = Annotated[
+    Path,
+    typer.Option("-o", "--output", metavar="DIR", help="Folder for the files; made when it is not there."),
+]
+Output = Annotated[
+    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix says what kind.")
+]
+Size = Annotated[
+    int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
+]
+Mask = Annotated[
+    Path | None,
+    typer.Option(
+        "--mask", metavar="FILE", help="Picture as large as the sketch, white where the field is wanted."
+    ),
+]
+GaugeName = Annotated[
+    Literal["strokes", "box"] | None,
+    typer.Option(
+        "--gauge",
+        help="The 90 degrees in which the angle alpha may lie: round the stroke in each pixel (strokes,"
+        " exact), or 0 to 90 as the paper prints it (box).",
+    ),
+]
+Facet = Annotated[
+    Literal["hull", "printed"] | None,
+    typer.Option("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),
+]
+StrokeNorm = Annotated[
+    int | None,
+    typer.Option(
+        "--stroke-norm",
+        min=1,
+        max=2,
+        help="Distance from the strokes in absolute values (1) or squares (2), where a formulation leaves it"
+        " open.",
+    ),
+]
+BetaNorm = Annotated[
+    int | None,
+    typer.Option(
+        "--beta-norm",
+        min=1,
+        max=2,
+        help="Skew beta in absolute values (1) or squares (2), where a formulation leaves it open.",
+    ),
+]
+Relax = Annotated[
+    bool, typer.Option("--relax", help="Let integers take any value within their bounds: a lower bound.")
+]
+Seconds = Annotated[
+    float, typer.Option("--time-limit", min=0.1, metavar="SECONDS", help="Seconds for each solve.")
+]
+SecondsInAll = Annotated[
+    float,
+    typer.Option(
+        "--time-limit",
+        min=0.1,
+        metavar="SECONDS",
+        help="Seconds in all, reading and writing files included; greedy and power end when they are done.",
+    ),
+]
+SecondsEach = Annotated[
+    float,
+    typer.Option(
+        "--time-limit",
+        min=0.1,
+        metavar="SECONDS",
+        help="Seconds for each method that searches; what that makes in all is said before the first begins.",
+    ),
+]
+Gap = Annotated[
+    float,
+    typer.Option(
+        "--gap",
+        min=0.0,
+        help="Relative distance between best point and proven bound at which a solver may stop.",
+    ),
+]
+Jobs = Annotated[
+    int,
+    typer.Option("--jobs", callback=_jobs, help=f"How many solver files are written at once; 1 to {MOST}."),
+]
+Processes = Annotated[
+    int, typer.Option("--jobs", callback=_jobs, help=f"How many entries are built at once; 1 to {MOST}.")
+]
+Threads = Annotated[
+    int,
+    typer.Option(
+        "--threads",
+        callback=_threads,
+        help=f"Cores that HiGHS, search and windows use at once; 1 to {MOST}, or 0: as many as they choose.",
+    ),
+]
+Start = Annotated[
+    Path | None,
+    typer.Option(
+        "--start",
+        metavar="FIELD",
+        help="Field (.npz, .json) on the same instance to start from; its jumps are the data of qp-fixed.",
+    ),
+]
+GamsLayout = Annotated[
+    Literal["indexed", "scalar"] | None,
+    typer.Option(
+        "--gams-layout",
+        help="GAMS files with sets and equations over them (indexed), or row by row as in MINLPLib (scalar).",
+    ),
+]
+NlForm = Annotated[
+    Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
+]
+Names = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-f",
+        "--formulation",
+        metavar="NAME",
+        help="{formulations}; all by default, may be repeated.",
+    ),
+]
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-F",
+        "--format",
+        metavar="NAME",
+        help="{formats}; {default formats} by default, may be repeated.",
+    ),
+]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

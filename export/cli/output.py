@@ -1,0 +1,243 @@
+"""What the command line shows: progress, tables that fit 80 columns, JSON, and one-line messages."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import typer
+
+from ...models.errors import CrossfieldError, printable
+
+if TYPE_CHECKING:
+    from ..bundle.manifest import Manifest
+    from ..solutions.solution import Solution
+    from ..solving.run import Report
+
+Progress = Callable[[str], None]
+
+WIDTH: Final = 80
+"""Columns that tables are made for; a wider terminal is used where it helps."""
+
+
+INTERRUPTED: Final = "interrupted; files that stand are whole"
+
+
+class InterruptedRunError(CrossfieldError):
+    """Ctrl-C where there is no best point so far to be kept."""
+
+
+@contextmanager
+def progress(*, quiet: bool) -> Iterator[Progress]:
+    """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
+
+    Raises InterruptedRunError for a Ctrl-C that nobody caught.
+    """
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    shown = console.is_terminal and not quiet
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    try:
+        with Bar(*columns, console=console, transient=True, disable=not shown) as bar:
+            task = bar.add_task("starting")
+            yield lambda text: bar.update(task, description=text)
+    except KeyboardInterrupt as stop:
+        raise InterruptedRunError(INTERRUPTED) from stop
+
+
+def degrade() -> None:
+    """Have standard output and error write what their encoding does not have as escapes, rather than fail."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Print a line on standard output."""
+    typer.echo(text)
+
+
+def say_json(value: object) -> None:
+    """Print a value as JSON on standard output."""
+    typer.echo(json.dumps(value, indent=1, allow_nan=False))
+
+
+def complain(text: str) -> None:
+    """Print one line on standard error."""
+    typer.echo(f"crossfield: {printable(text)}", err=True)
+
+
+def show_table(
+    title: str,
+    columns: Sequence[str],
+    rows: list[list[str]],
+    *,
+    numbers: Sequence[str] = (),
+    header: bool = True,
+) -> None:
+    """Print a title and a table; the columns in `numbers` are set flush right."""
+    from rich import box
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    rule = box.SIMPLE_HEAD if header else None
+    table = Table(header_style="bold", show_header=header, box=rule, pad_edge=False, padding=(0, 1, 0, 0))
+    for column in columns:
+        first = column == columns[0]
+        table.add_column(
+            column, overflow="fold", no_wrap=first, justify="right" if column in numbers else "left"
+        )
+    for row in rows:
+        table.add_row(*(escape(printable(cell)) for cell in row))
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(printable(title), style="bold", markup=False, highlight=False, soft_wrap=True)
+    console.print(table)
+
+
+def show_report(report: Report, folder: Path) -> None:
+    """Print what a run found and where it lies, and what failed."""
+    columns = ("method", "2-norm", "1-norm", "singular", "|beta|", "seconds", "status")
+    rows = []
+    for candidate in report.candidates:
+        facts = candidate.facts()
+        numbers = [
+            f"{facts['energy_2_norm']:.4g}",
+            f"{facts['energy_1_norm']:.4g}",
+            str(facts["singularities"]),
+            f"{facts['mean_abs_beta_degrees']:.1f}°",
+            f"{facts['seconds']:.1f}",
+        ]
+        mark = "*" if candidate is report.best else ""
+        rows.append([candidate.method + mark, *numbers, str(facts.get("status", ""))])
+    show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
+    say(f"* kept, the least 2-norm energy: {folder / 'field.npz'} (.json, .rawfield)")
+    if not report.interrupted:
+        say(f"  pictures: {folder / 'overview.png'} and others beside it")
+    say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
+    for candidate in report.candidates:
+        if candidate.interrupted:
+            complain(f"{candidate.method}: interrupted; its best field so far was kept")
+    for method, reason in report.failures.items():
+        complain(f"{method}: {reason}")
+
+
+def show_manifests(manifests: list[Manifest], folder: Path) -> None:
+    """Print what an export wrote, and what it refused."""
+    documents = [manifest.document for manifest in manifests]
+    names = list(dict.fromkeys(name for document in documents for name in _sizes(document)))
+    columns = ("formulation", "class", "columns", "rows", *(f"{name}, kB" for name in names))
+    rows = []
+    for document in documents:
+        sizes, counts = _sizes(document), document["counts"]
+        written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
+        rows.append(
+            [
+                document["formulation"],
+                document["class"],
+                str(counts["columns"]),
+                str(counts["rows"]),
+                *written,
+            ]
+        )
+    show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
+    for document in documents:
+        for reason in document["refused"].values():
+            say(f"not written: {reason}")
+    say(f"files: {folder}")
+
+
+def _sizes(document: dict[str, Any]) -> dict[str, int]:
+    """Bytes of the model file of each format."""
+    return {
+        entry["format"]: entry["bytes"] for entry in document["files"] if not _is_list_of_names(entry["name"])
+    }
+
+
+def _is_list_of_names(name: str) -> bool:
+    return name.removesuffix(".gz").endswith((".row", ".col"))
+
+
+_ONLY_IF_ANY: Final = (
+    "lifted",
+    "furthest_rounding",
+    "unknown_names",
+    "contradictions",
+    "interrupted",
+    "dual_bound",
+    "worst_family",
+    "message",
+)
+
+
+def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None) -> None:
+    """Print what a solution claims beside what was recomputed, and where its field lies, if written."""
+    show_facts(solution.problem.instance.summary, facts)
+    if solution.point is not None and field is not None:
+        say(f"field: {field}")
+
+
+def show_facts(title: str, facts: dict[str, Any]) -> None:
+    """Print facts as a table of two columns."""
+    shown = {key: value for key, value in facts.items() if value or key not in _ONLY_IF_ANY}
+    rows = [[key.replace("_", " "), _text(value)] for key, value in shown.items()]
+    show_table(title, ("fact", "value"), rows, header=False)
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "not in the file"
+    if isinstance(value, list):
+        return "; ".join(map(str, value))
+    return f"{value + 0.0:.10g}" if isinstance(value, float) else str(value)
+
+
+def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
+    """Print the tables of formulations, formats, solvers and readers, and which go together."""
+    formulations = tables["formulations"][1]
+    show_table(
+        "formulations",
+        ("name", "paper", "class", "summary"),
+        _cells(formulations, ("name", "paper", "class", "summary")),
+    )
+    formats, solvers = tables["formats"], tables["solvers"]
+    names = [row["name"] for row in formats[1]]
+    carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]
+    show_table("which format carries what (--json: what instead)", ("formulation", *names), carried)
+    marked = [
+        [row[solvers[0][0]], *("yes" if row[name] == "yes" else "-" for name in solvers[0][1:])]
+        for row in solvers[1]
+    ]
+    externals = tables["externals"]
+    show_table("which solver solves what here (--json: why not)", solvers[0], marked)
+    takes = [
+        [name, ", ".join(row["formulation"] for row in externals[1] if row[name] == "yes")]
+        for name in externals[0][1:]
+    ]
+    show_table(
+        "which solver proves optima from our files (--json: why not others)", ("solver", "takes"), takes
+    )
+    show_table("formats", formats[0], _cells(formats[1], formats[0]))
+    methods, readers = tables["methods"], tables["readers"]
+    show_table("methods: ways to a field (solve --method)", methods[0], _cells(methods[1], methods[0]))
+    show_table("solution files that are read", readers[0], _cells(readers[1], readers[0]))
+
+
+def _cells(rows: list[dict[str, Any]], columns: Sequence[str]) -> list[list[str]]:
+    return [[str(row[column]) for column in columns] for row in rows]
+
+
+def show_samples(rows: list[dict[str, Any]]) -> None:
+    """Print the built-in samples."""
+    columns = ("name", "grid", "pixels", "strokes", "description")
+    show_table("samples", columns, _cells(rows, columns), numbers=("pixels", "strokes"))

@@ -1,0 +1,116 @@
+"""The tables of formulations, formats, solvers and readers, and which go together: for commands and docs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...models.errors import UnsupportedByFormatError
+from ...models.formulations.catalogue import FORMULATIONS, declare
+from ...models.formulations.problem import Problem
+from ...models.sketch.samples import sample, samples
+from ..formats.registry import FORMATS, carried
+from ..solutions.readers.registry import READERS
+from ..solvers_table import DRIVEN, PROGRAMS, SOLVERS, smallest, takers
+from ..solving.local import refusal
+from ..solving.methods import METHODS
+
+Row = dict[str, Any]
+Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
+
+
+def tables() -> Tables:
+    """For each table its columns and its rows, computed from the code, never typed."""
+    return {
+        "formulations": (
+            ("name", "paper", "class", "summary", *FORMATS),
+            [_formulation_row(problem) for problem in smallest_problems()],
+        ),
+        "formats": (
+            ("name", "written", "dialects", "verified by", "summary"),
+            [_format_row(name) for name in FORMATS],
+        ),
+        "solvers": (
+            ("formulation", *DRIVEN),
+            [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
+        ),
+        "externals": (
+            ("formulation", *SOLVERS),
+            [_external_row(problem) for problem in smallest_problems()],
+        ),
+        "methods": (
+            ("name", "summary"),
+            [{"name": method.name, "summary": method.summary} for method in METHODS.values()],
+        ),
+        "readers": (
+            ("name", "description"),
+            [{"name": reader.name, "description": reader.description} for reader in READERS],
+        ),
+    }
+
+
+def sample_rows() -> list[Row]:
+    """Name, kind, grid, stroke share and one line of each built-in sample on a grid of the default size."""
+    rows = []
+    for entry in samples():
+        instance = sample(entry.name)
+        grid = instance.grid
+        share = len(instance.theta) / grid.size
+        row = {
+            "name": entry.name,
+            "kind": entry.kind,
+            "grid": f"{grid.width} x {grid.height}",
+            "pixels": grid.size,
+            "strokes": f"{share:.0%}",
+        }
+        rows.append(row | {"description": entry.description})
+    return rows
+
+
+def smallest_problems() -> list[Problem]:
+    """Every formulation on the instance of two pixels."""
+    return [smallest(declare(name)) for name in FORMULATIONS]
+
+
+def _with_relaxations() -> list[tuple[Problem, bool]]:
+    rows: list[tuple[Problem, bool]] = []
+    for name, recipe in FORMULATIONS.items():
+        rows.append((smallest(declare(name)), False))
+        if "relax" in recipe.settable:
+            rows.append((smallest(declare(name, relax=True)), True))
+    return rows
+
+
+def _formulation_row(problem: Problem) -> Row:
+    recipe = FORMULATIONS[problem.name]
+    row: Row = {"name": problem.name, "paper": recipe.paper, "class": recipe.kind, "summary": recipe.summary}
+    return row | {name: _carriage(problem, name) for name in FORMATS}
+
+
+def _carriage(problem: Problem, name: str) -> str:
+    try:
+        held = carried(problem, FORMATS[name])
+    except UnsupportedByFormatError:
+        return f"refused: write {problem.formulation.equivalent}"
+    return "lifted, exact; relaxed, weaker" if held.formulation.lifted else "yes"
+
+
+def _format_row(name: str) -> Row:
+    entry = FORMATS[name]
+    readers = [program.title for program in PROGRAMS.values() if name in program.formats]
+    return {
+        "name": name,
+        "written": "by default" if entry.default else "when asked for",
+        "dialects": ", ".join(filter(None, entry.dialects)),
+        "verified by": ", ".join(readers) or "none",
+        "summary": entry.summary,
+    }
+
+
+def _solver_row(problem: Problem, relaxed: bool) -> Row:
+    answers = {name: refusal(problem, solver) or "yes" for name, solver in DRIVEN.items()}
+    return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
+
+
+def _external_row(problem: Problem) -> Row:
+    answers = {name: taking.reason or taking.answer for name, taking in takers(problem).items()}
+    return {"formulation": problem.name} | answers

@@ -1,0 +1,70 @@
+"""The command `verify`: exported files handed to every solver that is here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...models.errors import InputError
+from .options import Json, Quiet, Seconds
+from .output import complain, progress, say, say_json, show_table
+
+if TYPE_CHECKING:
+    from ..verify.verify import Verification
+
+
+def verify_command(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield export` wrote.")],
+    *,
+    solve: Annotated[
+        bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")
+    ] = False,
+    time_limit: Seconds = 10.0,
+    consumer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "-c",
+            "--consumer",
+            metavar="NAME",
+            help="{programs}; all that are installed by default, may be repeated.",
+        ),
+    ] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Hand every exported file to every solver that is installed, and compare what it reads with the problem.
+
+    All findings go to verify.json in the folder. The exit code is 1 when something differs.
+    """
+    from ..solvers_table import PROGRAMS
+    from ..verify.verify import verify
+
+    for name in consumer or ():
+        if name not in PROGRAMS:
+            raise InputError(f"there is no consumer {name!r}; choose one of {', '.join(PROGRAMS)}")
+    with progress(quiet=quiet) as show:
+        found = verify(folder, seconds=time_limit if solve else None, consumers=consumer, progress=show)
+    if as_json:
+        say_json(found.document())
+    elif not quiet:
+        _show(found)
+    for finding in found.bad:
+        complain(f"{finding.file}: {finding.consumer}: {finding.verdict}: {finding.reason}")
+    if not found.ok:
+        raise typer.Exit(1)
+
+
+def _show(found: Verification) -> None:
+    """Print how many files each program read and solved, how that ended, and what is absent."""
+    verdicts = list(dict.fromkeys(finding.verdict for finding in found.findings))
+    columns = ("program", "step", *map(str, verdicts))
+    rows = []
+    for consumer, step in dict.fromkeys((finding.consumer, finding.step) for finding in found.findings):
+        mine = [f.verdict for f in found.findings if (f.consumer, f.step) == (consumer, step)]
+        rows.append([consumer, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
+    show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
+    for name, how in found.absent.items():
+        say(f"absent: {name}; {how}")
+    say(f"reasons and numbers: {found.folder / 'verify.json'}")

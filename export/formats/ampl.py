@@ -1,0 +1,161 @@
+"""AMPL: a model in the notation of the paper, printed from the declaration, and its data beside it in a .dat.
+
+    set I dimen 2; set S_c within I;         pixels (r,c) as plain numbers, and those with a stroke
+    set E := {(r,c) in I, h in SIDES: ...};  pairs: AMPL finds the upper and the right neighbours itself
+    param p_min{(r,c,h) in E} := ...         windows and jump bounds by our formulas, in the same doubles
+    var s{(r,c,h) in E} >= 0;
+    minimize energy: sum{(r,c,h) in E} ( ...
+    subject to c14{(r,c,h) in E}: s[r,c,h] >= ...
+
+What depends on the sketch stands in the .dat: I, S_c with theta and w, the weights, and the jumps where they
+are data. Only what AMPL and GNU MathProg share is used: no `solve`, `param pi` computed, strings in quotes,
+`mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear formulations, and
+evaluates every expression of the others once variables are turned into parameters, as the tests do. AMPL
+itself is not free; no test runs it.
+
+Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
+ends with comments that print an answer under our names, as a solution file that is read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.symbols import VARIABLES, IndexSet, pixel_of
+from ...models.instance.grid import Ints
+from ...models.instance.instance import Instance
+from ...templates import stream
+from ..writing.canonical import Canonical
+from ..writing.names import name_length
+from ..writing.records import Decimals, Piece, Pieces, Words, number, render, table, words
+from .indexed import Indexed, check_indexed, described
+
+SECOND: Final = "r - north[h], c + east[h]"
+"""The pixel j of the pair (r,c,h)."""
+
+DOMAINS: Final[dict[IndexSet, str]] = {
+    "pixels": "{(r,c) in I}",
+    "strokes": "{(r,c) in S_c}",
+    "pairs": "{(r,c,h) in E}",
+}
+_INDEX: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,h"}
+
+SENSES: Final = {">=": b" >= ", "<=": b" <= ", "==": b" = "}
+
+
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+    """The bytes of the .mod file. header: lines of comment, without the comment sign.
+
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with columns
+    fixed.
+    """
+    problem = form.problem
+    check_indexed(problem, "mod", "nl, lp or mps")
+    context = {
+        "header": header,
+        "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
+        "gauge": problem.instance.gauge,
+        "second": SECOND,
+        "jumps": problem.jumps is not None and len(problem.jumps) > 0,
+        "variables": [
+            _variable(block) | {"label": _label(problem.instance, block), "index": _INDEX[block.over]}
+            for block in problem.blocks.values()
+            if block.count
+        ],
+        "terms": [_described(family) for family in problem.objective],
+        "rows": [_described(family) for family in problem.rows],
+    }
+    yield from stream("models/ampl.mod.j2", {}, **context)
+
+
+def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
+    """The bytes of the .dat file, block by block. header: lines of comment, without the comment sign."""
+    instance = problem.instance
+    for line in header:
+        yield f"# {line}\n".encode()
+    yield b"data;\nset I :=\n"
+    rows, columns = _place(instance, "pixels")
+    yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
+    yield b";\nparam: S_c: theta w :=\n"
+    yield from _listed(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
+    weights = f"param w_strokes := {number(instance.w_strokes)};\nparam w_beta := {number(instance.w_beta)};"
+    yield b";\n" + weights.encode() + b"\n"
+    if problem.jumps is not None and len(problem.jumps):
+        at = np.nonzero(problem.jumps)[0]
+        yield b"param p :=\n"
+        yield from _listed(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
+        yield b";\n"
+    yield b"end;\n"
+
+
+def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
+    """Row and column of the pixel of each element."""
+    at = pixel_of(instance, over)
+    return instance.grid.rows[at], instance.grid.columns[at]
+
+
+def _listed(
+    instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
+) -> Iterator[bytes]:
+    """One element a line, its index and its values: `1 2 u 0.3`; only the elements `at`, when they are given."""
+    rows, columns = _place(instance, over)
+    sides = instance.grid.upward.view(np.uint8)
+    if at is not None:
+        rows, columns, sides = rows[at], columns[at], sides[at]
+    side: Pieces = [b" ", Words(table([b"r", b"u"]), sides)] if over == "pairs" else []
+    yield from render([Decimals(rows), b" ", Decimals(columns), *side, b" ", *values, b"\n"], len(rows))
+
+
+def _variable(block: Block) -> dict[str, str]:
+    variable, language = VARIABLES[block.name], _Ampl(block.over)
+    attributes = ["integer"] * block.integer
+    attributes += [
+        f"{sign} {language.bound(end)}"
+        for sign, end in ((">=", variable.lower), ("<=", variable.upper))
+        if not end.is_infinite
+    ]
+    return {
+        "name": block.name,
+        "domain": DOMAINS[block.over],
+        "attributes": " " * bool(attributes) + ", ".join(attributes),
+        "meaning": variable.meaning,
+    }
+
+
+def _label(instance: Instance, block: Block) -> str:
+    """How the names of a block are printed: `alpha_%02d_%02d`."""
+    digits = name_length(instance, "", "pixels") // 2 - 1
+    return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
+
+
+def _described(family: Bound) -> dict[str, str]:
+    return described(_Ampl, family, SENSES) | {"domain": _domain(family)}
+
+
+def _domain(family: Bound) -> str:
+    """The set of a family, with a condition for rows that are needed only for one parity of a bound."""
+    over, only = family.family.over, family.family.only
+    if only is None:
+        return DOMAINS[over]
+    return f"{DOMAINS[over][:-1]}: abs({only[0]}[{_INDEX[over]}]) mod 2 = {only[1]}}}"
+
+
+class _Ampl(Indexed):
+    """The language of AMPL."""
+
+    index = _INDEX
+    second = SECOND
+    brackets = "[]"
+
+    def exact(self, constant: sp.Expr) -> str:
+        return str(constant).replace("**", "^")
+
+    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
+        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
+        return [*bracketed, f"^{exponent}".encode()]

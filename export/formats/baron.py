@@ -1,0 +1,123 @@
+"""BARON's own format, for polynomials up to degree 4 (it has exp, log and powers, but no trigonometric functions: B1).
+
+    // comment
+    BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default), in this order (B2)
+    LOWER_BOUNDS{                            every finite bound, those of binaries aside
+    alpha_00_00: 0;
+    }
+    UPPER_BOUNDS{ ... }
+    EQUATIONS c14_00_00_u, ...;
+    c14_00_00_u: s_00_00_u - alpha_00_00 ... >= 0;    constants on the right (B4)
+    OBJ: minimize
+     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, squares kept, one summand a line; negative numbers in brackets (B6)
+    STARTING_POINT{ ... }
+
+Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of
+its own sections, and no rows (B5). No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections
+and grammar: BARON's user manual, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.instance.grid import Floats
+from ..writing.canonical import Canonical, Kind, coefficient
+from ..writing.expressions import wrapped
+from ..writing.names import Names
+from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
+from .gams_scalar import Scalar, declared
+
+WIDTH = 160
+"""Lines are broken about here."""
+
+
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+    """The bytes of the .bar file, block by block. header: lines of comment. start: a point (columns,)."""
+    problem, names = form.problem, form.names
+    for line in header:
+        yield f"// {line}\n".encode()
+    yield from _variables(form)
+    for title, low in ((b"LOWER", True), (b"UPPER", False)):
+        yield title + b"_BOUNDS{\n"
+        for block in problem.blocks.values():
+            if form.kind(block) != "binary":
+                yield from _bounds(block, names, low=low)
+        yield b"}\n"
+    if problem.rows:
+        yield from declared(b"EQUATIONS", [(names.row(family), family.count) for family in problem.rows])
+    for family in problem.rows:
+        yield from _rows(family, names)
+    yield from _objective(problem, names)
+    if start is not None:
+        yield from _start(problem, names, start)
+
+
+_KEYWORDS: Final[dict[Kind, bytes]] = {
+    "binary": b"BINARY_VARIABLES",
+    "integer": b"INTEGER_VARIABLES",
+    "continuous": b"VARIABLES",
+}
+
+
+def _variables(form: Canonical) -> Iterator[bytes]:
+    for kind, keyword in _KEYWORDS.items():
+        chosen = form.blocks(kind)
+        if chosen:
+            yield from declared(keyword, [(form.names.of(block), block.count) for block in chosen])
+
+
+def _bounds(block: Block, names: Names, *, low: bool) -> Iterator[bytes]:
+    values = block.lower if low else block.upper
+    at = np.nonzero(np.isfinite(values))[0]
+    yield from _assigned(names.of(block).at(at), values[at])
+
+
+def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
+    if len(values):
+        yield from render([name, b": ", words(scalar_when_constant(values)), b";\n"], len(values))
+
+
+def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+    terms = [_monomial(term, names) for term in (*family.of_degree(1), *family.of_degree(2))]
+    sense = f" {family.family.sense} ".encode()
+    parts = [names.row(family), b":", *(piece for term in terms for piece in term), sense]
+    yield from render([*parts, words(scalar_when_constant(family.limit)), b";\n"], family.count)
+
+
+def _monomial(term: Term, names: Names) -> list[Piece]:
+    """A signed term of a row, a coefficient of 1 left out."""
+    assert term.degree in {1, 2}  # no declaration has other rows
+    lead: list[Piece] = [b" ", words(coefficient(term), signed), b"*"]
+    if np.ndim(term.coefficient) == 0 and abs(term.coefficient) == 1:
+        lead = [b" + " if term.coefficient == 1 else b" - "]
+    first, *rest = (names.at(term.family, symbol) for symbol in term.symbols)
+    return [*lead, first, *(piece for name in rest for piece in (b"*", name))]
+
+
+class _Baron(Scalar):
+    """The language of one family: that of scalar GAMS, with powers of its own."""
+
+    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
+        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
+        return [*bracketed, f"^{exponent}".encode()]
+
+
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
+    yield b"OBJ: minimize\n"
+    for family in problem.objective:
+        terms = _Baron(family, names).summands(family.family.expression)
+        yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
+    yield b";\n"
+
+
+def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
+    yield b"STARTING_POINT{\n"
+    for block in problem.blocks.values():
+        if block.count:
+            yield from _assigned(names.of(block), start[block.columns])
+    yield b"}\n"

@@ -1,0 +1,232 @@
+"""GAMS, scalar layout, as instance libraries have it: one variable a column, one equation a row, under our own names.
+
+    Variables objvar;                        the objective is a free scalar (G10), obj.. objvar =e= one summand a line (G6)
+    Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; lists are wrapped, no line starts
+                                             with `*`, which would make it a comment (G6)
+    c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); negative numbers in brackets (G2, G3)
+    alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   both bounds of every column (G7), -inf and +inf (G12), .fx where equal
+    alpha_00_00.l = 0.3;                     the start
+    solve m using minlp minimizing objvar;   the type by what is in the model (G9)
+    $ifThen set RESULTS ... $endIf           after `gams x.gms --RESULTS=x.csv`: the answer as lines name,value
+
+Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is
+a cosine. Numbers are shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No
+`$include`, no `$call`, and `put` only behind the switch RESULTS, because NEOS refuses them (G19).
+
+The CSV starts with model_status, solver_status (GAMS's numbers: 1 optimal, 2 locally optimal, 8 integer
+solution, 4, 5, 10 infeasible, ...; 1 normal completion, 2 iterations, 3 time, ...) and objective; then all
+columns in order. Values have 16 digits, which is what put gives (nr=2, nd=15, nw=24: R7), with a blank where
+a minus would stand. Without a solution they are the start, so look at the status first; the same holds for a
+column in no term, which is not in GAMS's model (G11).
+
+G-numbers: docs/format-rules.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from ...models.formulations.problem import Block, Bound, Problem
+from ...models.instance.grid import Floats
+from ...templates import stream
+from ..writing.canonical import Canonical
+from ..writing.expressions import Language, is_data, wrapped
+from ..writing.names import Names
+from ..writing.records import (
+    Piece,
+    Tagged,
+    Texts,
+    Words,
+    bounds,
+    check_coefficients,
+    number,
+    numbers,
+    render,
+    scalar_when_constant,
+    table,
+    words,
+)
+from ..writing.records import signed as with_sign
+
+MODEL_TYPES: Final = {
+    "LP": "lp",
+    "MILP": "mip",
+    "QP": "qcp",
+    "MIQP": "miqcp",
+    "QCP": "qcp",
+    "MIQCP": "miqcp",
+    "NLP": "nlp",
+    "MINLP": "minlp",
+}
+"""Our classes -> GAMS's model types."""
+
+SENSES: Final = {">=": b" =g= ", "<=": b" =l= ", "==": b" =e= "}
+
+WIDTH: Final = 160
+"""Lines are broken about here."""
+
+
+def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
+    """The bytes of the GAMS file in scalar layout, block by block.
+
+    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
+    levels.
+    """
+    problem, names = form.problem, form.names
+    blocks = {
+        "variables": _variables(form),
+        "equations": _equations(problem, names),
+        "objective": _objective(problem, names),
+        "rows": _rows(problem, names),
+        "bounds": _bounds(problem, names),
+        "start": () if start is None else _start(problem, names, start),
+        "results": _results(problem, names),
+    }
+    objective = None if start is None else number(problem.objective_value(start))
+    yield from stream(
+        "models/gams_scalar.gms.j2",
+        blocks,
+        header=header,
+        stamp=problem.stamp,
+        model_type=MODEL_TYPES[problem.problem_class],
+        start=objective,
+    )
+
+
+def power(base: list[Piece], exponent: int) -> list[Piece]:
+    """A power as GAMS evaluates it for bases of any sign (G1)."""
+    return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
+
+
+def bracketed(values: Floats) -> Texts:
+    """Numbers, in brackets when negative: `3`, `(-0.5)`."""
+    texts = numbers(values)
+    return np.where(values < 0, np.strings.add(np.strings.add(b"(", texts), b")"), texts)
+
+
+class Scalar(Language):
+    """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
+
+    def __init__(self, family: Bound, names: Names) -> None:
+        self._family = family
+        self._names = names
+
+    def symbol(self, symbol: sp.Symbol) -> Piece:
+        """A column's name at each element."""
+        return self._names.at(self._family, symbol)
+
+    def is_data(self, expression: sp.Expr) -> bool:
+        """Whether it holds no column."""
+        return is_data(self._family, expression)
+
+    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """One number an element."""
+        return _number_words(self._family.data(expression), signed=signed)
+
+    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """One number an element; raises UnsupportedByFormatError for an extreme one."""
+        values = self._family.data(expression)
+        check_coefficients(values, f"family {self._family.family.tag}")
+        return _number_words(values, signed=signed)
+
+    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
+        """A power as GAMS writes it."""
+        return power(base, exponent)
+
+
+def _number_words(values: Floats | float, *, signed: bool) -> Piece:
+    given = values if isinstance(values, float) else scalar_when_constant(values)
+    return words(given, with_sign if signed else bracketed)
+
+
+def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
+    """A statement that declares names, given as lists with their lengths, as one wrapped list."""
+    per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
+    total = sum(count for _, count in lists)
+    yield keyword + b"\n  "
+    start = 0
+    for name, count in lists:
+        place = np.arange(start + 1, start + count + 1)
+        separator = np.where(place == total, 2, place % per_line == 0)
+        yield from render([name, Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
+        start += count
+
+
+KEYWORDS: Final = {
+    "continuous": b"Variables",
+    "binary": b"Binary Variables",
+    "integer": b"Integer Variables",
+}
+
+
+def _variables(form: Canonical) -> Iterator[bytes]:
+    for block in form.problem.blocks.values():
+        if block.count:
+            yield from declared(KEYWORDS[form.kind(block)], [(form.names.of(block), block.count)])
+
+
+def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
+    if problem.rows:
+        yield from declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
+
+
+def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
+    """The terms of the objective, one line an element (more when it is long)."""
+    for family in problem.objective:
+        terms = Scalar(family, names).summands(family.family.expression)
+        yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
+
+
+def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
+    for family in problem.rows:
+        language, relation = Scalar(family, names), family.family.expression
+        left, right = language.expression(relation.lhs), language.expression(relation.rhs)
+        parts = [
+            names.row(family),
+            b".. ",
+            *left,
+            SENSES[family.family.sense],
+            *right,
+            b";\n",
+        ]
+        yield from render(parts, family.count)
+
+
+def _bounds(problem: Problem, names: Names) -> Iterator[bytes]:
+    for block in problem.blocks.values():
+        fixed = block.lower == block.upper
+        for chosen, suffixes in ((fixed, ("fx",)), (~fixed, ("lo", "up"))):
+            at = np.nonzero(chosen)[0]
+            yield from render(_bound_parts(block, names, at, suffixes), len(at))
+
+
+def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:
+    name = names.of(block) if len(at) == block.count else names.of(block).at(at)
+    parts: list[Piece] = []
+    for suffix in suffixes:
+        values = (block.upper if suffix == "up" else block.lower)[at]
+        text = words(scalar_when_constant(values), bounds) if len(at) else b""
+        parts += [
+            name,
+            f".{suffix} = ".encode(),
+            text,
+            b"; " if suffix == "lo" else b";\n",
+        ]
+    return parts
+
+
+def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
+    for block in problem.blocks.values():
+        level = words(start[block.columns])
+        yield from render([names.of(block), b".l = ", level, b";\n"], block.count)
+
+
+def _results(problem: Problem, names: Names) -> Iterator[bytes]:
+    for block in problem.blocks.values():
+        name = names.of(block)
+        yield from render([b"put '", name, b",' ", name, b".l:0 /;\n"], block.count)

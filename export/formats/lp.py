@@ -1,0 +1,103 @@
+r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
+
+    \ comment
+    Minimize
+     obj_sha256_1a2b3c4d5e6f: + 7 ONE  Gurobi takes this label for the model's name and repeats it in its solution, GLPK as the objective's
+     + 2 s_00_00_u                     every column, in order, also with cost 0: fixes the order of columns (L16, L31)
+     + [
+     + 4 d_00_00_u ^2                  twice the coefficient, because of / 2 (L9, L12); no blank after the caret (L34)
+     ] / 2
+    Subject To
+     c14_00_00_u: + 1 s_00_00_u ... >= 0
+     c16_00_00_u: + 1 t_00_00_u + [ + 2 beta_00_00 * p1_00_00_u ] >= 0      no / 2 in rows (L10)
+    Bounds
+     0 <= s_00_00_u <= +inf            both bounds of every column (L17, L22), before the next two sections (L6)
+    Generals / Binaries                never Integers (L5)
+    End
+
+A constant is carried by the column ONE fixed to 1 (L1, L2); one term a line, so that no line is long (L30). A
+model without rows gets the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip. L-numbers:
+docs/format-rules.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...models.formulations.problem import Block, Bound
+from ..writing.canonical import Canonical, coefficient
+from ..writing.names import Names
+from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
+
+
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+    """The bytes of the LP file, block by block. header: lines of comment, without the comment sign."""
+    problem, names = form.problem, form.names
+    for line in header:
+        yield f"\\ {line}\n".encode()
+    yield f"Minimize\n obj_{problem.stamp}:".encode()
+    yield from render([b" ", words(form.constant, signed), b" ONE\n"] if form.has_one else [b"\n"], 1)
+    yield from _objective(form)
+    yield b"Subject To\n"
+    if not problem.rows:
+        yield b" c_ONE: + 1 ONE = 1\n"
+    for family in problem.rows:
+        yield from _rows(family, names)
+    yield b"Bounds\n"
+    if form.has_one:
+        yield b" 1 <= ONE <= 1\n"
+    for block in problem.blocks.values():
+        yield from _bounds(block, names)
+    if form.blocks("integer"):
+        yield b"Generals\n"
+    for block in form.blocks("integer"):
+        yield from render([b" ", names.of(block), b"\n"], block.count)
+    if form.blocks("binary"):
+        yield b"Binaries\n"
+    for block in form.blocks("binary"):
+        yield from render([b" ", names.of(block), b"\n"], block.count)
+    yield b"End\n"
+
+
+def _objective(form: Canonical) -> Iterator[bytes]:
+    names = form.names
+    for block in form.problem.blocks.values():
+        cost = words(scalar_when_constant(form.costs[block.columns]), signed)
+        yield from render([b" ", cost, b" ", names.of(block), b"\n"], block.count)
+    index, factor = form.products()
+    if not len(factor):
+        return
+    square = index[:, 0] == index[:, 1]
+    yield b" + [\n"
+    for chosen in (square, ~square):
+        pair, value = index[chosen], words(2 * factor[chosen], signed)
+        tail: Pieces = [b" ^2\n"] if chosen is square else [b" * ", names.all.at(pair[:, 1]), b"\n"]
+        yield from render([b" ", value, b" ", names.all.at(pair[:, 0]), *tail], len(pair))
+    yield b" ] / 2\n"
+
+
+def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+    parts: list[Piece] = [b" ", names.row(family), b":"]
+    for term in family.of_degree(1):
+        parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]
+    products = family.of_degree(2)
+    if products:
+        parts.append(b" + [")
+        for term in products:
+            parts += [
+                b" ",
+                words(coefficient(term), signed),
+                b" ",
+                names.at(family, term.symbols[0]),
+                b" * ",
+                names.at(family, term.symbols[1]),
+            ]
+        parts.append(b" ]")
+    sense = b" = " if family.family.sense == "==" else f" {family.family.sense} ".encode()
+    parts += [sense, words(scalar_when_constant(family.limit)), b"\n"]
+    yield from render(parts, family.count)
+
+
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
+    lower, upper = (words(scalar_when_constant(end), bounds) for end in (block.lower, block.upper))
+    yield from render([b" ", lower, b" <= ", names.of(block), b" <= ", upper, b"\n"], block.count)

@@ -1,0 +1,202 @@
+"""Free MPS, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
+
+    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated by Gurobi, Xpress and GLPK in their solutions; FREE is for CBC (M20)
+    ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
+    COLUMNS                            ` column row value`, one pair a line, `obj 0` for columns without cost (M19);
+        MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
+    RHS                                set name RHS1; no entry for the objective (M4), no RANGES (M11)
+    BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP, LO + PL, MI then UP
+    QUADOBJ                            one triangle of the Hessian: x'Qx/2 (M13)
+    QCMATRIX row                       both triangles, without one-half (M16), after BOUNDS (M17)
+    ENDATA
+
+The objective's constant is the cost of a column ONE fixed to 1. M-numbers: docs/format-rules.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.symbols import SLOTS
+from ...models.instance.grid import Bools, Grid, Ints
+from ..writing.canonical import Canonical, coefficient
+from ..writing.names import Names, problem_name
+from ..writing.records import (
+    OnlyWhere,
+    Piece,
+    Pieces,
+    Tagged,
+    number,
+    render,
+    scalar_when_constant,
+    words,
+)
+
+_KIND = {">=": b"G", "<=": b"L", "==": b"E"}
+
+
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+    """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
+    problem, names = form.problem, form.names
+    for line in header:
+        yield f"* {line}\n".encode()
+    yield f"NAME {problem_name(problem)} FREE\nROWS\n N obj\n".encode()
+    if not problem.rows:
+        yield b" E c_ONE\n"
+    for family in problem.rows:
+        yield from render([b" " + _KIND[family.family.sense] + b" ", names.row(family), b"\n"], family.count)
+    yield b"COLUMNS\n"
+    yield from _columns(form)
+    yield b"RHS\n"
+    yield from _right_sides(problem, names)
+    yield b"BOUNDS\n"
+    for block in problem.blocks.values():
+        yield from _bounds(block, names)
+    if form.has_one:
+        yield b" FX BND1 ONE 1\n"
+    yield from _objective_matrix(form)
+    for family in problem.rows:
+        yield from _row_matrices(family, names)
+    yield b"ENDATA\n"
+
+
+def _columns(form: Canonical) -> Iterator[bytes]:
+    """Matrix entries column by column; a record is a column with all its entries, the cost first, then by row."""
+    problem, names = form.problem, form.names
+    rows = {family.family.tag: names.row(family) for family in problem.rows}
+    markers = 0
+    for integer, blocks in _runs(problem):
+        if integer:
+            yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
+        for block in blocks:
+            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.columns]))
+            entries = [
+                entry
+                for family in problem.rows
+                for entry in _entries(family, block, name, rows[family.family.tag])
+            ]
+            yield from render([b" ", name, b" obj ", cost, b"\n", *entries], block.count)
+        if integer:
+            yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
+            markers += 2
+    if form.has_one:
+        yield f" ONE obj {number(form.constant)}\n".encode()
+        if not problem.rows:
+            yield b" ONE c_ONE 1\n"
+
+
+def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+    """The lines of a column of a block for the rows of a family, in the order of rows."""
+    chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
+    lines = [line for term in chosen for line in _incident(family, term)]
+    for _, row, term in sorted(lines, key=lambda line: line[0]):
+        value = words(coefficient(term))
+        if row is None:
+            line: Pieces = [b" ", name, b" ", rows, b" ", value, b"\n"]
+            yield from line
+        else:
+            at_row = value if isinstance(value, bytes) else value.at(row)
+            yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
+
+
+def _incident(family: Bound, term: Term) -> list[tuple[int, Ints | None, Term]]:
+    """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
+
+    None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
+    the right one, so that the rows of a pixel are those of its pairs to the left, upwards, to the right and
+    downwards, in this order.
+    """
+    instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
+    if kind == "itself":
+        own = None if family.everywhere else _inverse(family.elements, family.block(term.symbols[0]).count)
+        return [(0, own, term)]
+    assert family.everywhere  # families on a part of the pairs have terms of those pairs alone
+    if kind == "stroke":
+        return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
+    left, upper, right, lower = _pairs_round(instance.grid)
+    return [(1, upper, term), (2, right, term)] if kind == "first" else [(0, left, term), (3, lower, term)]
+
+
+def _inverse(index: Ints, count: int) -> Ints:
+    """Place in `index` of each number below `count`, -1 where it is not there."""
+    place = np.full(count, -1, dtype=np.int32)
+    place[index] = np.arange(len(index), dtype=np.int32)
+    return place
+
+
+def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
+    """Number of the pair of each pixel with its left, upper, right and lower neighbour, -1 where there is none."""
+    upper, right = grid.pair_number
+    left, lower = np.full_like(right, -1), np.full_like(upper, -1)
+    left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]
+    return left[grid.mask], upper[grid.mask], right[grid.mask], lower[grid.mask]
+
+
+def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
+    """Blocks that follow each other and are alike integer or not; empty blocks are left out."""
+    runs: list[tuple[bool, list[Block]]] = []
+    for block in filter(lambda block: block.count, problem.blocks.values()):
+        if not runs or runs[-1][0] != block.integer:
+            runs.append((block.integer, []))
+        runs[-1][1].append(block)
+    return runs
+
+
+def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
+    if not problem.rows:
+        yield b" RHS1 c_ONE 1\n"
+    for family in problem.rows:
+        at = np.nonzero(family.limit)[0]
+        value = words(scalar_when_constant(family.limit[at]))
+        yield from render([b" RHS1 ", names.row(family).at(at), b" ", value, b"\n"], len(at))
+
+
+def _bounds(block: Block, names: Names) -> Iterator[bytes]:
+    """Bounds kind by kind; within a kind one record a column, two lines where both ends are named."""
+    low, high = np.isfinite(block.lower), np.isfinite(block.upper)
+    fixed = block.lower == block.upper
+    kinds: list[tuple[Bools, bytes, bytes]] = [
+        (fixed, b"FX", b""),
+        (low & high & ~fixed, b"LO", b"UP"),
+        (low & ~high, b"LO", b"PL"),
+        (~low & high, b"MI", b"UP"),
+        (~low & ~high, b"FR", b""),
+    ]
+    for chosen, first, second in kinds:
+        at = np.nonzero(chosen)[0]
+        name = names.of(block) if len(at) == block.count else names.of(block).at(at)
+        parts: list[Piece] = []
+        for kind in filter(None, (first, second)):
+            value = {b"FX": block.lower, b"LO": block.lower, b"UP": block.upper}.get(kind)
+            parts += [b" " + kind + b" BND1 ", name]
+            if value is not None and len(at):
+                parts += [b" ", words(scalar_when_constant(value[at]))]
+            parts.append(b"\n")
+        yield from render(parts, len(at))
+
+
+def _objective_matrix(form: Canonical) -> Iterator[bytes]:
+    index, factor = form.products()
+    if not len(factor):
+        return
+    hessian, names = np.where(index[:, 0] == index[:, 1], 2 * factor, factor), form.names
+    yield b"QUADOBJ\n"
+    yield from render(
+        [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", words(hessian), b"\n"],
+        len(index),
+    )
+
+
+def _row_matrices(family: Bound, names: Names) -> Iterator[bytes]:
+    products = family.of_degree(2)
+    if not products:
+        return
+    parts: list[Piece] = [b"QCMATRIX ", names.row(family), b"\n"]
+    for term in products:
+        first, second = (names.at(family, symbol) for symbol in term.symbols)
+        half = words(np.asarray(coefficient(term)) / 2)
+        parts += [b" ", first, b" ", second, b" ", half, b"\n", b" ", second, b" ", first, b" ", half, b"\n"]
+    yield from render(parts, family.count)

@@ -1,0 +1,219 @@
+"""OSiL, the XML format of COIN-OR's Optimization Services, for SCIP and OSSolverService.
+
+    <variables numberOfVariables="7">
+    <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            every attribute always: defaults are lb 0, ub INF (O1); types C, B, I
+    <objectives> <obj maxOrMin="min" constant="0.3"> <coef idx="0">-1</coef>
+    <constraints> <con name="c14_00_00_u" lb="0" ub="INF"/>        constants on the right
+    <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
+    <quadraticCoefficients>
+    <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               the full coefficient, without one-half; idx -1 is the objective (O1, O2)
+    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms of the objective beyond quadratic, as declared, one <nl> (O2)
+
+What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
+Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
+is said in <description>, not in comments.
+
+Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
+each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
+any number of arguments, <square> and <cos> one; a constant of the objective becomes a fixed variable
+`objconstvar`. O-numbers: docs/format-rules.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import Final
+
+import numpy as np
+import sympy as sp
+
+from ...models.formulations.problem import Block, Bound, Problem
+from ...models.instance.grid import Floats, Ints
+from ..writing.canonical import Canonical, coefficient
+from ..writing.expressions import is_data, split
+from ..writing.names import OBJECTIVE, Names
+from ..writing.records import (
+    Decimals,
+    Piece,
+    Pieces,
+    Texts,
+    check_coefficients,
+    number,
+    numbers,
+    render,
+    scalar_when_constant,
+    words,
+)
+from ..writing.terms import terms
+
+_HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<osil xmlns="os.optimizationservices.org" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
+xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.org/schemas/2.0/OSiL.xsd">
+<instanceHeader>
+<name>{name}</name>
+<description>{description}</description>
+</instanceHeader>
+<instanceData>
+"""
+
+
+def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
+    """The bytes of the OSiL file, block by block. header: lines that say what it holds."""
+    problem, names = form.problem, form.names
+    description = escape("\n".join(header))
+    yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
+    yield f'<variables numberOfVariables="{problem.columns}">\n'.encode()
+    for block in problem.blocks.values():
+        yield from _variables(block, names, _LETTER[form.kind(block)])
+    yield b"</variables>\n"
+    yield from _objective(problem)
+    yield f'<constraints numberOfConstraints="{problem.row_count}">\n'.encode()
+    for family in problem.rows:
+        yield from _constraints(family, names)
+    yield b"</constraints>\n"
+    yield from _linear_rows(problem)
+    yield from _quadratic(problem)
+    yield from _nonlinear(problem)
+    yield b"</instanceData>\n</osil>\n"
+
+
+def ends(values: Floats) -> Texts:
+    """Bounds: numbers, `-INF` or `INF`."""
+    return np.where(np.isinf(values), np.where(values > 0, b"INF", b"-INF"), numbers(values))
+
+
+_LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
+
+
+def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
+    lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
+    parts: Pieces = [b'<var name="', names.of(block), f'" type="{kind}" lb="'.encode(), lower, b'" ub="', upper, b'"/>\n']  # fmt: skip
+    yield from render(parts, block.count)
+
+
+def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
+    """Columns (k, degree) and coefficients (k,) of the objective's terms up to quadratic, each set of columns once."""
+    nonlinear = problem.objective_degree > 2
+    index, value = _beside_nonlinear(problem, degree) if nonlinear else problem.merged_objective(degree)
+    if degree:
+        check_coefficients(value, "the objective")
+    return index, value
+
+
+def _beside_nonlinear(problem: Problem, degree: int) -> tuple[Ints, Floats]:
+    """The same for an objective that also has terms beyond quadratic: those are left to the tree."""
+    at, values = [np.zeros((0, degree + 1), np.int64)], [np.zeros(0)]
+    for family in (family for family in problem.objective if family.degree <= 2):
+        for term in family.of_degree(degree):
+            at.append(np.stack([np.zeros(family.count, np.int32), *term.factors], axis=1).astype(np.int64))
+            values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
+    merged = terms(np.concatenate(at), np.concatenate(values), indices=degree + 1, products=degree)
+    return merged.at[:, 1:], merged.value
+
+
+def _objective(problem: Problem) -> Iterator[bytes]:
+    index, cost = _coefficients(problem, 1)
+    constant = float(_coefficients(problem, 0)[1].sum())
+    yield b'<objectives numberOfObjectives="1">\n'
+    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" numberOfObjCoef="{len(cost)}" constant="{number(constant)}">\n'.encode()
+    yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', words(cost), b"</coef>\n"], len(cost))
+    yield b"</obj>\n</objectives>\n"
+
+
+def _constraints(family: Bound, names: Names) -> Iterator[bytes]:
+    limit = words(scalar_when_constant(family.limit))
+    lower: Piece = b"-INF" if family.family.sense == "<=" else limit
+    upper: Piece = b"INF" if family.family.sense == ">=" else limit
+    parts: Pieces = [b'<con name="', names.row(family), b'" lb="', lower, b'" ub="', upper, b'"/>\n']
+    yield from render(parts, family.count)
+
+
+def _linear_rows(problem: Problem) -> Iterator[bytes]:
+    """The matrix row by row: where each row starts, then columns, then values."""
+    if not problem.rows:
+        return
+    widths = [(family.count, len(family.of_degree(1))) for family in problem.rows]
+    total = sum(count * width for count, width in widths)
+    yield f'<linearConstraintCoefficients numberOfValues="{total}">\n<start>\n<el>0</el>\n'.encode()
+    first = 0
+    for count, width in widths:
+        yield from render([b"<el>", Decimals(first + width * np.arange(1, count + 1)), b"</el>\n"], count)
+        first += count * width
+    yield b"</start>\n<colIdx>\n"
+    for family in problem.rows:
+        parts = [piece for term in family.of_degree(1) for piece in _element(Decimals(term.factors[0]))]
+        yield from render(parts, family.count)
+    yield b"</colIdx>\n<value>\n"
+    for family in problem.rows:
+        parts = [piece for term in family.of_degree(1) for piece in _element(words(coefficient(term)))]
+        yield from render(parts, family.count)
+    yield b"</value>\n</linearConstraintCoefficients>\n"
+
+
+def _element(value: Piece) -> list[Piece]:
+    return [b"<el>", value, b"</el>\n"]
+
+
+def _quadratic(problem: Problem) -> Iterator[bytes]:
+    """The products of objective and rows."""
+    index, value = _coefficients(problem, 2)
+    total = len(value) + sum(family.count * len(family.of_degree(2)) for family in problem.rows)
+    if not total:
+        return
+    yield f'<quadraticCoefficients numberOfQuadraticTerms="{total}">\n'.encode()
+    yield from render(_product(b"-1", Decimals(index[:, 0]), Decimals(index[:, 1]), words(value)), len(value))
+    first = 0
+    for family in problem.rows:
+        row = Decimals(np.arange(first, first + family.count))
+        for term in family.of_degree(2):
+            one, two = map(Decimals, term.factors)
+            yield from render(_product(row, one, two, words(coefficient(term))), family.count)
+        first += family.count
+    yield b"</quadraticCoefficients>\n"
+
+
+def _product(row: Piece, one: Piece, two: Piece, value: Piece) -> Pieces:
+    return [b'<qTerm idx="', row, b'" idxOne="', one, b'" idxTwo="', two, b'" coef="', value, b'"/>\n']
+
+
+def _nonlinear(problem: Problem) -> Iterator[bytes]:
+    """The terms of the objective beyond quadratic, as one sum."""
+    families = [family for family in problem.objective if family.degree > 2]
+    assert all(family.degree <= 2 for family in problem.rows)  # no declaration has others
+    if not families:
+        return
+    yield b'<nonlinearExpressions numberOfNonlinearExpressions="1">\n<nl idx="-1">\n<sum>\n'
+    for family in families:
+        yield from render([*_tree(family, family.family.body), b"\n"], family.count)
+    yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
+
+
+def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
+    """An expression as nodes; parts free of columns become one number."""
+    if is_data(family, expression):
+        return _constant(family, expression)
+    if expression.is_Symbol:
+        return [b'<variable idx="', Decimals(family.columns(expression)), b'"/>']
+    if expression.is_Add or expression.is_Mul:
+        return _chain(family, expression)
+    if expression.is_Pow and expression.exp == 2:
+        return _node(b"square", _tree(family, expression.base))
+    assert isinstance(expression, sp.cos)  # no declaration holds anything else
+    return _node(b"cos", _tree(family, expression.args[0]))
+
+
+def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
+    """A sum or a product, its parts free of columns joined into one number in front."""
+    data, others = split(family, expression)
+    constant = [] if data is None else _constant(family, data)
+    inside = constant + [piece for part in others for piece in _tree(family, part)]
+    return _node(b"sum" if expression.is_Add else b"product", inside)
+
+
+def _constant(family: Bound, expression: sp.Expr) -> list[Piece]:
+    return [b'<number value="', words(family.data(expression)), b'"/>']
+
+
+def _node(name: bytes, inside: list[Piece]) -> list[Piece]:
+    return [b"<" + name + b">", *inside, b"</" + name + b">"]

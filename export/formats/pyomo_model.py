@@ -1,0 +1,117 @@
+"""A problem as a Pyomo model: for people who go on in Pyomo, and a second opinion on the files.
+
+Every term and row is the declaration itself, evaluated over Pyomo variables. Components are named as in the
+files, `alpha[row, column]`, `p1[row, column, side]` with side `u` (upper neighbour) or `r` (right one), row
+families by their tag, the objective `obj`. Python work grows with the number of pixels here: it is meant for
+small sketches, `write` for large ones.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import numpy as np
+import pyomo.environ as pyo
+import sympy as sp
+
+from ...models.field.field import CrossField
+from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.symbols import IndexSet, pixel_of
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from ..writing.canonical import Canonical
+
+Place = tuple[Any, ...]
+"""(row, column) of a pixel, (row, column, side) of a pair."""
+
+_COMPARE: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    "==": operator.eq,
+}
+_FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
+
+
+def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
+    """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
+
+    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has
+    None there.
+    start: a field whose complete point is set as the value of every variable. Raises InstanceError when it is
+    on another instance.
+    """
+    model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
+    point = None if start is None else problem.point(start)
+    form = Canonical(problem)
+    for block in problem.blocks.values():
+        index = places(problem.instance, block.over)
+        model.add_component(block.name, _variables(block, index, _domain(form, block), point))
+    columns = [
+        variable for block in problem.blocks.values() for variable in model.component(block.name).values()
+    ]
+    for family in problem.rows:
+        model.add_component(family.family.tag, _constraints(family, columns))
+    terms = [term for family in problem.objective for term in _values(family, family.family.body, columns)]
+    model.obj = pyo.Objective(expr=pyo.quicksum(terms))
+    return model
+
+
+def places(instance: Instance, over: IndexSet) -> list[Place]:
+    """Where the elements of an index set lie: (row, column), for a pair of its first pixel and then its side."""
+    grid = instance.grid
+    at = pixel_of(instance, over)
+    coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]
+    if over == "pairs":
+        coordinates.append(np.where(grid.upward, "u", "r").tolist())
+    return list(zip(*coordinates, strict=True))
+
+
+def _domain(form: Canonical, block: Block) -> Any:
+    """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary, for bounds stand beside."""
+    if not block.integer:
+        return pyo.Reals
+    return pyo.Binary if form.layout.binary[block.columns].all() else pyo.Integers
+
+
+def _variables(block: Block, index: list[Place], domain: Any, point: Floats | None) -> pyo.Var:
+    """The variables of a block of columns."""
+    ends = (
+        [value if math.isfinite(value) else None for value in bound.tolist()]
+        for bound in (block.lower, block.upper)
+    )
+    bounds = dict(zip(index, zip(*ends, strict=True), strict=True))
+    values = {} if point is None else dict(zip(index, point[block.columns].tolist(), strict=True))
+    return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
+
+
+def _constraints(family: Bound, columns: list[Any]) -> pyo.Constraint:
+    """The rows of a family, left and right side as declared."""
+    declared = places(family.problem.instance, family.family.over)
+    index = [declared[element] for element in family.elements.tolist()]
+    sides = (
+        _values(family, side, columns)
+        for side in (family.family.expression.lhs, family.family.expression.rhs)
+    )
+    compare = _COMPARE[family.family.sense]
+    rows = dict(zip(index, (compare(left, right) for left, right in zip(*sides, strict=True)), strict=True))
+    return pyo.Constraint(index, rule=lambda _, *place: rows[place])
+
+
+def _values(family: Bound, expression: sp.Expr, columns: list[Any]) -> Iterator[Any]:
+    """The expression at each element, over Pyomo variables where a symbol means a column."""
+    symbols = sorted(expression.free_symbols, key=str)
+    evaluate = sp.lambdify(symbols, expression, modules=[_FUNCTIONS, "math"])
+    given = [_arguments(family, symbol, columns) for symbol in symbols]
+    return (
+        evaluate(*arguments) for arguments in (zip(*given, strict=True) if given else [()] * family.count)
+    )
+
+
+def _arguments(family: Bound, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
+    """What a symbol means at each element: a Pyomo variable or a number."""
+    if symbol in family.variables:
+        return [columns[column] for column in family.columns(symbol).tolist()]
+    return np.broadcast_to(family.data(symbol), (family.count,)).tolist()  # type: ignore[no-any-return]

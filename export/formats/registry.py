@@ -1,0 +1,233 @@
+"""The table of file formats, and the one function that writes a problem to a file.
+
+A format states what it carries; what it cannot carry is lifted, which is exact for whole jumps and said to be
+a relaxation for others, or refused by name before the first byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final
+
+from ...models.errors import InputError, UnsupportedByFormatError
+from ...models.field.field import CrossField
+from ...models.formulations.problem import Problem, lifted
+from ...models.instance.grid import Floats
+from ..writing.canonical import Canonical
+from ..writing.sink import save
+
+ANY_DEGREE: Final = 99
+
+
+def _nl(form: Canonical, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+    from . import nl
+
+    return nl.generate(form, binary=dialect == "binary", start=start)
+
+
+def _gms(form: Canonical, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
+    from . import gams_indexed
+    from . import gams_scalar as gams
+
+    generate = gams.generate if dialect == "scalar" else gams_indexed.generate
+    return generate(form, header, start=start)
+
+
+def _lp(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import lp
+
+    return lp.generate(form, header)
+
+
+def _mps(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import mps
+
+    return mps.generate(form, header)
+
+
+def _mod(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import ampl as mod
+
+    return mod.generate(form, header)
+
+
+def _osil(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import osil
+
+    return osil.generate(form, header)
+
+
+def _qplib(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import qplib
+
+    return qplib.generate(form, header, start=start)
+
+
+def _bar(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
+    from . import baron as bar
+
+    return bar.generate(form, header, start=start)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format: what it carries and how it is written.
+
+    degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
+    first;
+    starts: whether a starting point has a place in it; default: whether it is written when no format is asked
+    for.
+    """
+
+    name: str
+    summary: str
+    degree: int
+    generate: Callable[[Canonical, list[str], Floats | None, str], Iterator[bytes]]
+    dialects: tuple[str, ...] = ("",)
+    starts: bool = False
+    default: bool = True
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of its files, with the dot."""
+        return f".{self.name}"
+
+
+FORMATS: Final = {
+    entry.name: entry
+    for entry in (
+        Format("nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro", ANY_DEGREE, _nl, ("text", "binary"), starts=True),
+        Format("gms", "GAMS model, self-contained: sets and equations, or scalar", ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True),
+        Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
+        Format("mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _mps),
+        Format("mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too", ANY_DEGREE, _mod, default=False),
+        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, _osil, default=False),
+        Format("qplib", "QPLIB's own format, at most quadratic", 2, _qplib, starts=True, default=False),
+        Format("bar", "BARON's own format, polynomials", 4, _bar, starts=True, default=False),
+    )
+}  # fmt: skip
+"""The table of formats; command line, docs and tests are generated from it."""
+
+DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.default)
+"""Names of the formats that are written when none is asked for."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: the format and dialect, the problem as the file holds it, and per file name, bytes and SHA-256."""
+
+    format: str
+    dialect: str
+    problem: Problem
+    files: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def lifted(self) -> str:
+        """How products were lifted for this format, empty when they were not."""
+        return self.problem.formulation.lifted
+
+
+@cache
+def generator() -> str:
+    """Name and version of this program, as files carry it."""
+    try:
+        return f"crossfield {version('crossfield')}"
+    except PackageNotFoundError:
+        return "crossfield"
+
+
+def format_of(path: str | Path) -> Format:
+    """The format that a path's suffix names, `.gz` aside. Raises InputError."""
+    name = Path(path).name.removesuffix(".gz")
+    suffix = Path(name).suffix.removeprefix(".")
+    if suffix not in FORMATS:
+        raise InputError(
+            f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz",
+            file=path,
+        )
+    return FORMATS[suffix]
+
+
+def carried(problem: Problem, entry: Format) -> Problem:
+    """The problem as the format can hold it: itself, or with products lifted.
+
+    Raises UnsupportedByFormatError, naming an equivalent formulation, when neither fits.
+    """
+    if _degree(problem) <= entry.degree:
+        return problem
+    if _degree(problem) < ANY_DEGREE:
+        other = lifted(problem)
+        if _degree(other) <= entry.degree:
+            return other
+    instead = problem.formulation.equivalent
+    remedy = f"write {instead}, which is the same problem" if instead else "choose nl or gms"
+    limit = "quadratic" if entry.degree == 2 else f"polynomials of degree {entry.degree}"
+    raise UnsupportedByFormatError(
+        f"{entry.name} holds nothing beyond {limit} and cannot carry {problem.name}; {remedy}"
+    )
+
+
+def _degree(problem: Problem) -> int:
+    return max(problem.objective_degree, problem.row_degree)
+
+
+def header(problem: Problem) -> list[str]:
+    """Lines of comment that say what a file holds."""
+    formulation, options = problem.formulation, problem.formulation.options
+    lines = [
+        f"{generator()}: {'continuous relaxation of ' if options.relax else ''}{formulation.name} (section {formulation.paper}), {problem.problem_class}, {formulation.summary}",
+        f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
+        f"facet {options.facet}, stroke norm {options.stroke_norm}, beta norm {options.beta_norm}, integrality {'dropped' if options.relax else 'kept'}",
+    ]
+    return lines + ([f"lifted: {formulation.lifted}"] if formulation.lifted else [])
+
+
+def write(
+    problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
+) -> Written:
+    """What was written to `path`: its suffix names the format, `.gz` compresses.
+
+    .nl gets .row and .col beside it, .mod its .dat.
+
+    dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point
+    is the starting point where the format has a place for one. Same problem, same bytes. Raises
+    UnsupportedByFormatError before a byte is written, InputError for an unknown suffix or dialect,
+    OutputError.
+    """
+    path = Path(path)
+    entry = format_of(path)
+    chosen = entry.dialects[0] if dialect is None else dialect
+    if chosen not in entry.dialects:
+        raise InputError(
+            f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}"
+        )
+    held = carried(problem, entry)
+    form = Canonical(held)
+    point = held.point(start) if start is not None and entry.starts else None
+    written = Written(entry.name, chosen, held)
+    lines = header(held)
+    written.files[path.name] = save(path, entry.generate(form, lines, point, chosen))
+    for beside, content in _companions(path, entry.name, form, lines):
+        written.files[beside.name] = save(beside, content)
+    return written
+
+
+def _companions(
+    path: Path, name: str, form: Canonical, lines: list[str]
+) -> Iterator[tuple[Path, Iterator[bytes]]]:
+    """The files beside one that is written: names of an .nl, never compressed, and data of a .mod, which are when it is."""
+    stem = path.name.removesuffix(".gz").removesuffix(f".{name}")
+    if name == "nl":
+        yield path.with_name(f"{stem}.row"), form.layout.row_file()
+        yield path.with_name(f"{stem}.col"), form.layout.column_file()
+    if name == "mod":
+        from . import ampl as mod
+
+        yield (
+            path.with_name(f"{stem}.dat{'.gz' if path.suffix == '.gz' else ''}"),
+            mod.data(form.problem, lines),
+        )

@@ -1,0 +1,177 @@
+"""Building a library: what is missing is made, what is whole stays.
+
+Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written
+here and nowhere else, each file beside and renamed, the one that says "done" last. So a build that was
+stopped continues, whatever it was that stopped it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ....models.errors import CrossfieldError
+from ....models.storage import make_folder, write_bytes
+from ..documents.documents import Library, are_whole, read_about, read_library, read_sidecar
+from ..documents.lock import Progress, changing
+from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
+from ..plan.recipe import InstancePlan, plan
+from ..plan.spec import Spec
+from .entry_task import Entry, make_entry
+from .executor import Tasks, ahead, executor
+from .index import write_index
+from .inputs import Inputs
+from .instance_task import Files, about_file, prepare
+
+
+def build(
+    spec: Spec,
+    folder: str | Path,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = lambda _: None,
+) -> Library:
+    """The library of a specification, now in the folder.
+
+    jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
+    progress: called with a line for each entry that is made. Same specification and ledger, same bytes, with
+    any number of processes; on another kind of processor, points may end in other digits. Raises InputError,
+    OutputError, BuildError.
+    """
+    plans = plan(spec)
+    folder, is_new = Path(folder), not Path(folder).exists()
+    make_folder(folder)
+    try:
+        with changing(folder, "a build of the library", progress):
+            return _built(spec, plans, folder, jobs=jobs, scheduler=scheduler, progress=progress)
+    except BaseException:
+        if is_new:
+            with suppress(OSError):  # it may hold what is whole, for the next build
+                folder.rmdir()
+        raise
+
+
+def _built(
+    spec: Spec,
+    plans: Sequence[InstancePlan],
+    folder: Path,
+    *,
+    jobs: int,
+    scheduler: str | None,
+    progress: Progress,
+) -> Library:
+    """The library, by a caller who holds its lock.
+
+    The ledger is written when all else is there: a build that is refused leaves none.
+    """
+    _sweep(folder)
+    ledger = _ledger(spec, plans, folder)
+    with executor(jobs, scheduler) as chosen:
+        tasks = Tasks(chosen, ahead(jobs, scheduler))
+        work = _Build(folder, ledger, plans, tasks, progress)
+        for each in sorted(
+            plans, key=lambda each: -each.recipe.size
+        ):  # the last one goes first: small ones, whose faults show at once
+            work.begin(each)
+        tasks.run()
+    keep(ledger)
+    progress("index and checksums")
+    write_index(folder, spec, plans)
+    return read_library(folder)
+
+
+def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+    """A library brought up to date after its ledger changed; only what the change touches is made again."""
+    folder = read_library(folder).folder
+    with changing(folder, "a build of the library", progress):
+        return rebuilt(folder, jobs=jobs, progress=progress)
+
+
+def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+    """As `rebuild`, for a caller who holds the lock of the library."""
+    spec = read_library(folder).spec
+    return _built(spec, plan(spec), folder, jobs=jobs, scheduler=None, progress=progress)
+
+
+def unmatched(library: Library) -> list[Record]:
+    """The records of a library's ledger that count for nothing:
+    the problem of their entry has changed since.
+    """
+    records = read_ledger(library.folder).records
+    names = {record.entry for record in records} & set(library.document["entries"])
+    problems = {name: library.entry(name)["problem_sha256"] for name in names}
+    return [each for each in records if problems.get(each.entry, each.problem_sha256) != each.problem_sha256]
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a build that was killed while it wrote has left."""
+    for path in folder.glob(".*.part"):
+        path.unlink(missing_ok=True)
+
+
+def _ledger(spec: Spec, plans: Iterable[InstancePlan], folder: Path) -> Ledger:
+    entries = [entry.name for each in plans for entry in each.entries]
+    given = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
+    return merged(folder, given, entries)
+
+
+class _Build:
+    """A build under way: what is to be made, and how far it is."""
+
+    def __init__(
+        self, folder: Path, ledger: Ledger, plans: Iterable[InstancePlan], tasks: Tasks, progress: Progress
+    ) -> None:
+        self.folder, self.tasks, self.progress = folder, tasks, progress
+        self.inputs = Inputs(ledger, plans)
+        self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
+
+    def begin(self, each: InstancePlan) -> None:
+        """Have an instance made, unless it is whole, and then its entries."""
+        task = self.inputs.preparation(each)
+        about = self._whole(task.name, task.sha256)
+        if about is not None:
+            self._entries(each, about)
+            return
+
+        def finish(files: Files) -> None:
+            self._write(files)
+            self._entries(each, read_about(self.folder / about_file(task.name)))
+
+        self.tasks.add(prepare, task, finish)
+
+    def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
+        """What is known of an instance, when it was made from the same and its files are whole."""
+        try:
+            about = read_about(self.folder / about_file(instance))
+        except CrossfieldError:
+            return None
+        return about if about["recipe_sha256"] == sha256 and are_whole(self.folder, about["files"]) else None
+
+    def _entries(self, each: InstancePlan, about: dict[str, Any]) -> None:
+        for task in reversed(list(self.inputs.entries(each, about, self.folder))):
+            if self._is_done(task):
+                self.done += 1
+            else:
+                self.tasks.add(make_entry, task, self._finish(task.name))
+
+    def _finish(self, name: str) -> Callable[[Files], None]:
+        def finish(files: Files) -> None:
+            self._write(files)
+            self.done += 1
+            self.progress(f"{self.done} of {self.total} entries: {name}")
+
+        return finish
+
+    def _is_done(self, task: Entry) -> bool:
+        try:
+            sidecar = read_sidecar(self.folder / f"{task.name}.json")
+        except CrossfieldError:
+            return False
+        return sidecar["recipe_sha256"] == task.sha256 and are_whole(self.folder, sidecar["files"])
+
+    def _write(self, files: Files) -> None:
+        for name, data in files.items():
+            write_bytes(self.folder / name, data)

@@ -1,0 +1,291 @@
+"""The task of each entry: model files in every format, the best known point, and the sidecar.
+
+Like the task of an instance it is a function from values to the bytes of files; the sidecar comes last, so
+that an entry whose sidecar stands and fits is done.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ....models.errors import InputError, UnsupportedByFormatError
+from ....models.field.file import read_field
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.problem import Problem, formulate
+from ....models.instance.file import read_instance
+from ....models.instance.grid import Ints
+from ....models.instance.instance import Instance
+from ...bundle.starts import Start, start_of
+from ...formats.nl import Layout
+from ...formats.registry import generator, write
+from ...solutions.readers.ampl import write_ampl_sol
+from ...writing.curvature import probtype
+from ...writing.records import number
+from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
+from ..documents.statistics import counts, curvature, ranges, tangent_bound
+from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
+from ..ledger.ledger import FILE as LEDGER
+from ..ledger.ledger import Record
+from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
+from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
+from ..plan.recipe import EntryRecipe, digest
+from .instance_task import Files, Submitted
+
+REFERENCES = (
+    (
+        "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization: "
+        "the formulations, whose equation numbers are in the names of the rows"
+    ),
+)
+_SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The task of an entry: its recipe, what is known of its instance, that instance's files,
+    and what the ledger says.
+
+    records and submitted: what the ledger has of all entries of the instance, records and kept fields;
+    relatives: names of the entries that may be related.
+    """
+
+    recipe: EntryRecipe
+    about: dict[str, Any]
+    files: Files
+    records: tuple[Record, ...] = ()
+    submitted: tuple[Submitted, ...] = ()
+    relatives: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the entry."""
+        return self.recipe.name
+
+    @property
+    def sha256(self) -> str:
+        """Stands for all that its files depend on."""
+        submitted = [hashlib.sha256(each.data).hexdigest() for each in self.submitted]
+        records = [asdict(record) for record in self.records]
+        return digest([generator(), asdict(self.recipe), self.about, records, submitted, self.relatives])
+
+
+def make_entry(task: Entry) -> Files:
+    """The files of an entry, the sidecar last."""
+    with (
+        tempfile.TemporaryDirectory(prefix="crossfield-") as given,
+        tempfile.TemporaryDirectory(prefix="crossfield-") as made,
+    ):
+        instance, known = _read(task, Path(given))
+        problem = _formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
+        listed, refused = _models(problem, task.recipe, Path(made))
+        best = best_point(problem, list(known.values()))
+        bounds = _bounds(task, best, instance)
+        status, gap = _status(best, bounds)
+        listed += _points(task, best, Path(made), proven=status == "optimal")
+        facts = {"bounds": bounds, "bound": _greatest(bounds), "status": status, "gap": gap}
+        document = _sidecar(task, best, listed, refused) | facts | _context(task, problem)
+        files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
+        return files | {f"{task.name}.json": as_bytes(document)}
+
+
+def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
+    """The instance, and the fields that are known of it, by their role."""
+    for name, data in task.files.items():
+        (folder / name).write_bytes(data)
+    known = {}
+    for role, facts in task.about["fields"].items():
+        provenance = Provenance(facts["solver"], facts["version"], facts["seconds"], facts["by"])
+        known[role] = Known(read_field(folder / facts["file"]), provenance)
+    instance = read_instance(folder / task.about["instance"]["file"])
+    for place, each in enumerate(task.submitted):
+        submitted = each.known()
+        if submitted.field.instance.sha256 == instance.sha256:
+            known[f"submitted {place}"] = submitted
+    return instance, known
+
+
+def _formulated(instance: Instance, formulation: str, facet: str, jumps: Ints) -> Problem:
+    recipe = FORMULATIONS[formulation]
+    options = {"facet": facet} if "facet" in recipe.settable else {}
+    return formulate(instance, formulation, p=jumps if recipe.fixed else None, **options)
+
+
+def _models(
+    problem: Problem, recipe: EntryRecipe, folder: Path
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Facts of the model files that are now in the folder, and why the other formats are refused."""
+    listed: list[dict[str, Any]] = []
+    refused = {}
+    for name in recipe.formats:
+        path = folder / f"{recipe.name}.{name}{'.gz' if recipe.compress else ''}"
+        try:
+            written = write(problem, path)
+        except UnsupportedByFormatError as error:
+            refused[name] = str(error)
+            continue
+        notes = notes_of(problem, name)
+        kind = {"format": name, "dialect": written.dialect}
+        listed += [{"name": file, **kind, **facts, "notes": notes} for file, facts in written.files.items()]
+    return listed, refused
+
+
+def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
+    """Facts of the files of the best point that are now in the folder: MIPLIB's kind,
+    and AMPL's where there is a .nl.
+    """
+    path = folder / f"{task.name}.sol"
+    path.write_bytes(b"".join(_miplib(best)))
+    listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
+    if "nl" in task.recipe.formats:
+        layout = Layout(best.problem)
+        path = folder / f"{task.name}.nl.sol"
+        message = f"{best.known.provenance.solver}: objective {number(best.objective)}"
+        code = _SOLVED if proven else _NOT_PROVEN
+        write_ampl_sol(path, message, best.point[layout.order], best.problem.row_count, code)
+        listed.append(_listed(path, "ampl", ["columns in the order of the .nl and its .col"]))
+    return listed
+
+
+def _miplib(best: Best) -> Iterator[bytes]:
+    """The lines of a .sol file as MIPLIB has them, in the columns of LP and MPS."""
+    held = start_of(best.problem, best.known.field).problem
+    start = Start(held, complete_point(held, best.known.field))
+    yield f"=obj= {number(start.objective)}\n".encode()
+    yield from start.lines(zeros=False)
+
+
+def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
+    data = path.read_bytes()
+    facts = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    return {"name": path.name, "format": "sol", "dialect": dialect, **facts, "notes": notes}
+
+
+def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]:
+    """The best dual bound of each solver on this problem or one with the same optimum,
+    as the ledger has them; and what follows from the point.
+    """
+    chosen: dict[str, Record] = {}
+    for record in sorted(_records(task, best, instance), key=lambda each: _preference(each, task.name)):
+        chosen.setdefault(record.solver, record)
+    found = [_bound(record, task.name) for record in sorted(chosen.values(), key=lambda each: each.solver)]
+    tangent = tangent_bound(best.problem, best.point)
+    if tangent is not None:
+        found.append(_tangent(tangent))
+    return [each | {"bound": _within(each, best, task.name)} for each in found]
+
+
+def _within(told: dict[str, Any], best: Best, entry: str) -> float:
+    """A bound, cut to the objective of the best point.
+
+    Raises InputError for one that the point contradicts.
+    """
+    bound = float(told["bound"])
+    if contradicts(bound, best.objective):
+        raise InputError(
+            f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, "
+            f"but {entry} has a feasible point of {best.objective!r}; "
+            "that bound is wrong, take its record out",
+            file=LEDGER,
+        )
+    return cut(bound, best.objective)
+
+
+def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
+    """The records with a bound that are about this very problem, or about one with the same optimum."""
+    shas = {task.name: best.problem.sha256}
+    for name, formulation in siblings(task.recipe, task.relatives).items():
+        shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
+    return [
+        each
+        for each in task.records
+        if each.bound is not None and shas.get(each.entry) == each.problem_sha256
+    ]
+
+
+def _preference(record: Record, entry: str) -> tuple[Any, ...]:
+    """The greatest bound first; of equal ones that of the entry itself, then the quickest."""
+    return (-(record.bound or 0.0), record.entry != entry, record.seconds or 0.0, record.rank)
+
+
+def _bound(record: Record, entry: str) -> dict[str, Any]:
+    return {
+        "solver": record.solver,
+        "version": record.version,
+        "bound": record.bound,
+        "status": record.status,
+        "seconds": record.seconds,
+        "threads": record.threads,
+        "via": None if record.entry == entry else record.entry,
+    }
+
+
+def _tangent(bound: float) -> dict[str, Any]:
+    mine = ours("tangent at the point")
+    return {
+        "solver": mine.solver,
+        "version": mine.version,
+        "bound": bound,
+        "status": "computed",
+        "seconds": None,
+        "threads": None,
+        "via": None,
+    }
+
+
+def _greatest(bounds: list[dict[str, Any]]) -> float | None:
+    return max((each["bound"] for each in bounds), default=None)
+
+
+def _status(best: Best, bounds: list[dict[str, Any]]) -> tuple[str, float | None]:
+    bound = _greatest(bounds)
+    if bound is None:
+        return "best known", None
+    return "optimal" if is_proven(best.objective, bound) else "best known", relative_gap(
+        best.objective, bound
+    )
+
+
+def _sidecar(
+    task: Entry, best: Best, listed: list[dict[str, Any]], refused: dict[str, str]
+) -> dict[str, Any]:
+    problem, about = best.problem, task.about
+    inherited = {key: about[key] for key in ("family", "title", "rung", "generator", "source", "instance")}
+    facts = best.facts()
+    named = {each["dialect"]: each["name"] for each in listed if each["format"] == "sol"}
+    numbers = {key: facts.pop(key) for key in ("objective", "violation", "integrality")}
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": task.name,
+        **inherited,
+        "formulation": problem.name,
+        "paper": problem.formulation.paper,
+        "options": asdict(problem.formulation.options),
+        "jumps": listed_jumps(problem),
+        "problem_sha256": problem.sha256,
+        "class": problem.problem_class,
+        "probtype": probtype(problem),
+        "convex": problem.convex,
+        "counts": counts(problem),
+        "curvature": curvature(problem),
+        "ranges": ranges(problem),
+        "files": listed,
+        "refused": refused,
+        "best": {**numbers, "point": named["miplib"], "nl_point": named.get("ampl"), **facts},
+    }
+
+
+def _context(task: Entry, problem: Problem) -> dict[str, Any]:
+    return {
+        "transformations": transformations(problem, task.recipe.formats),
+        "equivalent": equivalent(task.recipe, task.relatives),
+        "not_equivalent": not_equivalent(task.recipe, task.relatives),
+        "licence": LICENCE,
+        "references": list(REFERENCES),
+        "recipe_sha256": task.sha256,
+    }

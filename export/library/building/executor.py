@@ -1,0 +1,155 @@
+"""Where tasks run: in this process, in processes of this machine, or on the workers of a dask scheduler.
+
+All three are executors of `concurrent.futures`. A task is a function from values to values that writes
+nothing, so that a worker may die in the middle of it: it is then done again elsewhere, and its result is used
+once.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Any, Final, ParamSpec, TypeVar
+
+from ....models.errors import CrossfieldError, InputError
+from ....models.processes.side_by_side import checked
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_AHEAD: Final = 64
+"""Tasks that are handed out to a cluster at once: enough for its workers, few enough to keep memory flat."""
+_TRIES: Final = 3  # of a task whose dask worker died
+_PATIENCE: Final = "10s"  # to reach a scheduler
+
+
+class BuildError(CrossfieldError):
+    """Workers that died or went away."""
+
+
+class _Here(Executor):
+    """Runs a task when it is submitted, in this process."""
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        future: Future[T] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def ahead(jobs: int, scheduler: str | None) -> int:
+    """How many tasks are handed out at once:
+    what is handed out and not done is lost when a build is killed.
+    """
+    return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
+
+
+@contextmanager
+def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
+    """Where tasks run. Raises InputError when no scheduler answers or dask is missing;
+    BuildError when workers die.
+    """
+    try:
+        with _cluster(scheduler) if scheduler else _local(jobs) as chosen:
+            yield chosen
+    except BrokenProcessPool as error:
+        raise BuildError(
+            "a process ended before its work was done, for want of memory most likely; "
+            "build again with fewer --jobs, what is whole is kept"
+        ) from error
+
+
+@contextmanager
+def _local(jobs: int) -> Iterator[Executor]:
+    if checked(jobs) == 1:
+        yield _Here()
+        return
+    others = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin_worker)
+    try:
+        yield pool
+    except BaseException:  # what is under way is lost in any case, so nobody waits for it
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and leave with the parent however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        import distributed
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "--scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
+        ) from error
+    try:
+        client: Any = distributed.Client(  # type: ignore[no-untyped-call]
+            address, timeout=_PATIENCE, set_as_default=False
+        )
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"no scheduler answers at {address[:100]}; start one with `dask scheduler`, "
+            "and give its address, say tcp://host:8786"
+        ) from error
+    try:
+        yield client.get_executor(pure=False, retries=_TRIES)
+    except distributed.KilledWorker as error:
+        raise BuildError(
+            "a task ended several workers, for want of memory most likely; see their logs and build again, "
+            "what is whole is kept"
+        ) from error
+    except (CancelledError, distributed.comm.core.CommClosedError) as error:
+        raise BuildError(
+            f"the scheduler at {address[:100]} went away; start it and build again, what is whole is kept"
+        ) from error
+    finally:
+        client.close()
+
+
+class Tasks:
+    """Tasks under way, at most so many at once: each is a function, its value,
+    and what is done here with its result.
+    """
+
+    def __init__(self, chosen: Executor, most: int) -> None:
+        self._executor, self._most = chosen, most
+        self._waiting: list[tuple[Callable[[Any], Any], Any, Callable[[Any], None]]] = []
+        self._running: dict[Future[Any], Callable[[Any], None]] = {}
+
+    def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
+        """Have the function called with the value somewhere, and `finish` here with its result;
+        `finish` may add more, which goes first.
+        """
+        self._waiting.append((function, value, finish))
+
+    def run(self) -> None:
+        """Come back when all tasks are done. Raises what a task raises."""
+        while self._waiting or self._running:
+            while self._waiting and len(self._running) < self._most:
+                function, value, finish = self._waiting.pop()
+                self._running[self._executor.submit(function, value)] = finish
+            done, _ = wait(self._running, return_when=FIRST_COMPLETED)
+            for future in done:
+                self._running.pop(future)(future.result())

@@ -1,0 +1,139 @@
+"""The files about a library as a whole: texts, drawings, checker, library.solu,
+library.json and SHA256SUMS.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.storage import read_bytes, sha256_of, write_bytes
+from ....templates import ENVIRONMENT
+from ...formats.registry import FORMATS, generator
+from ...writing.records import number
+from ..documents import check_point
+from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
+from ..ledger.ledger import FILE as LEDGER
+from ..ledger.ledger import read_ledger
+from ..plan.recipe import InstancePlan
+from ..plan.spec import RUNGS, Spec
+from .instance_task import about_file
+
+CHECKER: Final = "check_point.py"
+SOLU: Final = "library.solu"
+SUMS: Final = "SHA256SUMS"
+TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
+
+_OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
+
+
+def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None:
+    """Write all that is about the library as a whole, SHA256SUMS last;
+    files of entries that are no longer in it are removed.
+    """
+    plans = tuple(plans)
+    sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
+    written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
+    for name, data in written.items():
+        write_bytes(folder / name, data)
+    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *_of_ledger(folder)]
+    _remove_stale(folder, set(present))
+    sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
+    write_bytes(folder / SUMS, sums.encode())
+
+
+def general(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, bytes]:
+    """The files that tell of the library as a whole, by name: texts, drawings, checker and library.solu."""
+    context = _context(spec, sidecars)
+    texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
+    drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
+    checker = read_bytes(Path(check_point.__file__))
+    return texts | drawings | {CHECKER: checker, SOLU: "".join(_solu(sidecars)).encode()}
+
+
+def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+    """What the texts tell."""
+    rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
+    written = {file["format"] for each in sidecars for file in each["files"]}
+    return {
+        "spec": spec,
+        "generator": generator(),
+        "version": version("crossfield"),
+        "rungs": [rung for rung in rungs if rung["entries"]],
+        "instances": len({each["instance"]["sha256"] for each in sidecars}),
+        "entries": len(sidecars),
+        "tokens": {name: FORMULATIONS[name].short for name in spec.formulations},
+        "kinds": {each["formulation"]: each for each in reversed(sidecars)},
+        "formats": [entry for name, entry in FORMATS.items() if name in written],
+        "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),
+        "example": sidecars[0],
+    }
+
+
+def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+    """What the texts tell of a rung: its sizes, and how many entries it has and how many
+    of them have a proven optimum.
+    """
+    sizes = sorted({each["source"]["size"] for each in sidecars})
+    proven = sum(each["status"] == "optimal" for each in sidecars)
+    return {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven}
+
+
+def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:
+    """Lines as MINLPLib and SCIP have them: =opt= where the optimum is proven, else =best= and =bestdual=."""
+    for each in sidecars:
+        tag = "=opt=" if each["status"] == "optimal" else "=best="
+        yield f"{tag} {each['name']} {number(each['best']['objective'])}\n"
+        if each["status"] != "optimal" and each["bound"] is not None:
+            yield f"=bestdual= {each['name']} {number(each['bound'])}\n"
+
+
+def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
+    names = [each["name"] for each in sidecars]
+    return {
+        "format": INDEX_FORMAT,
+        "version": VERSION,
+        "generator": generator(),
+        "spec": spec.document(),
+        "entries": names,
+        "sha256": {name: sha256_of(folder / f"{name}.json") for name in names},
+    }
+
+
+def _of_instances(folder: Path, plans: tuple[InstancePlan, ...]) -> list[str]:
+    found = []
+    for each in plans:
+        name = about_file(each.recipe.name)
+        found += [name, *(file["name"] for file in read_about(folder / name)["files"])]
+    return found
+
+
+def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
+    return [
+        name
+        for each in sidecars
+        for name in (f"{each['name']}.json", *(file["name"] for file in each["files"]))
+    ]
+
+
+def _of_ledger(folder: Path) -> list[str]:
+    return [record.point for record in read_ledger(folder).records if record.point is not None]
+
+
+def _remove_stale(folder: Path, present: set[str]) -> None:
+    """Remove files that an earlier build listed and this one does not have; nobody else's."""
+    sums = folder / SUMS
+    if not sums.is_file():
+        return
+    for line in read_bytes(sums).decode("ascii", "replace").splitlines():
+        expected, _, name = line.partition("  ")
+        path = folder / name
+        if name in present or not _OURS.fullmatch(name) or not path.is_file():
+            continue
+        if hashlib.sha256(path.read_bytes()).hexdigest() == expected:
+            path.unlink()

@@ -1,0 +1,197 @@
+"""Checking an entry of a library against its problem, formulated again from the instance: facts, model files,
+points, bounds.
+
+The entry is made again from what it was made of, and compared with what is in the library, model files
+unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
+that ships with every library, against the .mps and the instance without any rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ....models.errors import CrossfieldError
+from ....models.formulations.problem import Problem
+from ...formats.registry import generator
+from ...solutions.solution import Solution, read_solution
+from ...writing.curvature import probtype
+from ..building.entry_task import Entry
+from ..documents.check_point import BadInputError, check
+from ..documents.documents import problem_of
+from ..documents.statistics import counts, curvature, ranges
+from ..ledger.dual_bounds import is_proven, relative_gap
+from ..ledger.ledger import FILE as LEDGER
+from ..ledger.ledger import Ledger
+from ..ledger.points import complete_point
+from .finding import BUILD, FEASIBLE, Finding, close, of_error
+from .made_again import entry_findings
+
+
+def verify_entry(
+    folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None
+) -> Iterator[Finding]:
+    """What is wrong with an entry whose sidecar obeys its schema and whose files are those that it lists.
+
+    task: what it was made of; None where that is damaged or missing, which is told elsewhere.
+    """
+    name = f"{sidecar['name']}.json"
+    try:
+        problem = problem_of(folder, sidecar)
+    except CrossfieldError as error:
+        yield of_error(error, Path(error.file or name).name)
+        return
+    if sidecar["generator"] != generator():
+        made = f"was made by {sidecar['generator']}, so that {generator()} cannot make it again to compare it"
+        yield Finding(name, made, f"verify with {sidecar['generator']}")
+        task = None
+    yield from _facts(name, sidecar, problem) if task is None else _again(folder, sidecar, task)
+    if sidecar["best"] is not None:
+        yield from _points(folder, sidecar, problem)
+        yield from _exactly(folder, sidecar)
+        yield from _unused(sidecar, problem, ledger)
+    yield from _bounds(name, sidecar)
+
+
+def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
+    """What differs from the entry made again, or why it cannot be made."""
+    try:
+        yield from entry_findings(folder, sidecar, task)
+    except CrossfieldError as error:
+        yield of_error(error, Path(error.file or f"{task.name}.json").name)
+
+
+def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
+    """The sidecar tells of its problem what is so."""
+    instance = problem.instance
+    grid = {"pixels": instance.grid.size, "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
+    facts: dict[str, Any] = {
+        "class": problem.problem_class,
+        "convex": problem.convex,
+        "probtype": probtype(problem),
+        "counts": counts(problem),
+        "curvature": curvature(problem),
+        "ranges": ranges(problem),
+        "instance": sidecar["instance"] | grid | {"sha256": instance.sha256},
+    }
+    for key, value in facts.items():
+        if sidecar[key] != value:
+            yield Finding(name, f"tells another {key} than its problem has", BUILD)
+
+
+def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
+    """The files of the best known point can be read and have the objective and the
+    violations that the sidecar tells.
+    """
+    best, listed = sidecar["best"], {file["name"] for file in sidecar["files"]}
+    for key in ("point", "nl_point"):
+        name = best[key]
+        if name is None:
+            continue
+        if name not in listed:
+            yield Finding(f"{sidecar['name']}.json", f"names {name} as a point and does not list it", BUILD)
+            continue
+        try:
+            solution = read_solution(folder / name, problem)
+        except CrossfieldError as error:
+            yield of_error(error, name)
+            continue
+        yield from (Finding(name, what, BUILD) for what in _differences(best, solution))
+
+
+def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
+    """In what a point that was read differs from what a sidecar tells of it."""
+    if solution.objective is None or solution.violation is None:
+        yield "holds no point"
+        return
+    if not close(solution.objective, best["objective"]):
+        yield f"has objective {solution.objective!r}, but its sidecar tells {best['objective']!r}"
+    if solution.reported is not None and not close(solution.reported, best["objective"]):
+        yield f"claims objective {solution.reported!r}, but its sidecar tells {best['objective']!r}"
+    found = solution.violation
+    if found.worst > FEASIBLE:
+        yield f"is not feasible: worst violation {found.worst:.3g}"
+    elif not close(max(found.rows, found.bounds), best["violation"]) or not close(
+        found.integrality, best["integrality"]
+    ):
+        yield "has other violations than its sidecar tells"
+    if not close(solution.field.energy().total, best["energy_2norm"]):
+        yield (
+            f"is of a field of energy {solution.field.energy().total!r}, "
+            f"but its sidecar tells {best['energy_2norm']!r}"
+        )
+
+
+def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
+    """The checker finds the same without rounding: against the .mps,
+    and where jumps are variables against the instance.
+    """
+    best, point = sidecar["best"], folder / sidecar["best"]["point"]
+    models = [(file["name"], best["objective"]) for file in sidecar["files"] if file["format"] == "mps"]
+    if sidecar["jumps"] is None:
+        models.append((sidecar["instance"]["file"], best["energy_2norm"]))
+    for model, told in models:
+        try:
+            found = check(str(folder / model), str(point))
+        except BadInputError as error:
+            yield Finding(
+                point.name, f"the checker refuses it: {str(error).removeprefix(f'{folder}/')}", BUILD
+            )
+            continue
+        if float(found.worst) > FEASIBLE:
+            yield Finding(
+                point.name,
+                f"is not feasible against {model}: worst violation {float(found.worst):.3g}",
+                BUILD,
+            )
+        if not close(float(found.objective), told):
+            yield Finding(
+                point.name,
+                f"has {float(found.objective)!r} against {model}, but its sidecar tells {told!r}",
+                BUILD,
+            )
+
+
+def _unused(sidecar: dict[str, Any], problem: Problem, ledger: Ledger) -> Iterator[Finding]:
+    """No field of the ledger is better than the best known point: then the build after it was stopped."""
+    record = ledger.with_point(sidecar["name"])
+    if record is None or record.problem_sha256 != problem.sha256:
+        return
+    try:
+        objective = problem.objective_value(complete_point(problem, ledger.field(record)))
+    except CrossfieldError:
+        return  # told with the ledger
+    if record.primal is not None and not close(objective, record.primal):
+        yield Finding(
+            LEDGER,
+            f"tells another objective of {record.point} than it has",
+            "restore it, or submit the point again",
+        )
+    told = sidecar["best"]["objective"]
+    if objective < told and not close(objective, told):
+        yield Finding(
+            f"{sidecar['name']}.json", f"tells a worse point than {record.point}, which the ledger has", BUILD
+        )
+
+
+def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
+    """Bounds, status and gap follow from each other and from the best known point."""
+    bounds = [each["bound"] for each in sidecar["bounds"] if each["bound"] is not None]
+    bound = max(bounds, default=None)
+    if sidecar["bound"] != bound:
+        yield Finding(
+            name, f"tells the bound {sidecar['bound']}, but the best of its bounds is {bound}", BUILD
+        )
+    if sidecar["best"] is None:
+        return
+    objective = sidecar["best"]["objective"]
+    if bound is not None and bound > objective:
+        yield Finding(
+            name, f"has a dual bound {bound!r} above the objective {objective!r} of its point", BUILD
+        )
+    expected: tuple[str, float | None] = ("best known", None)
+    if bound is not None:
+        expected = "optimal" if is_proven(objective, bound) else "best known", relative_gap(objective, bound)
+    if (sidecar["status"], sidecar["gap"]) != expected:
+        yield Finding(name, "tells another status or gap than follows from its bounds and its point", BUILD)

@@ -1,0 +1,344 @@
+"""Checking a library as a whole: every file whole and accounted for, every document to its schema,
+every entry as its sidecar says.
+
+Nothing that a file says is believed: problems are formulated again from their instances (`verify_entry`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from ....models.errors import CrossfieldError, InputError
+from ....models.field.field import CrossField
+from ....models.field.file import read_field
+from ....models.storage import read_bytes, sha256_of
+from ...formats.registry import generator
+from ..building.entry_task import Entry
+from ..building.index import CHECKER, SOLU, SUMS, TEXTS, general
+from ..building.inputs import Inputs
+from ..building.instance_task import about_file
+from ..documents import check_point
+from ..documents.archive import opened
+from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
+from ..documents.lock import FILE as LOCK
+from ..ledger.ledger import FILE as LEDGER
+from ..ledger.ledger import Ledger, read_ledger
+from ..plan.recipe import plan
+from .check_entry import verify_entry
+from .finding import BUILD, Finding, close, of_error
+from .made_again import instance_findings
+
+FETCH: Final = "fetch it again, or build the library again"
+REMOVE: Final = "remove it"
+PLAIN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+"""Names of files that a library may hold."""
+
+_SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
+_FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
+
+
+def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
+    """What is wrong with a library in a folder or an archive; nothing when all is as it should be.
+
+    progress: called with a line for each step. Raises InputError when there is no library.
+    """
+    with opened(folder) as place:
+        if not (place / INDEX).is_file() and not (place / SUMS).is_file():
+            raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
+        return list(_Verification(place, progress).findings())
+
+
+class _Verification:
+    """A verification under way: which files are there, which are not as SHA256SUMS says,
+    and which belong to something.
+    """
+
+    def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
+        self.folder, self.progress = folder, progress
+        self.present: set[str] = set()
+        self.damaged: set[str] = set()
+        self.known = {SUMS, INDEX, LEDGER, SOLU, CHECKER, *TEXTS}
+
+    def findings(self) -> Iterator[Finding]:
+        """Everything that is wrong, in the order in which it is looked for."""
+        self.progress("files and checksums")
+        yield from self._files()
+        listed: set[str] = set()
+        yield from self._checksums(listed)
+        try:
+            library = read_library(self.folder)
+        except CrossfieldError as error:
+            yield of_error(error, INDEX)
+            return
+        yield from self._index(library)
+        yield from self._entries(library)
+        for name in sorted(self.present - self.known):
+            if name in listed:  # else it was told already
+                yield Finding(name, "belongs to nothing in the library", REMOVE)
+
+    def _files(self) -> Iterator[Finding]:
+        """Everything in the folder is a plain file."""
+        for path in sorted(self.folder.iterdir()):
+            if path.name == LOCK:  # of a change under way, or of one that was killed
+                continue
+            if path.is_symlink() or not path.is_file():
+                kind = "a link" if path.is_symlink() else "a folder, or no plain file"
+                yield Finding(path.name, f"is {kind}; a library is flat and holds files alone", REMOVE)
+            elif path.name.startswith(".") and path.name.endswith(".part"):
+                yield Finding(path.name, "was left by a build that was stopped", BUILD)
+            else:
+                self.present.add(path.name)
+
+    def _checksums(self, listed: set[str]) -> Iterator[Finding]:
+        """Every file is in SHA256SUMS and has that checksum; `listed` gets the names there."""
+        if SUMS not in self.present:
+            yield Finding(SUMS, "is missing", FETCH)
+            return
+        for number, line in enumerate(_text(self.folder / SUMS).splitlines(), 1):
+            parts = _SUM.fullmatch(line)
+            if parts is None:
+                yield Finding(SUMS, f"line {number} is no checksum and name", FETCH)
+            elif not PLAIN.fullmatch(parts[2]) or parts[2] in listed:
+                yield Finding(
+                    SUMS,
+                    f"line {number} names {parts[2][:60]!r}, which is no plain file name, or there twice",
+                    FETCH,
+                )
+            else:
+                listed.add(parts[2])
+                yield from self._checksum(parts[2], parts[1])
+        for name in sorted(self.present - listed - {SUMS}):
+            yield Finding(name, "is not in SHA256SUMS", f"{REMOVE}, or {BUILD}")
+
+    def _checksum(self, name: str, expected: str) -> Iterator[Finding]:
+        if name not in self.present:
+            yield Finding(name, "is missing", FETCH)
+        elif sha256_of(self.folder / name) != expected:
+            self.damaged.add(name)
+            yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
+
+    def _index(self, library: Library) -> Iterator[Finding]:
+        """The index names its sidecars, and they are those of its specification;
+        texts and checker are there.
+        """
+        document = library.document
+        names = document["entries"]
+        if sorted(document["sha256"]) != sorted(names):
+            yield Finding(INDEX, "lists other entries than it has checksums for", BUILD)
+        for name in names:
+            path = self.folder / f"{name}.json"
+            if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
+                yield Finding(path.name, f"has another SHA-256 than {INDEX} says", BUILD)
+        try:
+            spec = library.spec
+            planned = [entry.name for each in plan(spec) for entry in each.entries]
+        except CrossfieldError as error:
+            yield of_error(error, INDEX)
+        else:
+            self.known |= {name for sketch in spec.sketches for name in sketch.files}
+            if planned != names:
+                yield Finding(INDEX, "lists other entries than its specification asks for", BUILD)
+        for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
+            yield Finding(name, "is missing", FETCH)
+        ours = read_bytes(Path(check_point.__file__))
+        if (
+            CHECKER in self.present
+            and document["generator"] == generator()
+            and read_bytes(self.folder / CHECKER) != ours
+        ):
+            yield Finding(CHECKER, f"is not the checker of {generator()}", BUILD)
+
+    def _entries(self, library: Library) -> Iterator[Finding]:
+        """Ledger, instances, entries and library.solu."""
+        try:
+            ledger = read_ledger(self.folder)
+        except CrossfieldError as error:
+            yield of_error(error, LEDGER)
+            ledger = Ledger(self.folder)
+        yield from self._ledger(ledger, library)
+        inputs, sidecars, sound = self._inputs(library, ledger), [], True
+        names = library.document["entries"]
+        for number, name in enumerate(names, 1):
+            self.progress(f"{number} of {len(names)}: {name}")
+            self.known.add(f"{name}.json")
+            try:
+                sidecar = read_sidecar(self.folder / f"{name}.json")
+            except CrossfieldError as error:
+                yield of_error(error, f"{name}.json")
+                continue
+            sidecars.append(sidecar)
+            self.known |= {file["name"] for file in sidecar["files"]}
+            wrong = list(self._entry(name, sidecar, ledger, inputs))
+            yield from wrong
+            sound = sound and not wrong
+        yield from self._instances(sidecars, inputs)
+        yield from self._solu(sidecars)
+        if sound and len(sidecars) == len(names):
+            yield from self._texts(library, sidecars)
+
+    def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
+        """What the library was made of; nothing, when its specification is damaged,
+        which is told with the index.
+        """
+        try:
+            return Inputs(ledger, plan(library.spec))
+        except CrossfieldError:
+            return Inputs(ledger, ())
+
+    def _task(self, name: str, inputs: Inputs) -> Entry | None:
+        """What an entry was made of; None where that is damaged or missing, which is told elsewhere."""
+        for each in inputs.plans:
+            if name in {entry.name for entry in each.entries}:
+                try:
+                    about = read_about(self.folder / about_file(each.recipe.name))
+                    return next(
+                        task for task in inputs.entries(each, about, self.folder) if task.name == name
+                    )
+                except CrossfieldError:
+                    return None
+        return None
+
+    def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
+        """Texts and drawings are those that this version makes of sound sidecars."""
+        if library.document["generator"] != generator():
+            return
+        try:
+            made = general(library.spec, sidecars)
+        except CrossfieldError:
+            return  # told with the index
+        for name in sorted({*made} - {CHECKER, SOLU}):
+            if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
+                yield Finding(name, "is not what follows from the specification and the sidecars", BUILD)
+
+    def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger, inputs: Inputs) -> Iterator[Finding]:
+        if sidecar["name"] != name:
+            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}", BUILD)
+        lost = list(self._listed(f"{name}.json", sidecar["files"]))
+        yield from lost
+        try:
+            if not lost:
+                yield from verify_entry(self.folder, sidecar, ledger, self._task(name, inputs))
+        except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
+            yield Finding(f"{name}.json", "holds values that no entry can have", BUILD)
+
+    def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
+        """Every file that a document lists is there, with the size and the checksum that it says."""
+        for file in files:
+            name = file["name"]
+            if not PLAIN.fullmatch(name):
+                yield Finding(by, f"names {name[:60]!r}, which is no plain file name", BUILD)
+            elif name not in self.present:
+                yield Finding(name, f"is missing, but {by} lists it", FETCH)
+            elif ((path := self.folder / name).stat().st_size, sha256_of(path)) != (
+                file["bytes"],
+                file["sha256"],
+            ):
+                yield Finding(name, f"is not the file that {by} lists", BUILD)
+
+    def _ledger(self, ledger: Ledger, library: Library) -> Iterator[Finding]:
+        """Every record is about an entry of the library, and its field is there."""
+        for record in ledger.records:
+            if record.entry not in library.document["sha256"]:
+                yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library", BUILD)
+            if record.point is not None:
+                self.known.add(record.point)
+                try:
+                    ledger.field(record)
+                except CrossfieldError as error:
+                    yield of_error(error, record.point)
+
+    def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
+        """Every instance with its fields is as its own document says,
+        and as the sidecars of its entries do.
+        """
+        self.progress("instances")
+        wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
+        for file, instance in sorted(wanted.items()):
+            name = about_file(file.removesuffix(".instance.json"))
+            self.known |= {name, file}
+            try:
+                about = read_about(self.folder / name)
+            except CrossfieldError as error:
+                yield of_error(error, name)
+                continue
+            self.known |= {each["name"] for each in about["files"]}
+            lost = list(self._listed(name, about["files"]))
+            yield from lost
+            if about["instance"] != instance:
+                yield Finding(name, "is about another instance than the sidecars of its entries", BUILD)
+            elif not lost:
+                yield from self._fields(name, about)
+                yield from self._recipe(name, about, inputs)
+
+    def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
+        """An instance is told to be what its recipe says, made by the same version."""
+        planned = [each for each in inputs.plans if about_file(each.recipe.name) == name]
+        if about["generator"] != generator() or not planned:
+            return
+        try:
+            yield from instance_findings(self.folder, name, about, inputs.preparation(planned[0]))
+        except CrossfieldError as error:
+            yield of_error(error, Path(error.file or name).name)
+
+    def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
+        """Every field is on its instance and has the energies that are told of it;
+        the least ones are least.
+        """
+        fields = about["fields"]
+        for role, facts in fields.items():
+            try:
+                field = self._field(facts["file"], about)
+            except CrossfieldError as error:
+                yield of_error(error, facts["file"])
+                continue
+            told = (facts["energy_2norm"], facts["energy_1norm"])
+            if field is None:
+                yield Finding(facts["file"], f"is not a field of {about['name']}", BUILD)
+            elif not all(map(close, told, (field.energy(2).total, field.energy(1).total))):
+                yield Finding(name, f"tells other energies of its field {role} than it has", BUILD)
+        for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
+            if fields[role][energy] > min(facts[energy] for facts in fields.values()):
+                yield Finding(name, f"its field {role} is not the one of least energy", BUILD)
+
+    def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
+        """The field in a file that belongs to an instance, None when it does not."""
+        if name not in {each["name"] for each in about["files"]}:
+            return None
+        field = read_field(self.folder / name)
+        return field if field.instance.sha256 == about["instance"]["sha256"] else None
+
+    def _solu(self, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
+        """library.solu says of each entry what its sidecar says, and no more."""
+        if SOLU not in self.present:
+            return
+        told: dict[tuple[str, str], float] = {}
+        for number, line in enumerate(_text(self.folder / SOLU).splitlines(), 1):
+            fact = _FACT.fullmatch(line)
+            if fact is None or (fact[2], fact[1]) in told or not _is_number(fact[3]):
+                yield Finding(SOLU, f"line {number} is no fact, or there twice", BUILD)
+            else:
+                told[fact[2], fact[1]] = float(fact[3])
+        expected = {}
+        for sidecar in sidecars:
+            proven = sidecar["status"] == "optimal"
+            if sidecar["best"] is not None:
+                expected[sidecar["name"], "opt" if proven else "best"] = sidecar["best"]["objective"]
+            if not proven and sidecar["bound"] is not None:
+                expected[sidecar["name"], "bestdual"] = sidecar["bound"]
+        for name, tag in sorted({key for key, _ in told.items() ^ expected.items()}):
+            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says", BUILD)
+
+
+def _text(path: Path) -> str:
+    return read_bytes(path).decode("utf-8", "replace")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

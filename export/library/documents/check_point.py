@@ -1,0 +1,811 @@
+"""Check a point of an instance of the library with exact arithmetic: `python check_point.py MODEL POINT`.
+
+One file, Python 3.9 or newer, nothing to install, no solver.
+
+MODEL   a .mps or .mps.gz of the library, or the .instance.json that its formulations share
+POINT   names and values, one pair a line: a MIPLIB .sol (`=obj=` first), a .sol of Gurobi or SCIP, or a plain
+        list; also .gz. A column that is left out is 0, or what it is fixed to.
+
+Against an MPS file the objective and the violations of bounds, rows and integrality are exact: every number
+is the decimal that stands in the files, and decimals are added and multiplied without rounding (Python's
+decimal, which would raise an error at the first rounding). Against an instance the energies of its cross
+field are computed from their definition; there the numbers are the doubles nearest to the decimals of the
+instance, and pi has 60 digits.
+
+Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong
+usage or a file that cannot be used. An objective that a file claims is compared with that of an MPS file, to
+1e-5 of its size, or of 1: solvers tell what they have to about 1e-6.
+"""
+
+from __future__ import annotations
+
+import argparse
+import decimal
+import gzip
+import json
+import math
+import re
+import sys
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import NoReturn, Optional, TypeVar
+
+PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
+ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
+EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
+"""Arithmetic that raises an error rather than round;
+the longest sum of products of three numbers has some 3,000 digits.
+"""
+
+INFINITE = Decimal("1e20")  # bounds from here on are none, as in all solvers
+
+LONGEST_LINE = 1 << 20
+MOST_BYTES = 1 << 30  # of a file, unpacked: a small .gz that holds more is a trap
+MOST_BYTES_OF_JSON = 1 << 27
+LONGEST_NUMBER = 100
+GREATEST_EXPONENT = 400
+
+BOUNDS = {
+    **dict.fromkeys(("LO", "LI"), (("lower",), True)),
+    **dict.fromkeys(("UP", "UI"), (("upper",), True)),
+    "FX": (("lower", "upper"), True),
+    **dict.fromkeys(("FR", "BV"), (("lower", "upper"), False)),
+    "MI": (("lower",), False),
+    "PL": (("upper",), False),
+}
+"""Kinds of bounds: the ends that they set, and whether a value follows."""
+
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+CLAIM = Decimal("1e-5")  # how far the objective may be from a claimed one, as a part of its size, or of 1
+MARK = "\ufeff"  # a byte order mark, which some editors put before a text
+ADDED = re.compile(
+    r"ONE|Constant|(?:MPS_)?Rg.*|nlobjvar|quadobjvar|qmatrixvar|objconstvar|~r_\d+|objvar|"
+    r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"
+)
+"""Columns that solvers and their readers add to a model; in a point they are passed over."""
+
+ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
+
+Entry = tuple[int, Decimal]
+Product = tuple[int, int, Decimal]
+Matrix = dict[tuple[int, int], Decimal]
+Place = tuple[Decimal, str]
+Jump = tuple[Decimal, Decimal]
+Interval = tuple[Optional[Decimal], Optional[Decimal]]
+Kind = TypeVar("Kind")
+
+
+class BadInputError(Exception):
+    """A file or an argument that cannot be used; the message is one line."""
+
+
+class Column:
+    """A column: bounds, None where there is none, and whether it is integer."""
+
+    def __init__(self, name: str, *, integer: bool) -> None:
+        self.name = name
+        self.integer = integer
+        self.lower: Decimal | None = ZERO
+        self.upper: Decimal | None = None
+        self.bounded: set[str] = set()  # the ends that a record of BOUNDS names
+
+
+class Row:
+    """A row or the objective: sense N, L, G or E, right side, range, linear entries, products."""
+
+    def __init__(self, name: str, sense: str) -> None:
+        self.name = name
+        self.sense = sense
+        self.side = ZERO
+        self.range: Decimal | None = None
+        self.linear: list[Entry] = []
+        self.products: list[Product] = []
+
+    def value(self, point: Sequence[Decimal]) -> Decimal:
+        """The exact value of its left side at a point."""
+        total = sum((factor * point[at] for at, factor in self.linear), ZERO)
+        return sum((factor * point[i] * point[j] for i, j, factor in self.products), total)
+
+    def interval(self) -> Interval:
+        """The least and the greatest value that its left side may take."""
+        side, length = self.side, self.range
+        if self.sense == "E":
+            lower = side if length is None else min(side, side + length)
+            return lower, side if length is None else max(side, side + length)
+        if self.sense == "L":
+            return None if length is None else side - abs(length), side
+        return side, None if length is None else side + abs(length)
+
+
+class Model:
+    """A model: columns and rows by name, the objective, and whether it is maximised."""
+
+    def __init__(self) -> None:
+        self.columns: list[Column] = []
+        self.number: dict[str, int] = {}
+        self.rows: dict[str, Row] = {}
+        self.objective: Row | None = None
+        self.free: set[str] = set()  # further N rows
+        self.maximised = False
+
+    def row(self, name: str) -> Row | None:
+        """The row of that name, the objective among them; None for a further N row."""
+        if self.objective is not None and name == self.objective.name:
+            return self.objective
+        if name in self.free:
+            return None
+        if name not in self.rows:
+            raise BadInputError(f"there is no row {name[:40]}")
+        return self.rows[name]
+
+    def value(self, point: Sequence[Decimal]) -> Decimal:
+        """The objective at a point, its constant included."""
+        assert self.objective is not None
+        return self.objective.value(point) - self.objective.side
+
+    def column(self, name: str) -> int:
+        """The number of the column of that name."""
+        if name not in self.number:
+            raise BadInputError(f"there is no column {name[:40]}")
+        return self.number[name]
+
+
+class Finding:
+    """What was found of a point.
+
+    Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and
+    whether the file's own point has the objective that it claims, if it claims one that can be compared.
+    """
+
+    def __init__(
+        self,
+        objective: Decimal,
+        lines: list[tuple[str, str]],
+        violations: dict[str, Place],
+        *,
+        agrees: bool = True,
+    ) -> None:
+        self.objective = objective
+        self.agrees = agrees
+        self.lines = lines
+        self.violations = violations
+
+    @property
+    def worst(self) -> Decimal:
+        """The largest violation of all."""
+        return max(value for value, _ in self.violations.values())
+
+
+# ---------------------------------------------------------------------------------------------------- reading
+
+
+def number(text: str) -> Decimal:
+    """The exact value of a decimal number."""
+    if len(text) <= LONGEST_NUMBER and NUMBER.fullmatch(text):
+        value = Decimal(text)
+        if abs(value.adjusted()) <= GREATEST_EXPONENT:
+            return value
+    raise BadInputError(f"{text[:40]!r} is not a finite number of reasonable length")
+
+
+def _require(condition: object, otherwise: str) -> None:
+    """Nothing, when the condition holds; else the error."""
+    if not condition:
+        raise BadInputError(otherwise)
+
+
+def lines_of(path: str) -> Iterator[tuple[int, str]]:
+    """The lines of a text file, unpacked where it is a gzip file, with their numbers from 1."""
+    total = 0
+    try:
+        with open(path, "rb") as raw:  # noqa: PTH123 - a path as it was typed is enough here
+            packed = raw.read(2) == b"\x1f\x8b"
+            raw.seek(0)
+            with gzip.open(raw) if packed else raw as stream:
+                for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), b""), 1):
+                    total += len(line)
+                    _require(len(line) < LONGEST_LINE and total <= MOST_BYTES, "is unreasonably long")
+                    text = line.decode("utf-8")
+                    yield at, text[len(MARK) :] if at == 1 and text.startswith(MARK) else text
+    except UnicodeDecodeError:
+        raise BadInputError("is not a text file") from None
+    except (EOFError, zlib.error, gzip.BadGzipFile):
+        raise BadInputError("the packed file is damaged or cut off") from None
+    except OSError as error:
+        raise BadInputError(f"cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+class MpsReader:
+    """Reads free MPS, section by section: NAME, OBJSENSE, ROWS, COLUMNS, RHS, RANGES, BOUNDS,
+    quadratic sections, ENDATA.
+    """
+
+    def __init__(self) -> None:
+        self.model = Model()
+        self.numbers: dict[str, Decimal] = {}  # coefficients are few, so each is converted once
+        self.integer = False
+        self.current: tuple[str, set[str]] = ("", set())
+        self.given: set[tuple[str, str]] = set()  # (section, row) or (end of a bound, column)
+        self.matrices: dict[tuple[str, str], Matrix] = {}
+        self.matrix: Matrix = {}
+        self.readers = {
+            "OBJSENSE": self.sense,
+            "ROWS": self.row,
+            "COLUMNS": self.entries,
+            "RHS": self.side,
+            "RANGES": self.range,
+            "BOUNDS": self.bound,
+            "QUADOBJ": self.product,
+            "QMATRIX": self.product,
+            "QSECTION": self.product,
+            "QCMATRIX": self.product,
+        }
+
+    def read(self, lines: Iterable[tuple[int, str]]) -> Model:
+        """The model that the lines hold."""
+        section = ""
+        for at, line in lines:
+            words = line.split()
+            if not words or line.startswith("*"):
+                continue
+            try:
+                if not line[0].isspace():
+                    section = words[0]
+                    self.begin(section, words[1:])
+                else:
+                    _require(section in self.readers, "stands outside of every section")
+                    self.readers[section](words)
+            except BadInputError as error:
+                raise BadInputError(f"line {at}: {error}") from None
+            if section == "ENDATA":
+                return self.finished()
+        raise BadInputError("holds no ENDATA; it is cut off, or no MPS file")
+
+    def begin(self, section: str, words: list[str]) -> None:
+        """Begin a section, whose line may hold more words."""
+        if section == "OBJSENSE" and words:
+            self.sense(words)
+        elif section in ("QUADOBJ", "QMATRIX", "QSECTION", "QCMATRIX"):
+            self.matrix = self.matrices.setdefault((section, words[0] if words else ""), {})
+        elif section not in self.readers and section not in ("NAME", "ENDATA"):
+            raise BadInputError(f"the section {section[:20]} is not known here")
+
+    def value(self, text: str) -> Decimal:
+        """A number, converted once."""
+        if text not in self.numbers:
+            self.numbers[text] = number(text)
+        return self.numbers[text]
+
+    def sense(self, words: list[str]) -> None:
+        """Read whether to minimise or maximise."""
+        known = ("MIN", "MINIMIZE", "MAX", "MAXIMIZE")
+        _require(words[0].upper() in known, f"{words[0][:20]} is neither MIN nor MAX")
+        self.model.maximised = words[0].upper().startswith("MAX")
+
+    def row(self, words: list[str]) -> None:
+        """Read a row; the first N row is the objective."""
+        if len(words) != 2 or words[0] not in ("N", "L", "G", "E"):
+            raise BadInputError("a row needs a sense N, L, G or E and a name")
+        sense, name = words
+        model = self.model
+        if name in model.rows or name in model.free or (model.objective and model.objective.name == name):
+            raise BadInputError(f"the row {name[:40]} is there twice")
+        if sense != "N":
+            model.rows[name] = Row(name, sense)
+        elif model.objective is None:
+            model.objective = Row(name, sense)
+        else:
+            model.free.add(name)
+
+    def entries(self, words: list[str]) -> None:
+        """Read entries of a column, or a marker of integer columns."""
+        if len(words) == 3 and words[1] == "'MARKER'":
+            _require(words[2] in ("'INTORG'", "'INTEND'"), f"the marker {words[2][:20]} is not known")
+            self.integer = words[2] == "'INTORG'"
+            return
+        name, model = words[0], self.model
+        if name != self.current[0]:
+            _require(name not in model.number, f"the entries of column {name[:40]} do not follow each other")
+            model.number[name] = len(model.columns)
+            model.columns.append(Column(name, integer=self.integer))
+            self.current = (name, set())
+        for row, value in _pairs(words, 1):
+            if row in self.current[1]:
+                raise BadInputError(f"column {name[:40]} has two entries in row {row[:40]}")
+            self.current[1].add(row)
+            held = model.row(row)
+            if held is not None:
+                held.linear.append((len(model.columns) - 1, self.value(value)))
+
+    def side(self, words: list[str]) -> None:
+        """Read right sides; that of the objective is minus its constant."""
+        for row, value in self.of_rows("RHS", words):
+            row.side = value
+
+    def range(self, words: list[str]) -> None:
+        """Read ranges of rows."""
+        for row, value in self.of_rows("RANGES", words):
+            row.range = value
+
+    def of_rows(self, section: str, words: list[str]) -> Iterator[tuple[Row, Decimal]]:
+        """Rows and values of a line that may begin with the name of a set; a row may have one value only."""
+        for name, value in _pairs(words, len(words) % 2):
+            if (section, name) in self.given:
+                raise BadInputError(f"{name[:40]} is there twice")
+            self.given.add((section, name))
+            held = self.model.row(name)
+            if held is not None:
+                yield held, self.value(value)
+
+    def bound(self, words: list[str]) -> None:
+        """Read a bound: kind, name of the set, column, and a value where the kind has one."""
+        kind = words[0]
+        if kind not in BOUNDS:
+            raise BadInputError(f"the kind of bound {kind[:20]} is not known here")
+        ends, valued = BOUNDS[kind]
+        fits = len(words) in ((3, 4) if valued else (2, 3, 4))
+        _require(fits, "a bound needs a kind, a set, a column, and a value where the kind has one")
+        name = words[-2] if valued else words[2] if len(words) > 2 else words[1]
+        column = self.model.columns[self.model.column(name)]
+        value = self.limit(words[-1], ends) if valued else None
+        for end in ends:
+            if (end, name) in self.given:
+                raise BadInputError(f"{name[:40]} has two {end} bounds")
+            self.given.add((end, name))
+            column.bounded.add(end)
+        if "lower" in ends:
+            column.lower = ZERO if kind == "BV" else value
+        if "upper" in ends:
+            column.upper = ONE if kind == "BV" else value
+        column.integer = column.integer or kind in ("LI", "UI", "BV")
+
+    def limit(self, text: str, ends: tuple[str, ...]) -> Decimal | None:
+        """The value of a bound, None for an infinite one, which must leave the column free on its side."""
+        infinite = text.lower().lstrip("+-") in ("inf", "infinity")
+        value = INFINITE.copy_sign(ONE if text[0] != "-" else -ONE) if infinite else self.value(text)
+        if abs(value) < INFINITE:
+            return value
+        _require(ends == (("upper",) if value > 0 else ("lower",)), f"the bound {text[:20]} leaves no value")
+        return None
+
+    def product(self, words: list[str]) -> None:
+        """Read an entry of a quadratic section."""
+        _require(len(words) == 3, "an entry of a matrix needs two columns and a value")
+        key = (self.model.column(words[0]), self.model.column(words[1]))
+        if key in self.matrix:
+            raise BadInputError(f"the entry {words[0][:40]} {words[1][:40]} is there twice")
+        self.matrix[key] = self.value(words[2])
+
+    def finished(self) -> Model:
+        """The model, once defaults are filled in and matrices belong to their rows."""
+        _require(self.model.objective is not None, "holds no objective")
+        for column in self.model.columns:
+            if column.integer and not column.bounded:
+                column.upper = ONE
+            if column.bounded == {"upper"} and column.upper is not None and column.upper < 0:
+                raise BadInputError(
+                    f"solvers differ on the lower bound of {column.name[:40]}, as the upper one is below 0"
+                )
+        for (section, name), matrix in self.matrices.items():
+            held = self.model.row(name) if name else self.model.objective
+            if held is not None:
+                held.products += _products(section, matrix)
+        return self.model
+
+
+def _pairs(words: list[str], start: int) -> Iterator[tuple[str, str]]:
+    """Names and values from a word on."""
+    _require(len(words) >= start + 2 and (len(words) - start) % 2 == 0, "a name or a number is missing")
+    return ((words[at], words[at + 1]) for at in range(start, len(words), 2))
+
+
+def _products(section: str, matrix: Matrix) -> list[Product]:
+    """The monomials of a matrix: QUADOBJ and QSECTION hold one triangle, the others both;
+    only QCMATRIX has no one-half.
+    """
+    triangle = section in ("QUADOBJ", "QSECTION")
+    for (i, j), value in matrix.items():
+        fits = i == j or ((j, i) not in matrix if triangle else matrix.get((j, i)) == value)
+        _require(
+            fits, f"{section} must hold {'one triangle' if triangle else 'both triangles, which are equal'}"
+        )
+    if triangle:
+        return [(i, j, value if i != j else HALF * value) for (i, j), value in matrix.items()]
+    return [(i, j, value if section == "QCMATRIX" else HALF * value) for (i, j), value in matrix.items()]
+
+
+class Point:
+    """Values by name, and the objective that the file claims, if any."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Decimal] = {}
+        self.claimed: Decimal | None = None
+
+    def of(self, columns: Iterable[Column]) -> list[Decimal]:
+        """The values of columns in order: 0 where one is left out, or what it is fixed to."""
+        values = []
+        for column in columns:
+            fixed = column.lower is not None and column.lower == column.upper
+            default = column.lower if fixed and column.lower is not None else ZERO
+            values.append(self.values.get(column.name, default))
+        return values
+
+
+def read_point(path: str) -> Point:
+    """The point in a file."""
+    point = Point()
+    for at, line in lines_of(path):
+        words = line.split()
+        try:
+            if words and not _said(point, line, words):
+                _value(point, words)
+        except BadInputError as error:
+            raise BadInputError(f"line {at}: {error}") from None
+    _require(point.values or point.claimed is not None, "holds no point: neither a value nor an objective")
+    return point
+
+
+def _said(point: Point, line: str, words: list[str]) -> bool:
+    """Whether a line is a comment, a status or an objective, which is kept."""
+    claim = re.match(r"(?:=obj=|objective value:|# ?Objective value ?=?)\s*(\S+)\s*$", line, re.IGNORECASE)
+    if claim:
+        point.claimed = number(claim.group(1))
+    none = words[0] == "=infeas=" or line.startswith("no solution available")
+    _require(not none, "the file holds no point")
+    return bool(claim) or line.startswith(("#", "solution status:"))
+
+
+def _value(point: Point, words: list[str]) -> None:
+    """Keep a name and its value; SCIP adds the objective coefficient in brackets."""
+    fits = len(words) == 2 or (len(words) == 3 and words[2].startswith("(obj:"))
+    _require(fits, "is not a name and a value; give a MIPLIB .sol, one of Gurobi or SCIP, or a plain list")
+    if words[0] in point.values:
+        raise BadInputError(f"{words[0][:40]} is there twice")
+    point.values[words[0]] = number(words[1])
+
+
+# ------------------------------------------------------------------------------------------ MPS against point
+
+
+def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
+    """What is found of a point against a model, without any rounding error."""
+    foreign = [name for name in point.values if name not in model.number]
+    _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
+    values = point.of(model.columns)
+    agrees = point.claimed is None or _close(point.claimed, model.value(values))
+    if rounded:
+        values = [_nearest(v) if c.integer else v for c, v in zip(model.columns, values)]
+    objective = model.value(values)
+    integers = [(c, v) for c, v in zip(model.columns, values) if c.integer]
+    lines = [
+        ("model", f"{len(model.columns)} columns ({len(integers)} integer), {len(model.rows)} rows"),
+        ("point", _described(len(point.values) - len(foreign), len(model.columns), foreign)),
+        ("objective", _shown(objective) + (" (maximised)" if model.maximised else "")),
+    ]
+    if point.claimed is not None:
+        lines.append(("claimed", f"{point.claimed} (differs by {_brief(abs(point.claimed - objective))})"))
+    bounds = [(_outside(v, (c.lower, c.upper)), c.name) for c, v in zip(model.columns, values)]
+    violations = {
+        "bounds": _worst(bounds),
+        "rows": _worst(
+            (_outside(row.value(values), row.interval()), row.name) for row in model.rows.values()
+        ),
+        "integers": _worst((abs(v - _nearest(v)), c.name) for c, v in integers),
+    }
+    return Finding(objective, lines, violations, agrees=agrees)
+
+
+def _close(claimed: Decimal, objective: Decimal) -> bool:
+    """Whether a claimed objective is that objective."""
+    return abs(claimed - objective) <= CLAIM * max(ONE, abs(objective))
+
+
+def _refuse_foreign(names: list[str], count: int) -> None:
+    of = f"{len(names)} of {count} names are not in the model"
+    _require(not names, f"{of}, {''.join(names[:1])[:40]!r} is one; it is of another instance or formulation")
+
+
+def _described(used: int, columns: int, added: list[str]) -> str:
+    text = f"{used} values, {columns - used} columns left out"
+    return text + (f", {len(added)} that a solver added passed over" if added else "")
+
+
+def _nearest(value: Decimal) -> Decimal:
+    """The nearest whole number."""
+    return value.to_integral_value(decimal.ROUND_HALF_EVEN)
+
+
+def _outside(value: Decimal, interval: Interval) -> Decimal:
+    """How far a value lies outside of an interval."""
+    lower, upper = interval
+    below = ZERO if lower is None else lower - value
+    above = ZERO if upper is None else value - upper
+    return max(below, above, ZERO)
+
+
+def _worst(violations: Iterable[Place]) -> Place:
+    """The largest violation and its place; the first of equal ones."""
+    return max(violations, key=lambda violation: violation[0], default=(ZERO, ""))
+
+
+# ------------------------------------------------------------------------------------- instance against point
+
+
+class Pixel:
+    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any."""
+
+    def __init__(self, place: str, gauge: str, stroke: tuple[float, Decimal] | None) -> None:
+        self.place = place
+        self.stroke: tuple[Decimal, Decimal] | None = None
+        self.low = 0.0
+        self.window: tuple[Decimal, Decimal] = (ZERO, PI / 2)
+        if stroke is None:
+            return
+        theta = stroke[0] % math.pi
+        theta = theta if 1e-8 <= theta < math.pi else 0.0  # as the program itself has it
+        if gauge == "box":
+            theta = -math.pi / 4 + (theta + math.pi / 4) % math.pi
+        else:
+            self.low = theta - math.pi / 4
+            self.window = (Decimal(theta) - PI / 4, Decimal(theta) + PI / 4)
+        self.stroke = (Decimal(theta), stroke[1])
+
+
+class Instance:
+    """An instance: pixels, pairs (place, first, second), and the weights of the energy."""
+
+    def __init__(
+        self, pixels: list[Pixel], pairs: list[tuple[str, int, int]], weights: tuple[Decimal, Decimal]
+    ) -> None:
+        self.pixels = pixels
+        self.pairs = pairs
+        self.w_strokes, self.w_beta = weights
+
+    def jumps(self, first: int, second: int) -> tuple[int, int]:
+        """The least and the greatest useful jump of a pair of pixels."""
+        difference = self.pixels[first].low - self.pixels[second].low
+        high, low = difference + math.pi / 2, difference - math.pi / 2
+        return math.floor(-2 * high / math.pi + 1e-9), math.ceil(-2 * low / math.pi - 1e-9)
+
+
+def read_instance(path: str) -> Instance:
+    """The instance in a JSON file."""
+    text, size = [], 0
+    for _, line in lines_of(path):
+        text.append(line)
+        size += len(line)
+        _require(size <= MOST_BYTES_OF_JSON, "is unreasonably long for an instance")
+    try:
+        document = json.loads("".join(text), parse_constant=_no_constant)
+        known = document["format"] == "crossfield-instance" and document["version"] == 1
+        _require(known, "is JSON, but no instance of crossfield, version 1")
+        return _instance(document)
+    except (ValueError, RecursionError, KeyError, TypeError, IndexError, OverflowError, ArithmeticError):
+        raise BadInputError("is no instance of crossfield, or damaged") from None
+
+
+def _no_constant(text: str) -> NoReturn:
+    raise ValueError(text)
+
+
+def _instance(document: dict[str, object]) -> Instance:
+    mask, strokes = document["mask"], document["strokes"]
+    gauge = document.get("gauge", "strokes")
+    if not (isinstance(mask, list) and isinstance(strokes, list)) or gauge not in ("strokes", "box"):
+        raise ValueError(gauge)
+    width = max(2, len(str(max(len(mask), *(len(row) for row in mask)) - 1)))
+    held = {(int(r), int(c)): (float(theta), Decimal(float(w))) for r, c, theta, w in strokes}
+    inside = [(r, c) for r, row in enumerate(mask) for c, pixel in enumerate(row) if pixel == "#"]
+    at = {place: number for number, place in enumerate(inside)}
+    if len(held) < len(strokes) or any(place not in at for place in held):
+        raise ValueError("strokes")
+    pixels = [Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c))) for r, c in inside]
+    pairs = [
+        (f"{pixels[i].place}_{way}", i, at[other])
+        for (r, c), i in at.items()
+        for way, other in (("u", (r - 1, c)), ("r", (r, c + 1)))
+        if other in at
+    ]
+    weights = [Decimal(float(str(document.get(*item)))) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))]
+    return Instance(pixels, pairs, (weights[0], weights[1]))
+
+
+class Field:
+    """The cross field of a point: angles of the pixels,
+    and of each pair the jump and the factor (-1)^p of its first skew.
+    """
+
+    def __init__(self, instance: Instance, point: Point) -> None:
+        self.instance = instance
+        get = point.values.get
+        self.alpha = [get(f"alpha_{pixel.place}", ZERO) for pixel in instance.pixels]
+        self.beta = [get(f"beta_{pixel.place}", ZERO) for pixel in instance.pixels]
+        names = [place for place, _, _ in instance.pairs]
+        self.whole = any(name.startswith("p_") for name in point.values)
+        self.p1 = [get(f"p1_{name}", ZERO) for name in names]
+        self.p2 = [get(f"p2_{name}", ZERO) for name in names]
+        self.p = [get(f"p_{name}", ZERO) for name in names]
+        if not self.whole:
+            self.p = [odd + TWO * even for odd, even in zip(self.p1, self.p2)]
+
+    def as_given(self) -> Iterator[Jump]:
+        """Jump and factor of each pair; a parity p1 that is not whole counts as it stands,
+        of p the cosine of pi p.
+        """
+        if not self.whole:
+            yield from ((p, ONE - TWO * odd) for p, odd in zip(self.p, self.p1))
+            return
+        for p in self.p:
+            yield p, _sign(_nearest(p)) * Decimal(math.cos(math.pi * float(p - _nearest(p))))
+
+    def rounded(self) -> Iterator[Jump]:
+        """Jump and factor of each pair, integers rounded."""
+        if self.whole:
+            yield from ((_nearest(p), _sign(_nearest(p))) for p in self.p)
+            return
+        for odd, even in zip(map(_nearest, self.p1), map(_nearest, self.p2)):
+            yield odd + TWO * even, ONE - TWO * odd
+
+    def best(self) -> Iterator[Jump]:
+        """Jump and factor of each pair with the least energy for these angles."""
+        for _, i, j in self.instance.pairs:
+            low, high = self.instance.jumps(i, j)
+            costs = []
+            for jump in ((Decimal(p), _sign(Decimal(p))) for p in range(low, high + 1)):
+                a, b = self.residuals(i, j, jump)
+                costs.append((a * a + b * b, jump))
+            yield min(costs)[1]
+
+    def residuals(self, i: int, j: int, jump: Jump) -> tuple[Decimal, Decimal]:
+        """Change of direction and of skew across a pair."""
+        return self.alpha[i] - self.alpha[j] + PI / 2 * jump[0], jump[1] * self.beta[i] - self.beta[j]
+
+    def energy(self, norm: int, jumps: Iterable[Jump]) -> Decimal:
+        """The energy with squares (2) or absolute values (1):
+        2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
+        """
+
+        def size(value: Decimal) -> Decimal:
+            return abs(value) if norm == 1 else value * value
+
+        smooth = strokes = skew = ZERO
+        for (_, i, j), jump in zip(self.instance.pairs, jumps):
+            smooth += sum(map(size, self.residuals(i, j, jump)), ZERO)
+        for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):
+            skew += size(beta)
+            if pixel.stroke is not None:
+                strokes += pixel.stroke[1] * size(alpha + beta - pixel.stroke[0])
+        return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
+
+    def violations(self) -> dict[str, Place]:
+        """Windows of alpha and beta, ranges of jumps, integrality."""
+        quarter = (-PI / 4, PI / 4)
+        bounds = []
+        for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):
+            bounds.append((_outside(alpha, pixel.window), f"alpha_{pixel.place}"))
+            bounds.append((_outside(beta, quarter), f"beta_{pixel.place}"))
+        integers = []
+        for (name, i, j), p, odd, even in zip(self.instance.pairs, self.p, self.p1, self.p2):
+            low, high = self.instance.jumps(i, j)
+            bounds.append((_outside(p, (Decimal(low), Decimal(high))), f"the jump of {name}"))
+            bounds.append((_outside(odd, (ZERO, ONE)), f"p1_{name}"))
+            whole = (p,) if self.whole else (odd, even)
+            integers.append((max(abs(v - _nearest(v)) for v in whole), f"the jump of {name}"))
+        return {"bounds": _worst(bounds), "integers": _worst(integers)}
+
+
+def _sign(p: Decimal) -> Decimal:
+    return ONE if p % 2 == 0 else -ONE
+
+
+def check_instance(instance: Instance, point: Point) -> Finding:
+    """What is found of the cross field of a point on an instance."""
+    places = {pixel.place for pixel in instance.pixels}, {name for name, _, _ in instance.pairs}
+    foreign = [name for name in point.values if not _is_of(name, places) and not ADDED.fullmatch(name)]
+    _refuse_foreign(foreign, len(point.values))
+    tags = {name.split("_", 1)[0] for name in point.values}
+    _require("p" not in tags or not tags & {"p1", "p2"}, "holds jumps both as p and as p1 and p2")
+    field = Field(instance, point)
+    strokes = sum(pixel.stroke is not None for pixel in instance.pixels)
+    given = field.energy(2, field.as_given())
+    lines = [
+        ("instance", f"{len(instance.pixels)} pixels ({strokes} with strokes), {len(instance.pairs)} pairs"),
+        ("2-norm", f"{_shown(given)} with the jumps as they are"),
+        ("", f"{_shown(field.energy(2, field.rounded()))} with jumps rounded"),
+        ("", f"{_shown(field.energy(2, field.best()))} with the best jumps for these angles"),
+        ("1-norm", f"{_shown(field.energy(1, field.rounded()))} with jumps rounded"),
+        ("pi", "60 digits; all else exact for the doubles of the instance"),
+    ]
+    if not tags & {"p", "p1", "p2"}:
+        lines.append(("jumps", "none in the point: taken as 0; of qp-fixed they are data, see its .mps"))
+    return Finding(given, lines, field.violations())
+
+
+def _is_of(name: str, places: tuple[set[str], set[str]]) -> bool:
+    tag, _, place = name.partition("_")
+    return (tag in ON_PIXELS and place in places[0]) or (tag in ON_PAIRS and place in places[1])
+
+
+# ----------------------------------------------------------------------------------------------------- report
+
+
+def _shown(value: Decimal) -> str:
+    """A value to 17 digits."""
+    short = decimal.Context(prec=17).plus(value).normalize()
+    return f"{short:f}" if -7 < short.adjusted() < 17 else str(short)
+
+
+def _brief(value: Decimal) -> str:
+    return "0" if value == 0 else f"{float(value):.3g}"
+
+
+def check(model: str, point: str, *, rounded: bool = False) -> Finding:
+    """What is found of the point in a file against the model or the instance in another one."""
+    with decimal.localcontext(EXACT):
+        values = _of_file(point, read_point)
+        if _of_file(model, _is_json):
+            return _of_file(model, lambda path: check_instance(read_instance(path), values))
+        return _of_file(
+            model, lambda path: check_model(MpsReader().read(lines_of(path)), values, rounded=rounded)
+        )
+
+
+def _of_file(path: str, read: Callable[[str], Kind]) -> Kind:
+    """What is read from a file, whose name leads every error."""
+    try:
+        return read(path)
+    except BadInputError as error:
+        raise BadInputError(f"{path}: {error}") from None
+
+
+def _is_json(path: str) -> bool:
+    return next((line for _, line in lines_of(path) if line.strip()), "").lstrip().startswith("{")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check a point and print a report; the exit code."""
+    try:
+        given = _arguments(arguments)
+        finding = check(given.model, given.point, rounded=given.round)
+    except BadInputError as error:
+        print(f"check_point: {error}", file=sys.stderr)
+        return 2
+    if given.fraction:
+        finding.lines.append(("fraction", str(Fraction(finding.objective))))
+    for label, text in finding.lines:
+        print(f"{label:<10}{text}")
+    for kind, (value, place) in finding.violations.items():
+        print(f"{kind:<10}{_brief(value)}{f' at {place}' if value else ''}")
+    feasible = finding.worst <= given.tolerance
+    print(f"{'feasible' if feasible else 'NOT feasible'} within {_brief(given.tolerance)}")
+    if not finding.agrees:
+        print("NOT the objective that the file claims")
+    return 0 if feasible and finding.agrees else 1
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadInputError(f"{message}; see check_point.py --help")
+
+
+def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = _Parser(
+        "check_point.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("model", metavar="MODEL", help=".mps, .mps.gz or .instance.json")
+    parser.add_argument("point", metavar="POINT", help="names and values, may be .gz")
+    parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
+    parser.add_argument("--round", action="store_true", help="of an MPS file: round integer columns first")
+    parser.add_argument("--fraction", action="store_true", help="show the objective as a fraction too")
+    given = parser.parse_args(arguments)
+    given.tolerance = number(given.tolerance)
+    _require(given.tolerance >= 0, "the tolerance must not be negative")
+    return given
+
+
+if __name__ == "__main__":
+    sys.exit(main())

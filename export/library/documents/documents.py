@@ -1,0 +1,153 @@
+"""Sidecars: one JSON document for each entry, and the index of the library. Written, read, checked.
+
+Schemas: library-entry.schema.json, library-instance.schema.json and library-index.schema.json beside this
+module.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ....models.errors import InputError, InstanceError
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.problem import Problem, formulate
+from ....models.input_limits import MAX_BYTES
+from ....models.instance.file import check_schema, check_version, parse_json, read_instance
+from ....models.instance.grid import Ints
+from ....models.instance.instance import Instance
+from ....models.storage import read_bytes, sha256_of
+from ..plan.spec import Spec, spec_of
+
+FORMAT: Final = "crossfield-library-entry"
+INDEX_FORMAT: Final = "crossfield-library"
+ABOUT_FORMAT: Final = "crossfield-library-instance"
+VERSION: Final = 1
+INDEX: Final = "library.json"
+LICENCE: Final = "CC-BY-4.0"
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """A library that was built: its folder and its index, both checked."""
+
+    folder: Path
+    document: dict[str, Any]
+
+    @cached_property
+    def entries(self) -> tuple[dict[str, Any], ...]:
+        """The sidecars of all entries, in order.
+
+        Raises InputError, InstanceError when one is missing or damaged.
+        """
+        return tuple(map(self.entry, self.document["entries"]))
+
+    def entry(self, name: str) -> dict[str, Any]:
+        """The sidecar of an entry. Raises InputError for a name that the library does not have."""
+        if name not in self.document["sha256"]:
+            raise InputError(f"has no entry {name[:40]!r}; library.json lists them", file=self.folder)
+        return read_sidecar(self.folder / f"{name}.json")
+
+    @property
+    def spec(self) -> Spec:
+        """The specification it was built from; drawings are read from the library itself."""
+        return spec_of(self.document["spec"], self.folder / INDEX)
+
+
+def read_library(folder: str | Path) -> Library:
+    """The library in a folder.
+
+    Raises InputError when there is none, InstanceError when its index is damaged.
+    """
+    path = Path(folder) / INDEX
+    if not path.is_file():
+        raise InputError(
+            "is no library: it has no library.json; build one with `crossfield library build`", file=folder
+        )
+    return Library(Path(folder), _read(path, INDEX_FORMAT, "library-index"))
+
+
+def read_sidecar(path: str | Path) -> dict[str, Any]:
+    """The sidecar in a file. Raises InputError when it cannot be read,
+    InstanceError with the place when it breaks its schema.
+    """
+    return _read(Path(path), FORMAT, "library-entry")
+
+
+def read_about(path: str | Path) -> dict[str, Any]:
+    """What a library knows of an instance. Raises as `read_sidecar`."""
+    return _read(Path(path), ABOUT_FORMAT, "library-instance")
+
+
+def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
+    try:
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
+        check_version(document, form, VERSION)
+        return check_schema(document, schema, __package__)
+    except UnicodeDecodeError as error:
+        raise InstanceError("is not JSON; build the library again", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+
+
+def as_bytes(document: dict[str, Any]) -> bytes:
+    """A document as the bytes of its file."""
+    return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Problem:
+    """The problem of an entry, from its instance's file and its sidecar.
+
+    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
+    names.
+    """
+    folder = library.folder if isinstance(library, Library) else Path(library)
+    path = folder / document["instance"]["file"]
+    problem = problem_from(
+        read_instance(path), document["formulation"], document["options"], document["jumps"]
+    )
+    if problem.sha256 != document["problem_sha256"]:
+        raise InstanceError(
+            f"is not the instance that {document['name']}.json was made from; build the library again",
+            file=path,
+        )
+    return problem
+
+
+def problem_from(
+    instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
+) -> Problem:
+    """The problem of a formulation with options, and with jumps where they are data: [pair,
+    jump] of those that are not zero.
+    """
+    jumps: Ints | None = None
+    if FORMULATIONS[formulation].fixed:
+        jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+        given = np.array(listed or [], dtype=np.int64).reshape(-1, 2)
+        if (given[:, 0] >= len(jumps)).any():
+            raise InstanceError(
+                "a jump of a pair is listed that the instance does not have; build the library again"
+            )
+        jumps[given[:, 0]] = given[:, 1]
+    return formulate(instance, formulation, p=jumps, **options)
+
+
+def listed_jumps(problem: Problem) -> list[list[int]] | None:
+    """Jumps that are data and not zero as [pair, jump]; None where jumps are variables."""
+    if problem.jumps is None:
+        return None
+    at = np.nonzero(problem.jumps)[0]
+    found: list[list[int]] = np.stack([at, problem.jumps[at]], axis=1).tolist()
+    return found
+
+
+def are_whole(folder: Path, files: Iterable[dict[str, Any]]) -> bool:
+    """Whether every listed file is in the folder with its SHA-256."""
+    paths = ((folder / each["name"], each["sha256"]) for each in files)
+    return all(path.is_file() and sha256_of(path) == expected for path, expected in paths)

@@ -1,0 +1,148 @@
+"""What is counted of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
+
+The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to
+the instance.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from ....models.formulations.problem import Bound, Problem
+from ....models.instance.grid import Floats
+from ...writing.canonical import Canonical
+from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
+
+MOST_EIGEN: Final = 600
+"""Variables in the quadratic objective up to which eigenvalues are computed."""
+
+
+def counts(problem: Problem) -> dict[str, int]:
+    """Numbers of columns, rows, nonzeros and terms by kind."""
+    return _columns(problem) | _rows(problem) | _terms(problem)
+
+
+def _columns(problem: Problem) -> dict[str, int]:
+    form = Canonical(problem)
+    binary, integer = form.binary, problem.integer
+    nonlinear = form.layout.in_objective | form.layout.in_rows
+    return {
+        "variables": problem.columns,
+        "continuous": int((~integer).sum()),
+        "binary": int(binary.sum()),
+        "integer": int((integer & ~binary).sum()),
+        "nonlinear_variables": int(nonlinear.sum()),
+        "nonlinear_binary": int((nonlinear & binary).sum()),
+        "nonlinear_integer": int((nonlinear & integer & ~binary).sum()),
+    }
+
+
+def _rows(problem: Problem) -> dict[str, int]:
+    by_degree = {
+        degree: sum(f.count for f in problem.rows if _kind(f.degree) == degree) for degree in range(4)
+    }
+    return {
+        "constraints": problem.row_count,
+        "equalities": sum(f.count for f in problem.rows if f.family.sense == "=="),
+        "linear_constraints": by_degree[0],
+        "quadratic_constraints": by_degree[1],
+        "polynomial_constraints": by_degree[2],
+        "general_constraints": by_degree[3],
+        "nonzeros": sum(len(f.variables) * f.count for f in problem.rows),
+        "nonlinear_nonzeros": sum(_nonlinear_variables(f) * f.count for f in problem.rows),
+    }
+
+
+def _kind(degree: int) -> int:
+    """0 linear, 1 quadratic, 2 polynomial, 3 general."""
+    return 0 if degree <= 1 else 1 if degree == 2 else 2 if degree < 99 else 3
+
+
+def _nonlinear_variables(family: Bound) -> int:
+    """Columns that stand in nonlinear terms of each row of a family."""
+    if family.terms is None:
+        return len(family.variables)
+    return len({symbol for term in family.terms if term.degree > 1 for symbol in term.symbols})
+
+
+def _terms(problem: Problem) -> dict[str, int]:
+    degree = problem.objective_degree
+    higher = range(3, degree + 1) if degree < 99 else range(3, 5)
+    general = sum(family.count for family in problem.objective if family.terms is None)
+    return {
+        "objective_linear_terms": len(problem.merged_objective(1)[1]),
+        "objective_quadratic_terms": len(problem.merged_objective(2)[1]),
+        "objective_higher_terms": sum(len(problem.merged_objective(each)[1]) for each in higher),
+        "objective_general_terms": general,
+    }
+
+
+def curvature(problem: Problem) -> dict[str, Any]:
+    """Curvature of objective and constraints; the signs of the eigenvalues of the objective's Hessian, or the reason for none."""
+    objective, reason = of_objective(problem)
+    found = _eigenvalue_signs(problem) if problem.objective_degree == 2 else None
+    return {
+        "objective": objective,
+        "constraints": of_rows(problem),
+        "eigenvalues": found,
+        "reason": None if found else reason,
+    }
+
+
+def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
+    """How many eigenvalues of the Hessian of a quadratic objective are negative, zero and positive; None when it is large."""
+    index, value = problem.merged_objective(2)
+    used, place = np.unique(index, return_inverse=True)
+    if len(used) > MOST_EIGEN:
+        return None
+    place = place.reshape(-1, 2)
+    hessian = np.zeros((len(used), len(used)))
+    np.add.at(hessian, (place[:, 0], place[:, 1]), value)
+    np.add.at(hessian, (place[:, 1], place[:, 0]), value)
+    values = np.linalg.eigvalsh(hessian)
+    slack = NEGLIGIBLE * float(np.abs(values).max(initial=0.0))
+    negative, positive = int((values < -slack).sum()), int((values > slack).sum())
+    return {"negative": negative, "zero": problem.columns - negative - positive, "positive": positive}
+
+
+def ranges(problem: Problem) -> dict[str, list[float] | None]:
+    """Least and greatest absolute value of the nonzero coefficients, finite bounds and right sides; None where there is none."""
+    degree = problem.objective_degree
+    costs = [problem.merged_objective(each)[1] for each in range(1, (degree if degree < 99 else 4) + 1)]
+    rows = [
+        np.broadcast_to(term.coefficient, (family.count,))
+        for family in problem.rows
+        for term in family.terms or ()
+        if term.degree > 0
+    ]
+    return {
+        "objective": _range(costs),
+        "matrix": _range(rows),
+        "bounds": _range([problem.lower, problem.upper]),
+        "right_sides": _range([family.limit for family in problem.rows]),
+    }
+
+
+def _range(arrays: list[Floats]) -> list[float] | None:
+    values = np.abs(np.concatenate([np.zeros(0), *arrays]))
+    values = values[np.isfinite(values) & (values > 0)]
+    return [float(values.min()), float(values.max())] if len(values) else None
+
+
+def tangent_bound(problem: Problem, point: Floats) -> float | None:
+    """A lower bound of a convex quadratic objective over finite bounds alone, from its tangent at a point; None for other problems.
+
+    f(x) >= f(x0) + g (x - x0), whose least value over the box is found coordinate by coordinate.
+    """
+    if problem.rows or problem.integer.any() or of_objective(problem)[0] != "convex":
+        return None
+    slope = np.zeros(problem.columns)
+    index, cost = problem.merged_objective(1)
+    slope[index[:, 0]] += cost
+    index, value = problem.merged_objective(2)
+    np.add.at(slope, index[:, 0], value * point[index[:, 1]])
+    np.add.at(slope, index[:, 1], value * point[index[:, 0]])
+    falls = np.minimum(slope * (problem.lower - point), slope * (problem.upper - point))
+    return problem.objective_value(point) + float(np.minimum(falls, 0.0).sum())

@@ -1,0 +1,185 @@
+"""The ledger: what solvers found, measured once and kept. An input of every build, never made by one.
+
+ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A
+record carries the SHA-256 of the problem it is about, and counts for that problem alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from ....models.errors import InputError, InstanceError
+from ....models.field.field import CrossField
+from ....models.field.file import read_field, write_field
+from ....models.input_limits import MAX_BYTES
+from ....models.instance.file import check_schema, check_version, parse_json
+from ....models.storage import read_bytes, sha256_of, write_bytes
+from .. import documents
+
+FORMAT: Final = "crossfield-ledger"
+VERSION: Final = 1
+FILE: Final = "ledger.json"
+Ending = Literal["optimal", "feasible", "limit", "no point"]
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run of a solver on an entry, or one submitted point.
+
+    problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound;
+    seconds, threads and time_limit as measured; by: who ran it; point: the field's file beside the ledger,
+    with its SHA-256, or None.
+    """
+
+    entry: str
+    problem_sha256: str
+    solver: str
+    version: str
+    status: Ending
+    primal: float | None = None
+    bound: float | None = None
+    seconds: float | None = None
+    threads: int | None = None
+    time_limit: float | None = None
+    by: str | None = None
+    point: str | None = None
+    point_sha256: str | None = None
+
+    @property
+    def rank(self) -> tuple[Any, ...]:
+        """Place in the ledger: by entry and solver, then by everything else."""
+        return (self.entry, self.solver, self.version, json.dumps(asdict(self)))
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Records in order, and the folder where the files of their fields lie, or are to lie:
+    elsewhere says where those lie that are not there yet.
+    """
+
+    folder: Path
+    records: tuple[Record, ...] = ()
+    elsewhere: Mapping[str, Path] = field(default_factory=dict)
+
+    def of(self, entry: str, problem_sha256: str) -> list[Record]:
+        """The records of an entry that are about this very problem."""
+        return [each for each in self.records if (each.entry, each.problem_sha256) == (entry, problem_sha256)]
+
+    def with_point(self, entry: str) -> Record | None:
+        """The record whose field is kept for an entry: the last one that has a field."""
+        found = [each for each in self.records if each.entry == entry and each.point is not None]
+        return found[-1] if found else None
+
+    def path(self, record: Record) -> Path:
+        """The file of a record's field."""
+        return self.elsewhere.get(str(record.point), self.folder / str(record.point))
+
+    def field(self, record: Record) -> CrossField:
+        """The field of a record. Raises InputError, InstanceError when the file is missing,
+        damaged or another one.
+        """
+        path = self.path(record)
+        if path.is_file() and sha256_of(path) != record.point_sha256:
+            raise InstanceError(
+                "is another file than the one its ledger names; restore it, or submit the point again",
+                file=path,
+            )
+        return read_field(path)
+
+    def document(self) -> dict[str, Any]:
+        """The ledger as JSON."""
+        return {"format": FORMAT, "version": VERSION, "records": [asdict(record) for record in self.records]}
+
+
+def field_file(entry: str) -> str:
+    """Name of the file that holds the kept field of an entry."""
+    return f"{entry}.field.json"
+
+
+def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
+    """The ledger of a folder, empty when there is none. Raises InputError, InstanceError, naming the file."""
+    path = Path(folder) / name
+    if not path.exists():
+        return Ledger(Path(folder))
+    try:
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
+        check_version(document, FORMAT, VERSION)
+        given = check_schema(document, "library-ledger", documents.__name__)["records"]
+    except UnicodeDecodeError as error:
+        raise InputError("is not JSON; give the ledger.json of a library", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+    return Ledger(Path(folder), tuple(Record(**each) for each in given))
+
+
+def write_ledger(ledger: Ledger) -> Path:
+    """The path of the ledger's file, now holding it. Raises OutputError."""
+    data = json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n"
+    return write_bytes(ledger.folder / FILE, data.encode())
+
+
+def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
+    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry,
+    that is from now on the kept one.
+
+    The caller holds the lock of the library. The field's file is written first, so that the ledger never
+    names what is not there. Records of the same entry that named the file before lose their field, which is
+    not there any more. Raises OutputError.
+    """
+    ledger = read_ledger(folder)
+    records = list(ledger.records)
+    if field is not None and _is_better(record, ledger.with_point(record.entry)):
+        path = write_field(field, ledger.folder / field_file(record.entry))
+        record = replace(record, point=path.name, point_sha256=sha256_of(path))
+        records = [_without_point(each) if each.entry == record.entry else each for each in records]
+    records = sorted({*records, record}, key=lambda each: each.rank)
+    write_ledger(replace(ledger, records=tuple(records)))
+    return record
+
+
+def _is_better(record: Record, kept: Record | None) -> bool:
+    """Whether the field of a record is to be kept in place of another one,
+    which may have come while it was looked for.
+    """
+    if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
+        return True
+    return record.primal is None or record.primal < kept.primal
+
+
+def _without_point(record: Record) -> Record:
+    return replace(record, point=None, point_sha256=None)
+
+
+def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
+    """The ledger of a folder with the records of another one about these entries and their fields;
+    nothing is written yet.
+
+    A field that the folder has for an entry already stays.
+    """
+    ledger, wanted = read_ledger(folder), set(entries)
+    have = {_without_point(record) for record in ledger.records}
+    fresh: list[Record] = []
+    elsewhere: dict[str, Path] = {}
+    for record in other.records:
+        if record.entry not in wanted or _without_point(record) in have:
+            continue
+        if record.point is not None and ledger.with_point(record.entry) is None:
+            other.field(record)  # checked before it is taken over
+            elsewhere[record.point] = other.path(record)
+            fresh.append(record)
+        else:
+            fresh.append(_without_point(record))
+    records = sorted({*ledger.records, *fresh}, key=lambda each: each.rank)
+    return replace(ledger, records=tuple(records), elsewhere=elsewhere)
+
+
+def keep(ledger: Ledger) -> None:
+    """Write a ledger that was merged, its fields first. Raises OutputError."""
+    for name, path in ledger.elsewhere.items():
+        write_bytes(ledger.folder / name, read_bytes(path))
+    if not (ledger.folder / FILE).exists() or read_ledger(ledger.folder).records != ledger.records:
+        write_ledger(ledger)

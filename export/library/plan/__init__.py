@@ -1,0 +1,5 @@
+"""What a library shall hold.
+
+The specification (TOML), every instance and entry that follows from it, where sketches come from, which
+entries are one problem. Nothing is made here.
+"""

@@ -1,0 +1,121 @@
+"""What is to be made: every instance and every entry (an instance in one formulation) of a specification,
+with their names.
+
+cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
+instance[_printed]_TOKEN              an entry: facet and formulation
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from ....models.errors import InputError
+from ....models.formulations.catalogue import FORMULATIONS
+from .spec import Rung, Sketch, Spec
+
+LONGEST: Final = 32
+"""Characters of a name before its suffix."""
+
+
+@dataclass(frozen=True)
+class InstanceRecipe:
+    """How an instance is made. sketch: with the drawing's bytes; seed: None unless the sketch is random."""
+
+    name: str
+    sketch: Sketch
+    rung: str
+    size: int
+    seed: int | None
+    gauge: str
+
+    def document(self) -> dict[str, Any]:
+        """All that decides its content, as JSON."""
+        hashes = [hashlib.sha256(data).hexdigest() for data in (self.sketch.drawing, self.sketch.mask)]
+        sketch = {
+            "kind": self.sketch.kind,
+            "what": self.sketch.what,
+            "title": self.sketch.title,
+            "sha256": hashes,
+        }
+        return asdict(self) | {"sketch": sketch}
+
+
+@dataclass(frozen=True)
+class EntryRecipe:
+    """How an entry is made: the name of its instance, formulation, facet, formats,
+    and whether files are compressed.
+    """
+
+    name: str
+    instance: str
+    formulation: str
+    facet: str
+    formats: tuple[str, ...]
+    compress: bool
+
+
+@dataclass(frozen=True)
+class InstancePlan:
+    """An instance and its entries, in order."""
+
+    recipe: InstanceRecipe
+    entries: tuple[EntryRecipe, ...]
+
+
+def entry_name(instance: str, formulation: str, facet: str) -> str:
+    """Name of an entry."""
+    return f"{instance}{'_printed' if facet == 'printed' else ''}_{FORMULATIONS[formulation].short}"
+
+
+def plan(spec: Spec) -> tuple[InstancePlan, ...]:
+    """Every instance of a specification with its entries: by sketch, size, seed and gauge.
+
+    Raises InputError for a name that is too long.
+    """
+    found = tuple(
+        InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
+        for sketch in spec.sketches
+        for rung in spec.rungs
+        if rung.name in sketch.rungs
+        for recipe in _instances(sketch, rung)
+    )
+    for entry in (entry for each in found for entry in each.entries):
+        if len(entry.name) > LONGEST:
+            raise InputError(
+                f"the name {entry.name} has {len(entry.name)} characters; "
+                f"shorten the sketch's name until it has {LONGEST}"
+            )
+    return found
+
+
+def _instances(sketch: Sketch, rung: Rung) -> list[InstanceRecipe]:
+    return [
+        InstanceRecipe(_instance_name(sketch.name, size, seed, gauge), sketch, rung.name, size, seed, gauge)
+        for size in sketch.sizes_on(rung)
+        for seed in sketch.seeds
+        for gauge in rung.gauges
+    ]
+
+
+def _instance_name(short: str, size: int, seed: int | None, gauge: str) -> str:
+    seeded = "" if seed is None else f"_s{seed}"
+    return f"cf_{short}_n{size:03}{seeded}{'_box' if gauge == 'box' else ''}"
+
+
+def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:
+    return tuple(
+        EntryRecipe(
+            entry_name(recipe.name, name, facet), recipe.name, name, facet, rung.formats, rung.compress
+        )
+        for facet in rung.facets
+        for name in formulations
+        if facet == "hull" or "facet" in FORMULATIONS[name].settable
+    )
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of a value that JSON holds, the same whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, ensure_ascii=False).encode()).hexdigest()

@@ -1,0 +1,89 @@
+"""From a recipe to its instance: of a sample, of a drawing, or of random strokes."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, cast
+
+import numpy as np
+from scipy import ndimage
+
+from ....models.errors import CrossfieldError, InputError
+from ....models.instance.grid import Bools
+from ....models.instance.instance import Gauge, Instance
+from ....models.sketch.read import LEAST_WEIGHT, instance_of
+from ....models.sketch.samples import SAMPLES, sample
+from .recipe import InstanceRecipe
+
+STROKE_SHARE: Final = 0.2
+"""Part of the pixels of a random instance that carry strokes."""
+RAGGED_SHARE: Final = 0.75
+"""Part of the square that a ragged mask is drawn from; its largest connected part is kept."""
+
+
+def instance_from(recipe: InstanceRecipe) -> Instance:
+    """The instance of a recipe, under the recipe's name. Raises InputError that names it."""
+    make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
+    try:
+        return replace(make(recipe), name=recipe.name)
+    except CrossfieldError as error:
+        raise InputError(f"{recipe.name}: {error}") from error
+
+
+def kind_of(recipe: InstanceRecipe) -> str:
+    """`sketch`, `analytic`, `file` or `random`."""
+    kind = recipe.sketch.kind
+    return SAMPLES[recipe.sketch.what].kind if kind == "sample" else kind
+
+
+def _of_sample(recipe: InstanceRecipe) -> Instance:
+    return sample(recipe.sketch.what, recipe.size, cast("Gauge", recipe.gauge))
+
+
+def _of_file(recipe: InstanceRecipe) -> Instance:
+    sketch = recipe.sketch
+    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        mask = Path(folder) / f"mask{Path(sketch.mask_name).suffix}"
+        mask.write_bytes(sketch.mask)
+        return instance_of(
+            sketch.drawing,
+            size=recipe.size,
+            name=recipe.name,
+            source=sketch.what,
+            mask=mask if sketch.mask else None,
+            gauge=cast("Gauge", recipe.gauge),
+        )
+
+
+def random_instance(recipe: InstanceRecipe) -> Instance:
+    """The instance of a size and a seed: strokes in random directions on a fifth of the pixels.
+
+    Drawn with NumPy's PCG64 in this order: the mask when it is ragged, the order of the pixels (the first
+    fifth, at least one, are strokes), theta uniform in [0, pi), w uniform in [0.1, 1].
+    """
+    rng = np.random.Generator(np.random.PCG64(recipe.seed))
+    mask = np.ones((recipe.size, recipe.size), dtype=bool)
+    if recipe.sketch.what == "ragged":
+        mask = _ragged(rng, recipe.size)
+    inside = np.argwhere(mask)
+    count = max(1, round(STROKE_SHARE * len(inside)))
+    chosen = np.sort(rng.permutation(len(inside))[:count])
+    return Instance(
+        name=recipe.name,
+        mask=mask,
+        stroke_pixels=inside[chosen].astype(np.int32),
+        theta=rng.uniform(0.0, np.pi, count),
+        w=rng.uniform(LEAST_WEIGHT, 1.0, count),
+        gauge=cast("Gauge", recipe.gauge),
+        source=f"random strokes on a {recipe.sketch.what} mask, seed {recipe.seed}",
+    )
+
+
+def _ragged(rng: np.random.Generator, size: int) -> Bools:
+    """The largest 4-connected part of a random share of a square."""
+    label, _ = ndimage.label(rng.random((size, size)) < RAGGED_SHARE)
+    sizes = np.bincount(label.ravel(), minlength=2)[1:]
+    mask: Bools = label == 1 + int(np.argmax(sizes))
+    return mask

@@ -1,0 +1,356 @@
+"""The specification of a library: which sketches, sizes, gauges, seeds, formulations and formats.
+
+Read from TOML and checked.
+
+    format = "crossfield-library-spec"
+    version = 1
+    title = "..."                      one line
+    formulations = ["..."]             all by default
+    gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
+    ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
+
+    [rungs.tiny]                       tiny, small, medium or large
+    sizes = [4]                        pixels on the longer side
+    formats = ["nl", "mps"]            all by default
+    compress = false                   .gz
+
+    [[sketches]]
+    name = "bend"                      lower case and digits, part of every name
+    sample = "cylinder_bend"           or file = "drawing.svg" (with mask = "mask.png" if need be),
+                                       or random = "full" | "ragged"
+    seeds = [1, 2]                     of a random one
+    rungs = ["tiny"]                   all by default
+    sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
+
+Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
+what is checked here are words of tables that the program has, and what several keys say together.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from ....models.errors import InputError, shortened
+from ....models.formulations.declaration import FACETS, FORMULATIONS
+from ....models.input_limits import MAX_BYTES
+from ....models.instance.file import schema_error
+from ....models.instance.instance import GAUGES
+from ....models.sketch.samples import SAMPLES, sample_svg
+from ....models.storage import read_bytes
+from ...formats.registry import FORMATS
+
+FORMAT: Final = "crossfield-library-spec"
+VERSION: Final = 1
+RUNGS: Final = ("tiny", "small", "medium", "large")
+"""The ladder: every solver in seconds; optimum proven; gap open; reading and presolve."""
+Kind = Literal["sample", "file", "random"]
+DEFAULT: Final = Path(__file__).with_name("default.toml")
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A step of the ladder: its sizes, and what is written of each instance there."""
+
+    name: str
+    sizes: tuple[int, ...]
+    formats: tuple[str, ...]
+    compress: bool
+    gauges: tuple[str, ...]
+    facets: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The rung as a table of a specification."""
+        return {
+            "sizes": list(self.sizes),
+            "formats": list(self.formats),
+            "compress": self.compress,
+            "gauges": list(self.gauges),
+            "facets": list(self.facets),
+        }
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """Where instances come from: a sample, a file (its bytes, with those of a mask),
+    or random strokes of some seeds.
+
+    name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
+    file's own name, or the shape of a random mask.
+    """
+
+    name: str
+    kind: Kind
+    what: str
+    title: str
+    rungs: tuple[str, ...]
+    sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    seeds: tuple[int | None, ...] = (None,)
+    drawing: bytes = b""
+    mask: bytes = b""
+    mask_name: str = ""
+
+    def sizes_on(self, rung: Rung) -> tuple[int, ...]:
+        """Its sizes on a rung."""
+        return dict(self.sizes).get(rung.name, rung.sizes)
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Files of the library that hold the drawing and its mask, by name."""
+        if self.kind == "sample" and SAMPLES[self.what].kind == "sketch":
+            return {f"cf_{self.name}.sketch.svg": sample_svg(self.what).encode()}
+        return {
+            name: data for name, data in ((self._copy(), self.drawing), (self._mask(), self.mask)) if data
+        }
+
+    def _copy(self) -> str:
+        return f"cf_{self.name}.sketch{Path(self.what).suffix.lower()}"
+
+    def _mask(self) -> str:
+        return f"cf_{self.name}.mask{Path(self.mask_name).suffix.lower()}"
+
+    def document(self) -> dict[str, Any]:
+        """The sketch as a table of a specification, its files as they lie in a library."""
+        head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
+        head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
+        if self.kind == "sample":
+            return head | {"sample": self.what}
+        if self.kind == "random":
+            return head | {"random": self.what, "seeds": list(self.seeds)}
+        masked = {"mask": self._mask()} if self.mask else {}
+        return head | {"file": self._copy(), "source": self.what} | masked
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A checked specification. ledger: the file of a ledger that the build takes as input, or None."""
+
+    title: str
+    formulations: tuple[str, ...]
+    rungs: tuple[Rung, ...]
+    sketches: tuple[Sketch, ...]
+    ledger: Path | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The specification with every default written out, as library.json holds it."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "title": self.title,
+            "formulations": list(self.formulations),
+            "rungs": {rung.name: rung.document() for rung in self.rungs},
+            "sketches": [sketch.document() for sketch in self.sketches],
+        }
+
+
+def default_spec() -> Spec:
+    """The specification that ships."""
+    return read_spec(DEFAULT)
+
+
+def read_spec(path: str | Path) -> Spec:
+    """The specification in a TOML file. Raises InputError that names file, key and remedy."""
+    path = Path(path)
+    try:
+        document = tomllib.loads(read_bytes(path, MAX_BYTES).decode())
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text; save it as TOML in UTF-8", file=path) from error
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
+        raise InputError(f"is not valid TOML: {error}", file=path) from error
+    return spec_of(document, path)
+
+
+def spec_of(document: dict[str, Any], path: Path) -> Spec:
+    """The specification that a document describes, whose files are found beside `path`.
+
+    Raises InputError, naming `path`.
+    """
+    try:
+        _check_form(document)
+        return _spec(document, path.parent)
+    except InputError as error:
+        raise error if error.file is not None else InputError(str(error), file=path) from error
+
+
+def _check_form(document: dict[str, Any]) -> None:
+    for key, value in (("format", FORMAT), ("version", VERSION)):
+        if document.get(key) != value:
+            raise InputError(
+                f"{key}: must be {value!r}; this is no specification of a library, or another version"
+            )
+    try:
+        error = schema_error(document, "library-spec", __package__)
+    except ValueError as large:  # of a whole number of more digits than Python writes
+        raise InputError("holds a number of thousands of digits; write a smaller one") from large
+    if error is not None:
+        raise InputError(_of_key(error) or _of_value(error))
+
+
+def _of_key(error: Any) -> str | None:
+    """What is said of a key that is too many or missing; None where the error is about a value."""
+    given, said, place = error.instance, error.validator_value, error.json_path[2:]
+    known = error.schema.get("properties", {})
+    match error.validator:
+        case "additionalProperties":
+            key = next(key for key in given if key not in known)
+            words = f"is unknown; the keys here are {', '.join(known)}"
+        case "required":
+            key = next(key for key in said if key not in given)
+            words = f"there is none; write {known[key].get('description', 'it')}"
+        case "dependentRequired":
+            key, needed = next(
+                (key, need) for key, (need,) in said.items() if key in given and need not in given
+            )
+            words = f"goes with {needed}; write both, or leave it out"
+        case _:
+            return None
+    return f"{place}.{key}: {words}" if place else f"{key}: {words}"
+
+
+def _of_value(error: Any) -> str:
+    """What is said of a value, at its place; an entry of a list is told of as the list."""
+    place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
+    if not isinstance(error.instance, dict):
+        place = re.sub(r"\[\d+\]$", "", place)
+    match error.validator:
+        case "uniqueItems":
+            twice = next(each for n, each in enumerate(error.instance) if each in error.instance[:n])
+            words = f"{shortened(twice)!r} is listed twice; list it once"
+        case "minimum" | "maximum":
+            words = f"{value} is out of range; choose {schema['minimum']} to {schema['maximum']}"
+        case "enum":
+            words = f"there is no {value!r}; choose from {', '.join(schema['enum'])}"
+        case "oneOf":
+            words = f"needs exactly one of {', '.join(_SOURCES)}"
+        case "pattern":
+            words = f"{value!r} is not allowed; write {schema['description']}"
+        case _:
+            words = f"must be {schema['description']}"
+    return f"{place}: {words}"
+
+
+def _spec(document: dict[str, Any], folder: Path) -> Spec:
+    defaults = {
+        "formats": tuple(FORMATS),
+        "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
+        "facets": _words(document, "facets", FACETS, ("hull",)),
+    }
+    formulations = _words(document, "formulations", FORMULATIONS, tuple(FORMULATIONS))
+    rungs = tuple(
+        _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
+    )
+    sketches = tuple(
+        _sketch(table, f"sketches[{number}].", folder, rungs)
+        for number, table in enumerate(document["sketches"])
+    )
+    _check_names([sketch.name for sketch in sketches])
+    ledger = folder / document["ledger"] if "ledger" in document else None
+    if ledger is not None and not ledger.is_file():
+        raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
+    return Spec(document["title"], formulations, rungs, sketches, ledger)
+
+
+def _check_names(names: list[str]) -> None:
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise InputError(
+                f"sketches[{number}].name: {name!r} is the name of two sketches; give each its own"
+            )
+
+
+def _words(
+    table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
+) -> tuple[str, ...]:
+    """The words of a list, all of them known ones, or the default."""
+    found = tuple(table.get(key, default))
+    for word in found:
+        _check_known(word, known, f"{place}{key}")
+    return found
+
+
+def _check_known(word: str, known: Collection[str], place: str, kind: str = "") -> None:
+    if word not in known:
+        raise InputError(f"{place}: there is no {kind}{shortened(word)!r}; choose from {', '.join(known)}")
+
+
+def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]) -> Rung:
+    known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
+    words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
+    return Rung(name, _whole(table["sizes"]), compress=table.get("compress", False), **words)
+
+
+def _whole(numbers: list[float]) -> tuple[int, ...]:
+    """The numbers of a list that is checked: 4.0 is whole too."""
+    return tuple(map(int, numbers))
+
+
+def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
+    name, names = table["name"], tuple(rung.name for rung in rungs)
+    wanted = _words(table, "rungs", names, names, place)
+    kind = next(kind for kind in _SOURCES if kind in table)
+    what: dict[str, Any] = _SOURCES[kind](table, place, folder)
+    sketch = Sketch(
+        name,
+        kind,
+        title=table.get("title", what.pop("title")),
+        rungs=wanted,
+        sizes=_sizes(table, place, wanted),
+        **what,
+    )
+    every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
+    for size in every:
+        if every.count(size) > 1:
+            raise InputError(
+                f"{place[:-1]}: {name} has size {size} on two rungs; keep it on one, "
+                "because names carry the size alone"
+            )
+    return sketch
+
+
+def _sizes(
+    table: dict[str, Any], place: str, rungs: tuple[str, ...]
+) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    given = table.get("sizes", {})
+    for rung in given:
+        if rung not in rungs:
+            raise InputError(f"{place}sizes.{rung}: is unknown; the keys here are {', '.join(rungs)}")
+    return tuple((rung, _whole(given[rung])) for rung in rungs if rung in given)
+
+
+def _sample(table: dict[str, Any], place: str, _folder: Path) -> dict[str, Any]:
+    what = table["sample"]
+    _check_known(what, SAMPLES, f"{place}sample", "sample ")
+    return {"what": what, "title": SAMPLES[what].description}
+
+
+def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]:
+    what = table["random"]
+    title = f"random strokes on a {'full square' if what == 'full' else 'ragged part of a square'}"
+    return {"what": what, "title": title, "seeds": _whole(table["seeds"])}
+
+
+def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
+    what, mask = table["file"], table.get("mask", "")
+    source = table.get("source", Path(what).name)
+    drawing = _content(folder / what, f"{place}file")
+    masked = _content(folder / mask, f"{place}mask") if mask else b""
+    return {"what": source, "title": source, "drawing": drawing, "mask": masked, "mask_name": mask}
+
+
+_SOURCES: Final[dict[Kind, Callable[[dict[str, Any], str, Path], dict[str, Any]]]] = {
+    "sample": _sample,
+    "file": _file,
+    "random": _random,
+}
+
+
+def _content(path: Path, place: str) -> bytes:
+    if not path.is_file():
+        raise InputError(
+            f"{place}: there is no file {path}; check the path, which starts at the specification's folder"
+        )
+    return read_bytes(path, MAX_BYTES)

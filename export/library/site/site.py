@@ -1,0 +1,371 @@
+"""A library as a static site: a table of all entries, a page for each instance and each entry, pictures,
+and every file.
+
+Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/,
+files/ (the library itself). Links are relative, nothing is asked of any other place, and without JavaScript
+everything is there but sorting and filtering. The templates are templates/site/*.html.j2; every text that
+comes from a file is escaped by them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+from jinja2 import Environment
+
+from .... import templates
+from ....models.errors import InputError, InstanceError, OutputError
+from ....models.field.file import read_field
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.instance.file import read_instance
+from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
+from ....templates import ENVIRONMENT
+from ...formats.registry import FORMATS
+from ...pictures.svg import field_picture, instance_picture, thumbnail, told
+from ..building.index import SOLU, SUMS
+from ..building.instance_task import about_file
+from ..documents.documents import Library, read_about, read_library
+from ..documents.mathematics import model
+from ..plan.spec import RUNGS
+
+Progress = Callable[[str], None]
+
+ASSETS: Final = ("site.css", "site.js", "icon.svg")
+"""Files of the templates that go into a site as they are."""
+FOLDERS: Final = ("entry", "files", "instance", "pictures")
+PAGES: Final = ("index.html", "about.html")
+
+_SUM: Final = re.compile(r"([0-9a-f]{64})  ([A-Za-z0-9_][A-Za-z0-9_.]*)")
+_SHOWN: Final = {".svg", ".png"}
+_ROLES: Final = {
+    "least_2": "field of least known 2-norm energy",
+    "least_1": "field of least known 1-norm energy",
+    "baseline": "baseline field, whose jumps are the data of qp-fixed",
+}
+"""The fields of an instance, as its `about` names them, and what they are."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A field of an instance as it is shown. roles: keys of _ROLES; facts: who found it; told:
+    its singularities.
+    """
+
+    roles: tuple[str, ...]
+    facts: dict[str, Any]
+    file: str
+    told: str
+
+    @property
+    def caption(self) -> str:
+        """What it is."""
+        return "; ".join(_ROLES[role] for role in self.roles)
+
+
+@dataclass
+class Shown:
+    """An instance as the site shows it."""
+
+    about: dict[str, Any]
+    entries: list[dict[str, Any]]
+    label: str
+    pictures: list[Picture] = field(default_factory=list)
+    drawings: list[str] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.about["name"])
+
+    def picture_of(self, entry: dict[str, Any]) -> Picture:
+        """The field that is shown with an entry: best for the norm that the entry minimises,
+        or the one whose jumps are its data.
+        """
+        meaning = FORMULATIONS[entry["formulation"]].minimises
+        role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
+        return next(each for each in self.pictures if role in each.roles)
+
+
+def write_site(folder: str | Path, output: str | Path, progress: Progress = lambda _: None) -> list[Path]:
+    """The pages of the site about the library in `folder`, written to `output`,
+    where an earlier site is replaced as a whole.
+
+    Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
+    OutputError when `output` cannot be written or holds something other than a site.
+    """
+    library = read_library(folder)
+    if Path(output).resolve().is_relative_to(library.folder.resolve()):
+        raise OutputError(
+            "lies inside the library, whose files are its own; choose another folder", file=output
+        )
+    sums = _sums(library.folder / SUMS)
+    shown = _instances(library, sums)
+    _check_listed(library, shown, sums)
+    with _replacing_folder(Path(output)) as stage:
+        for name in FOLDERS:
+            make_folder(stage / name)
+        for name in ASSETS:
+            write_bytes(stage / name, files(templates).joinpath("site", name).read_bytes())
+        progress("files")
+        _place(library.folder, sums, stage / "files")
+        for each in shown:
+            progress(f"pictures of {each.name}")
+            _draw(library.folder, each, stage / "pictures")
+        progress("pages")
+        pages = _write_pages(library, shown, sums, stage)
+    return [Path(output) / page for page in pages]
+
+
+def _instances(library: Library, names: Iterable[str]) -> list[Shown]:
+    """The instances of a library with their entries, in its order."""
+    grouped: dict[str, list[dict[str, Any]]] = {}
+    for entry in library.entries:
+        grouped.setdefault(entry["instance"]["file"].removesuffix(".instance.json"), []).append(entry)
+    found = []
+    for name, entries in grouped.items():
+        about = read_about(library.folder / about_file(name))
+        drawings = sorted(each for each in names if each.startswith(f"cf_{entries[0]['family']}."))
+        found.append(Shown(about, entries, _label(entries[0]["source"]), drawings=drawings))
+    return found
+
+
+def _label(source: dict[str, Any]) -> str:
+    """An instance among those of its sketch, as `8 s2 box`: pixels a side, seed, gauge."""
+    seed = [] if source["seed"] is None else [f"s{source['seed']}"]
+    return " ".join([str(source["size"]), *seed, *(["box"] if source["gauge"] == "box" else [])])
+
+
+def _sums(path: Path) -> dict[str, str]:
+    """Name to SHA-256 of every file of the library. Raises InputError for a line that is none."""
+    found = {}
+    for line in read_bytes(path).decode("ascii", "replace").splitlines():
+        fields = _SUM.fullmatch(line)
+        if fields is None:
+            raise InputError(
+                f"{line[:80]!r} is no checksum of a file of the library; build the library again", file=path
+            )
+        found[fields[2]] = fields[1]
+    return found
+
+
+def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) -> None:
+    """What the pages say of a file is what SHA256SUMS says. Raises InstanceError."""
+    for document in (each for one in shown for each in (one.about, *one.entries)):
+        for file in document["files"]:
+            if sums.get(file["name"]) != file["sha256"]:
+                raise InstanceError(
+                    f"SHA256SUMS and {document['name']} disagree about {file['name']}; "
+                    "build the library again",
+                    file=library.folder,
+                )
+
+
+def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
+    """Link every file of the library into a folder, or copy where links cannot be.
+
+    Raises InputError when one differs from its checksum.
+    """
+    for name, expected in sums.items():
+        if not (folder / name).is_file() or sha256_of(folder / name) != expected:
+            raise InputError(
+                "is missing or differs from SHA256SUMS; build the library again", file=folder / name
+            )
+    for name in (*sums, SUMS):
+        try:
+            os.link(folder / name, target / name, follow_symlinks=True)
+        except OSError:
+            write_bytes(target / name, read_bytes(folder / name))
+
+
+def _draw(folder: Path, shown: Shown, target: Path) -> None:
+    """Write the pictures of an instance and of each of its different fields."""
+    instance = read_instance(folder / shown.about["instance"]["file"])
+    write_bytes(target / f"{shown.name}.svg", instance_picture(instance))
+    write_bytes(target / f"{shown.name}.thumb.svg", thumbnail(instance))
+    roles_of: dict[str, list[str]] = {}
+    for role in _ROLES:
+        roles_of.setdefault(shown.about["fields"][role]["file"], []).append(role)
+    for file, roles in roles_of.items():
+        found = read_field(folder / file)
+        name = f"{file.removesuffix('.json')}.svg"
+        write_bytes(target / name, field_picture(found))
+        shown.pictures.append(Picture(tuple(roles), shown.about["fields"][roles[0]], name, told(found)))
+
+
+def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], stage: Path) -> list[Path]:
+    """Write every page; their paths inside the site."""
+    environment = _environment()
+    common = {
+        "library": library.document,
+        "entries": library.entries,
+        "instances": shown,
+        "instance_of": {entry["name"]: each for each in shown for entry in each.entries},
+        "families": (families := _families(shown)),
+        "faces": {name: max(members, key=_standing) for name, members in families.items()},
+        "tokens": {name: declared.short for name, declared in FORMULATIONS.items()},
+        "model": model,
+        "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
+        "sums": sums,
+    }
+    written = []
+
+    def write(path: str, template: str, **context: Any) -> None:
+        root = "../" * path.count("/")
+        text = environment.get_template(f"site/{template}.html.j2").render(common, root=root, **context)
+        write_bytes(stage / path, text.encode())
+        written.append(Path(path))
+
+    write("index.html", "index", choices=_choices(library.entries))
+    write(
+        "about.html",
+        "about",
+        formats=_formats(library.entries),
+        citation=(read_bytes(library.folder / "CITATION.cff").decode()),
+        solu=SOLU,
+    )
+    for each in shown:
+        write(f"instance/{each.name}.html", "instance", shown=each)
+        for entry in each.entries:
+            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry)
+    return written
+
+
+def _families(shown: list[Shown]) -> dict[str, list[Shown]]:
+    """Instances by sketch, in the order of the library."""
+    found: dict[str, list[Shown]] = {}
+    for each in shown:
+        found.setdefault(each.about["family"], []).append(each)
+    return found
+
+
+def _standing(shown: Shown) -> tuple[int, bool]:
+    """What the picture of a sketch is chosen by: the largest grid, in the gauge that loses nothing."""
+    source = shown.entries[0]["source"]
+    return source["size"], source["gauge"] == "strokes"
+
+
+def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
+    """What the filters of the table offer."""
+    present = {
+        key: dict.fromkeys(entry[key] for entry in entries)
+        for key in ("family", "rung", "formulation", "class", "status")
+    }
+    return {key: list(values) for key, values in present.items()} | {
+        "rung": [name for name in RUNGS if name in present["rung"]]
+    }
+
+
+def _formats(entries: tuple[dict[str, Any], ...]) -> list[Any]:
+    written = {file["format"] for entry in entries for file in entry["files"]}
+    return [entry for name, entry in FORMATS.items() if name in written]
+
+
+def _environment() -> Environment:
+    """The templates with filters that write numbers as people read them."""
+    environment = ENVIRONMENT.overlay()
+    environment.filters = {
+        **ENVIRONMENT.filters,
+        "count": count,
+        "value": value,
+        "exact": exact,
+        "percent": percent,
+        "size": size,
+    }
+    environment.globals = {**ENVIRONMENT.globals, "shown_types": _SHOWN}
+    return environment
+
+
+def count(number: int) -> str:
+    """A whole number with narrow spaces between its thousands."""
+    return f"{number:,}".replace(",", "\u202f")
+
+
+def value(number: float | None) -> str:
+    """A number to six digits, a dash for none."""
+    return "–" if number is None else f"{number + 0.0:.6g}".replace("-", "−")
+
+
+def exact(number: float) -> str:
+    """A number with all its digits."""
+    return repr(number + 0.0)
+
+
+def percent(share: float | None) -> str:
+    """A share in percent to three digits, a dash for none."""
+    if share is None:
+        return "–"
+    return "≈ 0\u202f%" if 0 < share < 1e-6 else f"{100 * share:.3g}\u202f%"
+
+
+def size(number: int) -> str:
+    """Bytes as B, kB or MB."""
+    for unit, name in ((1e6, "MB"), (1e3, "kB")):
+        if number >= unit:
+            return f"{number / unit:.3g}\u202f{name}"
+    return f"{number}\u202fB"
+
+
+@contextmanager
+def _replacing_folder(output: Path) -> Iterator[Path]:
+    """An empty neighbour of a folder that takes its place on success;
+    on failure it is removed and what stood there stays.
+
+    Raises OutputError when the folder holds something other than a site, or nothing can be written beside it.
+    """
+    output = output.resolve()
+    _check_replaceable(output)
+    make_folder(output.parent)
+    try:
+        remove_dead(output.parent)
+        stage = neighbour(output)
+        stage.mkdir()
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {error.strerror}; choose another folder", file=output
+        ) from error
+    try:
+        yield stage
+        _take_place(stage, output)
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {error.strerror}; free some space or choose another folder", file=output
+        ) from error
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _check_replaceable(output: Path) -> None:
+    if not output.exists():
+        return
+    if not output.is_dir():
+        raise OutputError("is a file; name a folder for the site", file=output)
+    known = {*FOLDERS, *PAGES, *ASSETS}
+    strange = sorted(path.name for path in output.iterdir() if path.name not in known)
+    if strange:
+        raise OutputError(
+            f"holds {strange[0]!r}, which is no part of a site; choose another folder", file=output
+        )
+
+
+def _take_place(stage: Path, output: Path) -> None:
+    """Rename the new folder to the old one's name; the old one goes only after that,
+    and comes back if it fails.
+    """
+    old = stage.with_suffix(".old")
+    if output.exists():
+        output.rename(old)
+    try:
+        stage.rename(output)
+    except OSError:
+        if old.exists():
+            old.rename(output)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,5 @@
+"""Pictures of fields.
+
+Figures of crosses, streamlines and singularities with matplotlib, combing, and small drawings as plain SVG.
+The numbers in a picture come from models/field.
+"""

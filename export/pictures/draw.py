@@ -1,0 +1,234 @@
+"""Pictures of instances and cross fields as PNG, SVG or PDF: same input, same bytes.
+
+The Agg, SVG and PDF writers of matplotlib are used directly; pyplot and the user's matplotlib settings play
+no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...models.errors import InputError
+from ...models.field.field import CrossField
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from ...models.storage import replacing
+from . import panels
+
+Panel = Callable[[Any, panels.Picture], None]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of picture: one line of description, its panels with their headings, and what stands round them.
+
+    size: points of the longer side of a panel. bar: points to the right for a colour bar. legend: keys below.
+    """
+
+    description: str
+    panels: tuple[tuple[str, Panel], ...]
+    size: float = 340.0
+    bar: float = 0.0
+    legend: bool = False
+    needs_field: bool = True
+
+
+KINDS: Final = {
+    "instance": Kind("mask and strokes of an instance", (("", panels.draw_instance),), needs_field=False),
+    "crosses": Kind(
+        "crosses on the pixels, one in several on large grids", (("", panels.draw_crosses),), legend=True
+    ),
+    "field": Kind(
+        "evenly spaced streamlines of both line families, with singularities",
+        (("", panels.draw_streamlines),),
+        legend=True,
+    ),
+    "angle": Kind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
+    "energy": Kind("map of the smoothness energy of each pixel", (("", panels.draw_energy),), bar=58.0),
+    "overview": Kind(
+        "instance, crosses, streamlines and angle map in a row, with counts and energies",
+        (
+            ("instance", panels.draw_instance),
+            ("crosses", panels.draw_crosses),
+            ("streamlines", panels.draw_streamlines),
+            ("angle map", panels.draw_angle),
+        ),
+        size=170.0,
+        bar=50.0,
+        legend=True,
+    ),
+}
+"""Every kind of picture, by the name under which it is asked for."""
+
+SUFFIXES: Final = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
+    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""File suffixes, and the metadata that would name a clock or a version."""
+
+_DOTS: Final = 220  # dots per inch of a PNG
+_POINTS: Final = 72.0
+_EDGE: Final = 9.0
+_GAP: Final = 14.0
+_LINE: Final = 13.0  # height of a line of text
+_CHARACTER: Final = 4.0  # width of a character of the caption, at most
+_NARROWEST: Final = 52.0  # room for a heading
+
+
+def draw(
+    what: CrossField | Instance,
+    path: str | Path,
+    *,
+    kind: str = "field",
+    sketch: Sequence[ArrayLike] | None = None,
+    title: str | None = None,
+) -> Path:
+    """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
+
+    kind: a name in KINDS; for an Instance only `instance` makes sense. sketch: polylines (k, 2) in the
+    coordinates of the sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to
+    the grid. Raises InputError for an unknown kind or suffix, a kind that needs a field, or a malformed
+    sketch, and OutputError when the file cannot be written.
+    """
+    path = Path(path)
+    suffix = _suffix(path)
+    chosen = _kind(kind, what)
+    instance, field = (what, None) if isinstance(what, Instance) else (what.instance, what)
+    picture = panels.Picture(instance, field, _on_grid(sketch or (), instance), chosen.size)
+
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcParams.update(
+            {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
+        )
+        mpl.rcParams.update(
+            {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
+        )
+        figure = _page(picture, chosen, title)
+        with replacing(path) as stream:
+            figure.savefig(stream, format=suffix[1:], dpi=_DOTS, metadata=SUFFIXES[suffix])
+    return path
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"pictures are not written as {suffix or 'a name without suffix'}; "
+            f"use one of {', '.join(SUFFIXES)}",
+            file=path,
+        )
+    return suffix
+
+
+def _kind(kind: str, what: CrossField | Instance) -> Kind:
+    if kind not in KINDS:
+        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
+    if KINDS[kind].needs_field and isinstance(what, Instance):
+        raise InputError(
+            f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, "
+            "or use kind instance"
+        )
+    return KINDS[kind]
+
+
+def _on_grid(sketch: Sequence[ArrayLike], instance: Instance) -> tuple[Floats, ...]:
+    """Polylines in pixel units, y up."""
+    lines = []
+    for number, polyline in enumerate(sketch):
+        try:
+            points = np.asarray(polyline, dtype=np.float64)
+        except (TypeError, ValueError):
+            points = np.array(np.nan)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise InputError(
+                f"polyline {number} of the sketch is no list of finite points (x, y); "
+                "leave it out or repair it"
+            )
+        scaled = (points - instance.origin) / instance.pixel_size - 0.5
+        lines.append(scaled * np.array([1.0, -1.0]))
+    return tuple(lines)
+
+
+def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
+    """The figure: panels in a row, headings above, legend and caption below; every length in points."""
+    from matplotlib.figure import Figure
+
+    height, width = (side * picture.unit for side in picture.instance.mask.shape)
+    above = _EDGE + _LINE * (any(heading for heading, _ in kind.panels) + (title is not None) * 1.3)
+    below = _EDGE + _LINE * (1 + kind.legend)
+    pitch, count = max(width, _NARROWEST) + _GAP, len(kind.panels)
+    row = count * pitch - _GAP + kind.bar
+    caption = _caption(picture, full=count > 1)
+    keys = panels.legend_of(picture) if kind.legend else []
+    words = _CHARACTER * max(len(caption), sum(len(key.get_label()) + 8 for key in keys))
+    page = np.array([max(row, words) + 2 * _EDGE, above + height + below])
+    figure = Figure(figsize=tuple(page / _POINTS), facecolor="white")
+    for number, (heading, panel) in enumerate(kind.panels):
+        corner = np.array([(page[0] - row) / 2 + number * pitch + (pitch - _GAP - width) / 2, below])
+        axes = figure.add_axes((*(corner / page), *(np.array([width, height]) / page)))
+        _frame(axes, picture.instance.mask.shape)
+        axes.set_title(heading, fontsize=8, pad=4)
+        panel(axes, picture)
+    if title is not None:
+        size = min(9.5, 1.6 * page[0] / max(len(title), 1))
+        figure.text(0.5, 1 - _EDGE / page[1], title, ha="center", va="top", fontsize=size, parse_math=False)
+    figure.text(0.5, _EDGE / page[1], caption, ha="center", va="bottom", color="#444444")
+    if keys:
+        place = (0.5, (_EDGE + _LINE - 3) / page[1])
+        style = {
+            "frameon": False,
+            "borderaxespad": 0,
+            "borderpad": 0.2,
+            "handlelength": 1.4,
+            "columnspacing": 1.6,
+        }
+        figure.legend(handles=keys, loc="lower center", bbox_to_anchor=place, ncols=len(keys), **style)
+    return figure
+
+
+def _frame(axes: Any, shape: tuple[int, ...]) -> None:
+    axes.set_xlim(-0.5, shape[1] - 0.5)
+    axes.set_ylim(0.5 - shape[0], 0.5)
+    axes.set_axis_off()
+    axes.set_autoscale_on(False)
+
+
+def _caption(picture: panels.Picture, *, full: bool) -> str:
+    instance = picture.instance
+    parts = [
+        f"{instance.grid.width} × {instance.grid.height} pixels",
+        f"{len(instance.theta)} stroke pixel{'' if len(instance.theta) == 1 else 's'}",
+    ]
+    if picture.field is not None:
+        parts.append(_counted(picture.field))
+    if picture.field is not None and full:
+        parts.append(
+            f"energy {picture.field.energy(2).total:.4g} (2-norm), "
+            f"{picture.field.energy(1).total:.4g} (1-norm)"
+        )
+    if full:
+        parts.append(f"gauge {instance.gauge}")
+    return "  ·  ".join(parts)
+
+
+def _counted(field: CrossField) -> str:
+    """How many singularities of which index, as 3 singularities (2 of +1/4, 1 of −1/2)."""
+    values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
+    if not len(values):
+        return "no singularity"
+    names = {1: "1/4", 2: "1/2", 3: "3/4"}
+    each = [
+        f"{count} of {'−' if value < 0 else '+'}{names.get(abs(value), f'{abs(value) / 4:g}')}"
+        for value, count in zip(values[::-1].tolist(), counts[::-1].tolist(), strict=True)
+    ]
+    total = int(counts.sum())
+    return f"{total} singularit{'y' if total == 1 else 'ies'} ({', '.join(each)})"

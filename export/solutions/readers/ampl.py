@@ -1,0 +1,371 @@
+"""AMPL solution files (.sol), text and binary: read and written.
+
+Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl and ampl/mp):
+
+    optimal solution found          any lines of message; Bonmin and Couenne begin with an empty one, Minto writes none
+                                    an empty line
+    Options
+    3                               number k of options, the first number of the .nl file
+    1
+    1                               if this one is 3, then k is 2 too large and a real number (vbtol) follows the counts
+    0
+    2                               number of constraints
+    0                               number of dual values that follow: all or none
+    5                               number of variables
+    5                               number of values that follow: all or none
+    10                              dual values, then values, in the order of the .nl file
+    ...
+    objno 0 0                       number of the objective and solve code; the code or the line may be missing
+    suffix ...                      suffixes and other text, not needed here
+
+If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told apart
+without the problem. The binary form has the same parts as records between their lengths, as Fortran writes them:
+integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes too few.
+
+The solve code says `solved` and no more. It counts as a global proof only where the message names a solver that
+proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is left out for saying
+Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ....models.errors import SolutionError
+from ....models.instance.grid import Floats
+from ....models.storage import replacing
+from .text import (
+    HEAD,
+    Cursor,
+    RawSolution,
+    Status,
+    is_number,
+    numbers,
+    one_line,
+    shown,
+    with_unix_ends,
+)
+
+TEXT: Final = "ampl-text"
+BINARY: Final = "ampl-binary"
+
+_OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
+_AFTER_NUMBERS = re.compile(rb"^(?:objno|suffix)\b", re.MULTILINE)
+_OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
+_CODE = re.compile(rb"objno[ \t]+\d{1,9}(?:[ \t]+(-?\d{1,9}))?[ \t]*")
+_MOST_OPTIONS: Final = 16
+_OUR_OPTIONS: Final = (1, 1, 0)  # as in the first line of our .nl files
+_LONGEST_MESSAGE: Final = 10_000
+_OPTIONS_WORD: Final = b"Options"
+_MAGIC: Final = b"\x06\0\0\0binary\x06\0\0\0"
+
+_GLOBAL = re.compile(
+    r"(optimal solution found$|(baron|cbc|copt|cplex|gurobi|highs|scip|xpress)\b(?!.*\blocal).*\boptimal)",
+    re.IGNORECASE,
+)
+# SCIP writes those three words and not its name; Ipopt writes them behind its own
+
+
+class _Code(NamedTuple):
+    """What solve codes up to `last` mean: with values in the file and without."""
+
+    last: int
+    with_point: Status
+    without_point: Status
+
+
+_FAILURE: Final = _Code(-1, Status.ERROR, Status.ERROR)  # codes below 0 and from 500 on
+_CODES: Final = (
+    _FAILURE,
+    _Code(99, Status.OPTIMAL_LOCAL, Status.ERROR),
+    _Code(199, Status.FEASIBLE, Status.ERROR),
+    _Code(299, Status.INFEASIBLE, Status.INFEASIBLE),
+    _Code(399, Status.UNBOUNDED, Status.UNBOUNDED),
+    _Code(449, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
+    # up to 469: infeasible or unbounded, which no point can be; older SCIP uses 450 for interrupted
+    _Code(469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
+    _Code(499, Status.LIMIT_WITHOUT_POINT, Status.LIMIT_WITHOUT_POINT),
+)
+
+
+def recognises_text(head: bytes) -> bool:
+    """Whether a file that begins so is an AMPL solution in text form."""
+    head = with_unix_ends(head)
+    return _OPTIONS.search(head) is not None or _start_of_numbers(head) is not None
+
+
+def recognises_binary(head: bytes) -> bool:
+    """Whether a file that begins so is an AMPL solution in binary form."""
+    return head.startswith(_MAGIC)
+
+
+def parse_text(data: bytes) -> RawSolution:
+    """The content of a text file. Raises SolutionError for files that are cut off or whose numbers do not fit."""
+    data = with_unix_ends(data)
+    found = _OPTIONS.search(data, 0, HEAD)
+    if found is None:
+        return _parse_without_options(data)
+    cursor = Cursor(data, found.end())
+    counts = _read_counts(cursor)
+    values = _read_values(cursor, counts)
+    code = _read_code(cursor)
+    return _solution(TEXT, data[: found.start()], code, values, counts.rows)
+
+
+def _start_of_numbers(head: bytes) -> int | None:
+    """Where the first number or `objno` on a line after an empty one is; None when there is none."""
+    start, after_empty = 0, False
+    for line in head.split(b"\n"):
+        word = line.strip()
+        if after_empty and (is_number(word) or word.startswith(b"objno ")):
+            return start
+        start, after_empty = start + len(line) + 1, not word
+    return None
+
+
+class _Counts(NamedTuple):
+    """The four counts of the Options block."""
+
+    rows: int
+    duals: int
+    columns: int
+    values: int
+
+    @property
+    def complaint(self) -> str | None:
+        """What is wrong with them, if anything."""
+        if self.duals in {0, self.rows} and self.values in {0, self.columns}:
+            return None
+        return (
+            f"{self.duals} dual values are announced for {self.rows} constraints and {self.values} values for {self.columns} "
+            "variables, where all or none should be"
+        )
+
+
+def _read_counts(cursor: Cursor) -> _Counts:
+    count = cursor.count("the number of options")
+    if count > _MOST_OPTIONS:
+        raise cursor.fault(f"{count} options are announced")
+    options = [cursor.integer("an option") for _ in range(min(count, 2))]
+    with_vbtol = options[1:] == [3]
+    for _ in range(count - len(options) - 2 * with_vbtol):
+        cursor.integer("an option")
+    counts = _Counts(*(cursor.count("a count of constraints, variables or values") for _ in range(4)))
+    if counts.complaint:
+        raise cursor.fault(counts.complaint)
+    if with_vbtol:
+        cursor.number(cursor.line("vbtol"))
+    return counts
+
+
+def _read_values(cursor: Cursor, counts: _Counts) -> Floats:
+    """The primal values; the cursor moves behind them."""
+    data, start = cursor.data, cursor.position
+    needed = counts.duals + counts.values
+    ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=start) == ord("\n"))[:needed] + 1
+    if len(ends) < needed:
+        raise cursor.fault(
+            f"{needed} numbers are announced, {len(ends)} whole lines follow; the file is cut off"
+        )
+    middle = start + int(ends[counts.duals - 1]) if counts.duals else start
+    cursor.position = start + int(ends[-1]) if needed else start
+    return numbers(data, middle, cursor.position)
+
+
+def _read_code(cursor: Cursor) -> int | None:
+    """The solve code, or None when the file has none."""
+    if is_number(cursor.data[cursor.position : cursor.position + HEAD].split(b"\n", 1)[0].strip()):
+        cursor.line("objno")
+        raise cursor.fault("there are more numbers than announced")
+    found = _OBJNO.search(cursor.data, cursor.position)
+    if found is None:
+        return None
+    cursor.position = found.start()
+    line = cursor.line("the solve code")
+    code = _CODE.fullmatch(line)
+    if code is None:
+        raise cursor.fault(f"{shown(line)} is not the number of the objective and a solve code")
+    return None if code[1] is None else int(code[1])
+
+
+def _parse_without_options(data: bytes) -> RawSolution:
+    start = _start_of_numbers(data[:HEAD])
+    if start is None:
+        raise SolutionError(
+            "there is neither an Options line nor a number after the message; let the solver write the file again"
+        )
+    stop = _end_of_numbers(data, start)
+    return _solution(TEXT, data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
+
+
+def _end_of_numbers(data: bytes, start: int) -> int:
+    found = _AFTER_NUMBERS.search(data, start)
+    return len(data) if found is None else found.start()
+
+
+def _solution(reader: str, message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
+    words = one_line(message)
+    if code is not None and 0 <= code <= 99 and not values.size:
+        raise SolutionError("the file says solved and holds no values; let the solver write the file again")
+    return RawSolution(
+        reader, _status(code, words, with_point=values.size > 0), words, None, None, values, rows=rows
+    )
+
+
+def _status(code: int | None, message: str, *, with_point: bool) -> Status:
+    if code is None:
+        return Status.FEASIBLE if with_point else Status.NO_POINT
+    if 0 <= code <= 99 and _GLOBAL.match(message):
+        return Status.OPTIMAL_GLOBAL
+    if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():
+        return Status.INFEASIBLE
+    entry = next((entry for entry in _CODES if code <= entry.last), _FAILURE)
+    return entry.with_point if with_point else entry.without_point
+
+
+def parse_binary(data: bytes) -> RawSolution:
+    """The content of a binary file. Raises SolutionError for files that are cut off or whose records do not fit."""
+    records = _Records(data, len(_MAGIC))
+    message = b"\n".join(iter(records.take, b""))
+    counts = records.take_counts()
+    duals, values = records.take_numbers("dual values"), records.take_numbers("values")
+    if counts and (duals.size, values.size) != (counts.duals, counts.values):
+        raise records.fault(
+            f"{counts.duals} dual values and {counts.values} values are announced, {duals.size} and {values.size} follow"
+        )
+    if np.isnan(values).any():
+        raise records.fault("one of the values is not a number")
+    rows = counts.rows if counts else duals.size
+    return _solution(BINARY, message, records.take_code(), values, rows)
+
+
+@dataclass
+class _Records:
+    """A place in a binary file that moves on record by record."""
+
+    data: bytes
+    position: int
+
+    def fault(self, text: str) -> SolutionError:
+        return SolutionError(f"byte {self.position}: {text}; let the solver write the file again")
+
+    def take(self, unstated: int = 0) -> bytes:
+        """The next record, which is `unstated` bytes longer than its length says."""
+        start = self.position + 4
+        length = self._length(self.position)
+        end = start + length + unstated
+        if self._length(end) != length:
+            raise self.fault(f"a record of {length} bytes does not end where it should")
+        self.position = end + 4
+        return self.data[start:end]
+
+    def _length(self, at: int) -> int:
+        if at + 4 > len(self.data):
+            raise self.fault("the file is cut off in this record")
+        return int.from_bytes(self.data[at : at + 4], "little")
+
+    def take_counts(self) -> _Counts | None:
+        """The counts of the Options record, if there is one."""
+        start = self.position + 4 + len(_OPTIONS_WORD)
+        if self.data[start - len(_OPTIONS_WORD) : start] != _OPTIONS_WORD:
+            return None
+        count, _, second = struct.unpack("<3i", self.data[start : start + 12].ljust(12, b"\0"))
+        with_vbtol = second == 3
+        size = len(_OPTIONS_WORD) + 4 * (count + 5 - 2 * with_vbtol)
+        stated = self._length(self.position)
+        record = self.take(8 if with_vbtol and stated == size else 0)
+        if not 0 <= count <= _MOST_OPTIONS or stated not in {size, size + 8 * with_vbtol}:
+            raise self.fault(f"the Options record of {stated} bytes announces {count} options")
+        return self._checked(_Counts(*struct.unpack("<4i", record[size - 16 : size])))
+
+    def _checked(self, counts: _Counts) -> _Counts:
+        if min(counts) < 0 or counts.complaint:
+            raise self.fault(counts.complaint or "a count is negative")
+        return counts
+
+    def take_numbers(self, what: str) -> Floats:
+        record = self.take()
+        if len(record) % 8:
+            raise self.fault(f"{len(record)} bytes cannot hold {what} of 8 bytes")
+        return np.frombuffer(record, "<f8").astype(np.float64)
+
+    def take_code(self) -> int | None:
+        """The solve code, or None when the file has none."""
+        if self.position == len(self.data):
+            return None
+        record = self.take()
+        if len(record) not in {4, 8}:
+            raise self.fault(f"a record of {len(record)} bytes stands where the solve code should")
+        return int(struct.unpack("<2i", record)[1]) if len(record) == 8 else None
+
+
+def write_ampl_sol(
+    path: str | Path,
+    message: str,
+    primal: Floats,
+    rows: int,
+    code: int,
+    *,
+    columns: int | None = None,
+    binary: bool = False,
+) -> Path:
+    """The path, now holding an AMPL solution file, text or binary.
+
+    primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
+    rows: number of constraints. code: solve code as in the head of this module. Numbers are written so that they are
+    read back bit by bit.
+
+    Raises SolutionError when a value is not finite, OutputError when the file cannot be written.
+    """
+    primal = np.asarray(primal, dtype=np.float64)
+    if not np.isfinite(primal).all():
+        raise SolutionError("the solver returned a value that is not finite; nothing was written", file=path)
+    counts = (rows, 0, len(primal) if columns is None else columns, len(primal))
+    with replacing(path) as stream:
+        stream.writelines(
+            _binary_parts(message, primal, counts, code)
+            if binary
+            else _text_parts(message, primal, counts, code)
+        )
+    return Path(path)
+
+
+def _lines_of(message: str) -> bytes:
+    """The message so that no line of it is empty or says Options."""
+    words = [
+        one_line(line.encode(errors="replace")) for line in message[:_LONGEST_MESSAGE].strip().splitlines()
+    ]
+    return "\n".join({"": " ", "Options": "Options."}.get(line, line) for line in words).encode()
+
+
+def _text_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:
+    head = [_lines_of(message).decode(), "", "Options", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts]
+    yield "\n".join(map(str, head)).encode() + b"\n"
+    for start in range(0, len(primal), HEAD):
+        text = "\n".join(map(repr, primal[start : start + HEAD].tolist())) + "\n"
+        yield text.replace(".0\n", "\n").encode()
+    yield f"objno 0 {code}\n".encode()
+
+
+def _binary_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:
+    text = _lines_of(message)
+    options = struct.pack("<8i", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts)
+    yield _MAGIC
+    if text:
+        yield _record(text)
+    yield from map(
+        _record,
+        (b"", _OPTIONS_WORD + options, b"", primal.astype("<f8").tobytes(), struct.pack("<2i", 0, code)),
+    )
+
+
+def _record(content: bytes) -> bytes:
+    length = len(content).to_bytes(4, "little")
+    return length + content + length

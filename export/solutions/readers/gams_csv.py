@@ -1,0 +1,111 @@
+"""The answer that our own GAMS files write after `gams x.gms --RESULTS=x.csv`: lines `name,value`.
+
+    model_status,1
+    solver_status,1
+    problem,sha256_1a2b3c4d5e6f               older files have no such line
+    objective, 5.565360828459345E-01
+    alpha_00_00, 1.146018366025520E-01     every column in order; EPS is a zero, +INF and -INF occur, NA and UNDF are no values
+
+GAMS's numbers of the two states are in the manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves
+the start in the levels: values are then not read.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from .text import Cursor, RawSolution, Status, named_numbers, shown, with_unix_ends, without_point
+
+NAME: Final = "gams-csv"
+
+_HEAD: Final = b"model_status,"
+_EPS = re.compile(rb",[ ]*EPS[ ]*$", re.MULTILINE)
+_NO_VALUE: Final = {b"NA", b"UNDF"}
+
+_MODEL: Final = {
+    1: (Status.OPTIMAL_GLOBAL, "optimal"),
+    2: (Status.OPTIMAL_LOCAL, "locally optimal"),
+    3: (Status.UNBOUNDED, "unbounded"),
+    4: (Status.INFEASIBLE, "infeasible"),
+    5: (Status.LIMIT_WITHOUT_POINT, "locally infeasible"),  # no proof of anything
+    6: (Status.LIMIT_WITHOUT_POINT, "intermediate infeasible"),
+    7: (Status.FEASIBLE, "feasible solution"),
+    8: (Status.FEASIBLE, "integer solution"),
+    9: (Status.LIMIT_WITHOUT_POINT, "intermediate non-integer"),
+    10: (Status.INFEASIBLE, "integer infeasible"),
+    14: (Status.LIMIT_WITHOUT_POINT, "no solution returned"),
+    18: (Status.UNBOUNDED, "unbounded, no solution"),
+    19: (Status.INFEASIBLE, "infeasible, no solution"),
+}
+_SOLVER: Final = {
+    1: "normal completion",
+    2: "iteration limit",
+    3: "time limit",
+    4: "terminated by the solver",
+    5: "evaluation errors",
+    6: "capability problems",
+    7: "licensing problems",
+    8: "user interrupt",
+    9: "setup failure",
+    10: "solver failure",
+    11: "internal solver error",
+    12: "skipped",
+    13: "system failure",
+}
+_LIMITS: Final = {2, 3, 4, 8}
+_HAS_POINT: Final = {
+    Status.OPTIMAL_GLOBAL,
+    Status.OPTIMAL_LOCAL,
+    Status.FEASIBLE,
+    Status.LIMIT_WITH_POINT,
+}
+
+
+def status_of(model: int, solver: int) -> tuple[Status, str]:
+    """The claim that GAMS's model status and solver status make, and both in words."""
+    status, words = _MODEL.get(model, (Status.ERROR, f"model status {model}"))
+    if status is Status.FEASIBLE and solver in _LIMITS:
+        status = Status.LIMIT_WITH_POINT
+    if status is Status.LIMIT_WITHOUT_POINT and solver not in _LIMITS | {1}:
+        status = Status.ERROR
+    return status, f"{words}; {_SOLVER.get(solver, f'solver status {solver}')}"
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins so was written by one of our GAMS files."""
+    return head.startswith(_HEAD)
+
+
+def parse(data: bytes) -> RawSolution:
+    """The content of a file. Raises SolutionError for NA, UNDF, what is not a number and a file that is cut off."""
+    data = with_unix_ends(data)
+    cursor = Cursor(data)
+    status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))
+    if data.startswith(b"problem,", cursor.position):
+        _field(cursor, b"problem")  # what reads every kind of file looks at it
+    text = _field(cursor, b"objective")
+    objective = None if text in _NO_VALUE else cursor.number(b"0" if text == b"EPS" else text)
+    if status not in _HAS_POINT:
+        return without_point(NAME, status, words)
+    if b"EPS" in data:
+        data = _EPS.sub(b",0", data)
+    names, values = named_numbers(data.replace(b",", b" "), cursor.position, len(data), 2)
+    if not len(values):
+        raise cursor.fault("no columns follow")
+    return RawSolution(NAME, status, words, objective, names, values)
+
+
+def _field(cursor: Cursor, expected: bytes) -> bytes:
+    """What stands after the comma on the next line, whose label is known."""
+    label, _, text = cursor.line(expected.decode()).partition(b",")
+    if label != expected:
+        raise cursor.fault(f"{shown(label)} stands where {expected.decode()} should")
+    return text.strip()
+
+
+def _state(cursor: Cursor, expected: bytes) -> int:
+    text = _field(cursor, expected)
+    if not re.fullmatch(rb"\d{1,3}", text):
+        raise cursor.fault(f"{shown(text)} is not the number of a state")
+    return int(text)

@@ -1,0 +1,141 @@
+"""Solution files of GLPK, `glpsol -w file`: no names, columns by their number.
+
+    c Problem:    tiny                     comments; an LP file has no name, an MPS file the one after NAME
+    ...
+    s mip 2 5 o -14.4                      kind, rows, columns, status, objective
+    i 1 1.3                                rows; s ipt adds the dual value, s bas a letter and the dual value
+    j 1 10                                 columns, in the order of the LP or MPS file
+    e o f
+
+Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the primal and one for the
+dual side. The order of the columns is told by the problem's name: our LP files put ONE first and have no name, our MPS files put it last;
+in a .mod the objective is named energy, which is the first row too.
+`glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its style 2 and counts the objective as
+one more row, which is found out when the sizes are compared. Layouts: GLPK 5.0.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ....models.errors import SolutionError
+from ....models.instance.grid import Floats
+from ...writing.canonical import Order
+from .text import (
+    Cursor,
+    RawSolution,
+    Status,
+    fault,
+    labelled_numbers,
+    line_after,
+    shown,
+    with_unix_ends,
+    without_point,
+)
+
+NAME: Final = "glpk"
+
+_HEAD = re.compile(rb"c Problem:|s (?:mip|bas|ipt) ")
+_SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
+_END: Final = b"e o f"
+_GOAL_OF_MOD: Final = b"energy ="
+_WORDS: Final = {b"mip": 3, b"ipt": 4, b"bas": 5}
+_STATUS: Final = {
+    b"o": Status.OPTIMAL_GLOBAL,
+    b"f": Status.LIMIT_WITH_POINT,
+    b"n": Status.INFEASIBLE,
+    b"i": Status.LIMIT_WITHOUT_POINT,
+    b"u": Status.LIMIT_WITHOUT_POINT,
+    b"f f": Status.OPTIMAL_GLOBAL,
+    b"f i": Status.LIMIT_WITH_POINT,
+    b"f u": Status.LIMIT_WITH_POINT,
+    b"f n": Status.UNBOUNDED,
+    b"n f": Status.INFEASIBLE,
+    b"n i": Status.INFEASIBLE,
+    b"n n": Status.INFEASIBLE,
+    b"n u": Status.INFEASIBLE,
+}
+_WITH_POINT: Final = {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}
+
+
+class _Summary(NamedTuple):
+    """The line that begins with s."""
+
+    words: int
+    rows: int
+    columns: int
+    status: Status
+    objective: float
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins so was written by GLPK, or by HiGHS in the manner of GLPK."""
+    return _HEAD.match(head) is not None
+
+
+def parse(data: bytes) -> RawSolution:
+    """The content of a file. Raises SolutionError for counts that do not fit and for a file that is cut off."""
+    data = with_unix_ends(data)
+    cursor = Cursor(data)
+    comments = _comments(cursor)
+    order = _order(comments)
+    summary = _summary(cursor)
+    message = comments.get(b"Status", b"").decode(errors="replace").lower()
+    if not data.rstrip().endswith(b"\n" + _END):
+        raise SolutionError("the file is cut off: it has no line `e o f`; let the solver write it again")
+    if summary.status not in _WITH_POINT:
+        return without_point(NAME, summary.status, message, rows=summary.rows)
+    values = _columns(data, cursor.position, summary)
+    return RawSolution(
+        NAME, summary.status, message, summary.objective, None, values, rows=summary.rows, order=order
+    )
+
+
+def _comments(cursor: Cursor) -> dict[bytes, bytes]:
+    """What the comments say; the cursor moves to the line after them."""
+    found: dict[bytes, bytes] = {}
+    while cursor.data.startswith(b"c", cursor.position):
+        label, _, text = cursor.line("a comment")[1:].partition(b":")
+        found.setdefault(label.strip(), text.strip())
+    return found
+
+
+def _order(comments: dict[bytes, bytes]) -> Order:
+    if comments.get(b"Objective", b"").startswith(_GOAL_OF_MOD):
+        return "mod"
+    return "mps" if comments.get(b"Problem") else "lp"
+
+
+def _summary(cursor: Cursor) -> _Summary:
+    line = cursor.line("the line of counts and status")
+    found = _SUMMARY.fullmatch(line)
+    if found is None:
+        raise cursor.fault(f"{shown(line)} is not kind, rows, columns, status and objective")
+    status = _STATUS.get(found[4], Status.LIMIT_WITHOUT_POINT)
+    return _Summary(_WORDS[found[1]], int(found[2]), int(found[3]), status, cursor.number(found[5]))
+
+
+def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
+    start = data.find(b"\nj ", start - 1) + 1 or data.rfind(_END)
+    stop = data.rfind(_END)
+    letters, numbers = labelled_numbers(
+        data, start, stop, summary.words, label=0, numeric=(1, 2 + (summary.words == 5))
+    )
+    if len(letters) != summary.columns:
+        raise fault(
+            data,
+            start,
+            f"{summary.columns} columns are announced, {len(letters)} lines follow; let the solver write the file again",
+        )
+    wrong = (letters != b"j") | (numbers[:, 0] != np.arange(1, summary.columns + 1))
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise fault(
+            data,
+            line_after(data, start, at),
+            f"this is not the line of column {at + 1}; let the solver write the file again",
+        )
+    return numbers[:, 1].copy()

@@ -1,0 +1,164 @@
+"""Solution files of Gurobi: .sol and .json. The .sol layout is also that of COPT, and of any plain list of names and values.
+
+    # Solution for model obj               comment lines; they vary from version to version, and the first may be missing
+    # Objective value = -1.44e+01
+    x 10                                   name and value of every column, zeros too
+
+A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one and holds the
+integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
+
+    { "SolutionInfo": { "Status": 2, "ObjVal": ..., "ObjBound": ..., ... },
+      "Vars": [ { "VarName": "x", "X": 10}, ... ]}
+
+Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further solutions too, which are not
+read: X is the incumbent. Without a solution there is no Vars, and bounds are 1e+100. Layouts: Gurobi 13.0.3.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any, Final
+
+from ....models.errors import SolutionError
+from ....models.instance.grid import Floats
+from .text import (
+    Bytes,
+    Cursor,
+    RawSolution,
+    Status,
+    is_number,
+    named_numbers,
+    named_pairs,
+    with_unix_ends,
+    without_point,
+)
+
+NAME: Final = "gurobi"
+JSON: Final = "gurobi-json"
+
+_MARK = re.compile(rb"# ?(?:Solution for model|Objective value|MIP start)\b", re.IGNORECASE)
+_OBJECTIVE = re.compile(rb"# ?Objective value ?=? *(\S+)", re.IGNORECASE)
+_START = re.compile(rb"# ?MIP start\b", re.IGNORECASE)
+_JSON = re.compile(rb'\s*\{\s*"SolutionInfo"')
+_LINES_TO_TELL: Final = 5
+_INFINITE: Final = 1e100
+
+_STATUS: Final = {
+    2: (Status.OPTIMAL_GLOBAL, "optimal"),
+    3: (Status.INFEASIBLE, "infeasible"),
+    4: (Status.INFEASIBLE, "infeasible or unbounded"),  # our objectives are bounded below
+    5: (Status.UNBOUNDED, "unbounded"),
+    6: (Status.LIMIT_WITH_POINT, "cutoff"),
+    7: (Status.LIMIT_WITH_POINT, "iteration limit"),
+    8: (Status.LIMIT_WITH_POINT, "node limit"),
+    9: (Status.LIMIT_WITH_POINT, "time limit"),
+    10: (Status.LIMIT_WITH_POINT, "solution limit"),
+    11: (Status.LIMIT_WITH_POINT, "interrupted"),
+    13: (Status.FEASIBLE, "suboptimal"),
+    15: (Status.LIMIT_WITH_POINT, "objective limit"),
+    16: (Status.LIMIT_WITH_POINT, "work limit"),
+    17: (Status.LIMIT_WITH_POINT, "memory limit"),
+    18: (Status.OPTIMAL_LOCAL, "locally optimal"),
+    19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # no proof of anything, and no point
+}
+_POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
+_WITHOUT_POINT: Final = {
+    Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT,
+    Status.FEASIBLE: Status.ERROR,
+}
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins so is a .sol of Gurobi, or a list of names and values without comments."""
+    if _MARK.match(head):
+        return True
+    lines = head[: head.rfind(b"\n") + 1].splitlines()
+    lines = lines[next((at for at, line in enumerate(lines) if not line.startswith(b"#")), len(lines)) :]
+    return bool(lines) and all(map(_is_pair, lines[:_LINES_TO_TELL]))
+
+
+def _is_pair(line: bytes) -> bool:
+    words = line.split()
+    return (
+        len(words) == 2 and not words[0].startswith(b"=") and not is_number(words[0]) and is_number(words[1])
+    )
+
+
+def recognises_json(head: bytes) -> bool:
+    """Whether a file that begins so is a .json of Gurobi."""
+    return _JSON.match(head) is not None
+
+
+def parse(data: bytes) -> RawSolution:
+    """The content of a .sol. Raises SolutionError for a MIP start, for no values at all and for what is not a number."""
+    data = with_unix_ends(data)
+    cursor, objective = Cursor(data), None
+    while data.startswith(b"#", cursor.position):
+        line = cursor.line("the end of a comment")
+        if _START.match(line):
+            raise cursor.fault("this is a MIP start, with the integer columns only; the .sol is needed")
+        if found := _OBJECTIVE.fullmatch(line):
+            objective = cursor.number(found[1])
+    names, values = named_numbers(data, cursor.position, len(data), 2)
+    if not len(values):
+        raise SolutionError("the file holds no values; let the solver write it again")
+    return RawSolution(NAME, Status.FEASIBLE, "", objective, names, values)
+
+
+def parse_json(data: bytes) -> RawSolution:
+    """The content of a .json: the incumbent. Raises SolutionError for damaged JSON and for values that are none."""
+    content = _document(data)
+    information, variables = content.get("SolutionInfo"), content.get("Vars")
+    if not isinstance(information, dict) or not isinstance(information.get("Status"), int):
+        raise SolutionError("the SolutionInfo has no Status; let Gurobi write the file again")
+    status, words = _STATUS.get(
+        information["Status"], (Status.ERROR, f"Gurobi's status {information['Status']}")
+    )
+    if variables is None or status in _POINTLESS:
+        if status is Status.OPTIMAL_GLOBAL:
+            raise SolutionError("the file says optimal and holds no Vars; let Gurobi write it again")
+        return without_point(JSON, _WITHOUT_POINT.get(status, status), words)
+    names, values = _columns(variables)
+    objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
+    return RawSolution(JSON, status, words, objective, names, values, omits_zeros=True, bound=bound)
+
+
+def _finite(value: Any) -> float | None:
+    """A number that is below Gurobi's infinity, else None."""
+    return float(value) if type(value) in {int, float} and abs(value) < _INFINITE else None
+
+
+def _document(data: bytes) -> dict[str, Any]:
+    try:
+        content = json.loads(data, object_pairs_hook=_object, parse_int=_integer)
+    except json.JSONDecodeError as error:
+        raise SolutionError(
+            f"line {error.lineno}: the JSON is damaged or cut off at column {error.colno}; let Gurobi write the file again"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise SolutionError("the JSON is damaged; let Gurobi write the file again") from error
+    if not isinstance(content, dict):
+        raise SolutionError("the JSON holds no SolutionInfo; let Gurobi write the file again")
+    return content
+
+
+def _integer(text: str) -> int | float:
+    """A whole number; a float where it is so long that converting it would take time."""
+    return int(text) if len(text) < 19 else float(text)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> Any:
+    """A variable as the pair of its name and value, which saves memory; everything else as a dictionary."""
+    content = dict(pairs)
+    return (content["VarName"], content.get("X", 0)) if "VarName" in content else content
+
+
+def _columns(variables: Any) -> tuple[Bytes, Floats]:
+    if not isinstance(variables, list) or not all(map(_is_column, variables)):
+        raise SolutionError("Vars is not a list of names and values; let Gurobi write the file again")
+    return named_pairs([name for name, _ in variables], [value for _, value in variables])
+
+
+def _is_column(entry: Any) -> bool:
+    return isinstance(entry, tuple) and isinstance(entry[0], str) and type(entry[1]) in {int, float}

@@ -1,0 +1,155 @@
+"""Solution files of HiGHS: style 0 (raw) and style 4 (sparse).
+
+Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
+
+    Model status
+    Time limit reached              words with blanks
+                                    an empty line
+    # Primal solution values
+    Feasible                        or Infeasible; or None, and then no point follows
+    Objective -14.4                 with the constant of the objective
+    # Columns 5                     style 4: minus the number of columns that are not zero
+    x 10                            name and value; style 4: and the column's number
+    ...
+    # Rows 2                        style 0 alone; rows, dual values and a basis follow and are not needed here
+
+Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style 2 has GLPK's layout
+and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic problems, which it does not take on paper: what
+class of problem it was given has to be checked where it is called.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+
+from ....models.errors import SolutionError
+from ....models.instance.grid import Floats
+from .text import Bytes, Cursor, RawSolution, Status, named_numbers, one_line, shown, with_unix_ends
+
+NAME: Final = "highs"
+
+_HEAD: Final = b"Model status\n"
+_OTHER_STYLES: Final = {
+    re.compile(rb"Columns\n +Index +Status"): "style 1 (pretty), which has six digits only",
+    re.compile(rb"Problem:"): "style 3 (GLPK pretty), which has six digits only",
+}
+_STATUS: Final = {
+    b"Optimal": Status.OPTIMAL_GLOBAL,
+    b"Infeasible": Status.INFEASIBLE,
+    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # a sum of squares or absolute values is bounded below
+    b"Unbounded": Status.UNBOUNDED,
+    b"Bound on objective reached": Status.LIMIT_WITH_POINT,
+    b"Target for objective reached": Status.LIMIT_WITH_POINT,
+    b"Time limit reached": Status.LIMIT_WITH_POINT,
+    b"Iteration limit reached": Status.LIMIT_WITH_POINT,
+    b"Solution limit reached": Status.LIMIT_WITH_POINT,
+    b"Memory limit reached": Status.LIMIT_WITH_POINT,
+    b"Interrupted by user": Status.LIMIT_WITH_POINT,
+    b"Interrupted by HiGHS": Status.LIMIT_WITH_POINT,
+    b"Unknown": Status.LIMIT_WITH_POINT,
+}
+_COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})")
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins so was written by HiGHS, in whatever style."""
+    head = with_unix_ends(head)
+    return head.startswith(_HEAD) or _other_style(head) is not None
+
+
+def parse(data: bytes) -> RawSolution:
+    """The content of a file of style 0 or 4.
+
+    Raises SolutionError for other styles, files that are cut off, counts that do not fit and what is not a number.
+    """
+    data = with_unix_ends(data)
+    if (style := _other_style(data)) is not None:
+        raise SolutionError(
+            f"this is HiGHS {style}; write it with write_solution_style = 0 (raw) or 4 (sparse)"
+        )
+    cursor = Cursor(data)
+    words = _words(cursor)
+    primal = cursor.line("Feasible, Infeasible or None")
+    if primal == b"None":
+        return _without_point(words)
+    if primal not in {b"Feasible", b"Infeasible"}:
+        raise cursor.fault(f"{shown(primal)} is not Feasible, Infeasible or None")
+    objective = _objective(cursor)
+    sparse, names, values = _columns(cursor)
+    status = _status(words, feasible=primal == b"Feasible")
+    return RawSolution(NAME, status, one_line(words), objective, names, values, sparse, _rows(cursor))
+
+
+def _other_style(head: bytes) -> str | None:
+    return next((style for pattern, style in _OTHER_STYLES.items() if pattern.match(head)), None)
+
+
+def _words(cursor: Cursor) -> bytes:
+    """The model status, with the heads before and after it read."""
+    _expect(cursor, b"Model status")
+    words = cursor.line("the model status")
+    _expect(cursor, b"")
+    _expect(cursor, b"# Primal solution values")
+    return words
+
+
+def _expect(cursor: Cursor, expected: bytes) -> None:
+    label = repr(expected.decode()) if expected else "an empty line"
+    line = cursor.line(label)
+    if line != expected:
+        raise cursor.fault(f"{shown(line)} stands where {label} should")
+
+
+def _status(words: bytes, *, feasible: bool) -> Status:
+    status = _STATUS.get(words, Status.ERROR)
+    if feasible:
+        return status
+    return {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.OPTIMAL_GLOBAL: Status.ERROR}.get(
+        status, status
+    )
+
+
+def _without_point(words: bytes) -> RawSolution:
+    if words == b"Optimal":
+        raise SolutionError("line 5: the file says Optimal and holds no point; let the solver write it again")
+    return RawSolution(
+        NAME, _status(words, feasible=False), one_line(words), None, np.empty(0, dtype="S1"), np.empty(0)
+    )
+
+
+def _objective(cursor: Cursor) -> float:
+    line = cursor.line("the objective")
+    label, _, number = line.partition(b" ")
+    if label != b"Objective":
+        raise cursor.fault(f"{shown(line)} stands where the objective should")
+    return cursor.number(number.strip())
+
+
+def _columns(cursor: Cursor) -> tuple[bool, Bytes, Floats]:
+    """Whether zeros are omitted, names and values; the cursor moves behind them."""
+    line = cursor.line("the number of columns")
+    found = _COLUMNS.fullmatch(line)
+    if found is None:
+        raise cursor.fault(f"{shown(line)} is not the number of columns")
+    count = int(found[2])
+    sparse = bool(found[1]) or count == 0  # a sparse file of the point 0 says `# Columns 0`
+    start, data = cursor.position, cursor.data
+    rows = data.find(b"\n# Rows ", start - 1) + 1
+    stop = len(data) if rows == 0 else rows
+    held = data.count(b"\n", start, stop)
+    if held != count:
+        raise cursor.fault(f"{count} columns are announced, {held} whole lines follow")
+    names, values = named_numbers(data, start, stop, 3 if sparse else 2)
+    cursor.position = stop
+    return sparse, names, values
+
+
+def _rows(cursor: Cursor) -> int | None:
+    """The number of rows, if the file goes on with them."""
+    if cursor.at_end:
+        return None
+    cursor.line("the number of rows")
+    return Cursor(cursor.data[cursor.before + len(b"# Rows ") : cursor.position]).count("the number of rows")

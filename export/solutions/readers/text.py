@@ -1,0 +1,459 @@
+"""What a solution file says, before it is mapped onto a problem; and fast parsing of its columns of text.
+
+The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when something is
+wrong is the place looked for.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import repeat
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....models.errors import SolutionError
+from ....models.instance.grid import Bools, Floats
+from ...solvers_table import PROGRAMS
+from ...writing.canonical import Order
+
+Bytes = NDArray[np.bytes_]
+Letters = NDArray[np.uint8]
+Positions = NDArray[np.int64]
+
+TOKEN_LIMIT: Final = 63
+"""Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
+
+HEAD: Final = 1 << 16
+"""How many bytes of a file are looked at to tell its format."""
+
+_PIECE: Final = 1 << 22  # bytes handled at once: temporary arrays stay below some 100 MB
+_NUMBER = re.compile(
+    rb"([-+]?)(?:((?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?)|inf(?:inity)?|1\.#inf0*)", re.IGNORECASE
+)
+_WINDOWS_INFINITY = re.compile(rb"1\.#inf0*", re.IGNORECASE)
+_FORTRAN = bytes.maketrans(b"dD", b"eE")
+_CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
+
+ADDED_COLUMNS: Final = {
+    "crossfield": r"ONE",
+    "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE",
+} | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
+"""Patterns of the columns that programs add when they read or write a model: for a constant of the objective, for its part
+that is not linear, for the range of a row. A solution may hold them beside the columns of the problem."""
+
+_ADDED = re.compile("|".join(ADDED_COLUMNS.values()).encode(), re.DOTALL)
+
+
+class Status(StrEnum):
+    """What a solver claims about its answer, never more than its file says; and what remains of the claim once the point is checked.
+
+    no-point: there is none, and no word why. unknown: the point contradicts the claim.
+    """
+
+    OPTIMAL_GLOBAL = "optimal-global"
+    OPTIMAL_LOCAL = "optimal-local"
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    UNBOUNDED = "unbounded"
+    LIMIT_WITH_POINT = "limit-with-point"
+    LIMIT_WITHOUT_POINT = "limit-without-point"
+    NO_POINT = "no-point"
+    ERROR = "error"
+    UNKNOWN = "unknown"
+
+    @property
+    def promises_point(self) -> bool:
+        """Whether there is a point behind it that is feasible."""
+        return self in _PROMISING
+
+
+_PROMISING: Final = frozenset(
+    {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL, Status.FEASIBLE, Status.LIMIT_WITH_POINT}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RawSolution:
+    """The content of one solution file.
+
+    reader: name of the reader that understood the file. status: the solver's claim. message: the solver's own words
+    on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
+    positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
+    omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
+    order: the order of the values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file
+    lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated it, else empty.
+    A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
+    """
+
+    reader: str
+    status: Status
+    message: str
+    objective: float | None
+    names: Bytes | None
+    values: Floats
+    omits_zeros: bool = False
+    rows: int | None = None
+    order: Order = "nl"
+    bound: float | None = None
+    of_rows: Bytes | None = None
+    stamp: str = ""
+
+    @property
+    def has_point(self) -> bool:
+        """Whether the file holds a point; one without values is the point 0 where zeros are omitted."""
+        return self.values.size > 0 or self.omits_zeros
+
+
+def without_point(
+    reader: str, status: Status, message: bytes | str, *, rows: int | None = None
+) -> RawSolution:
+    """What a file without a point says; the message is put on one line."""
+    words = one_line(message if isinstance(message, bytes) else message.encode())
+    return RawSolution(reader, status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
+
+
+class NamedValues(NamedTuple):
+    """Values by name: values (n,) with NaN where missing, and how many names are missing and unknown."""
+
+    values: Floats
+    missing: int
+    unknown: int
+
+
+def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
+    """The values of `names` (n,), unique byte strings, in their order.
+
+    A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in the file
+    that are not among `names` are counted as unknown, but for the columns that readers of models are known to add.
+
+    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of `names` as that of a row.
+    """
+    listed = _listed(raw)
+    _check_rows(names, raw)
+    if np.array_equal(listed, names):
+        return NamedValues(raw.values.copy(), 0, 0)
+    place = dict(zip(names.tolist(), range(len(names)), strict=True))
+    index = np.fromiter(map(place.get, listed.tolist(), repeat(-1)), np.int64, len(listed))
+    known = index >= 0
+    values = np.full(len(names), 0.0 if raw.omits_zeros else np.nan)
+    values[index[known]] = raw.values[known]
+    _check_repeats(listed[known], raw.values[known], values[index[known]])
+    strangers = sum(_ADDED.fullmatch(name) is None for name in listed[~known].tolist())
+    return NamedValues(values, int(np.isnan(values).sum()), strangers)
+
+
+def _listed(raw: RawSolution) -> Bytes:
+    _check_point(raw)
+    if raw.names is None:
+        raise SolutionError(
+            f"the file lists values without names; it must be read by position, in the order of the .{raw.order} file"
+        )
+    return raw.names
+
+
+def _check_point(raw: RawSolution) -> None:
+    if not raw.has_point:
+        words = f"{raw.status}: {raw.message}" if raw.message else str(raw.status)
+        raise SolutionError(
+            f"there is no point in it ({words}); give the solver more time or a problem that has a solution"
+        )
+
+
+def _check_rows(names: Bytes, raw: RawSolution) -> None:
+    if raw.of_rows is None:
+        return
+    misplaced = raw.of_rows[np.isin(raw.of_rows, names)]
+    if len(misplaced):
+        name = misplaced[0].decode(errors="replace")
+        raise SolutionError(
+            f"the column {name} stands before the numbers start again, where rows should; a line is there twice or out of order; "
+            "let the solver write the file again"
+        )
+
+
+def _check_repeats(names: Bytes, given: Floats, kept: Floats) -> None:
+    clash = given != kept
+    if clash.any():
+        at = int(np.argmax(clash))
+        name = names[at].decode(errors="replace")
+        raise SolutionError(
+            f"{name} has two values, {given[at]} and {kept[at]}; leave one solution in the file"
+        )
+
+
+def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
+    """The primal values (columns,) of a positional file for a problem with that many columns and rows.
+
+    Raises SolutionError when the file has no point or is of a problem of another size.
+    """
+    _check_point(raw)
+    found = raw.values.size
+    if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
+        if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
+            raise SolutionError(
+                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); write it with write_solution_style = 0 (raw) or 4 (sparse)"
+            )
+        size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
+        raise SolutionError(
+            f"the file is of {size}, the problem has {columns} columns and {rows} rows; give the solution of this very problem"
+        )
+    return raw.values[found - columns :].copy()
+
+
+def one_line(text: bytes) -> str:
+    """The words of a text on one line of at most 300 characters, without control characters."""
+    return " ".join(_CONTROLS.sub(" ", text[:HEAD].decode(errors="replace")).split())[:300]
+
+
+def with_unix_ends(data: bytes) -> bytes:
+    r"""The text with \n as the end of its lines."""
+    return data.replace(b"\r\n", b"\n") if b"\r" in data else data
+
+
+def fault(data: bytes, position: int, text: str) -> SolutionError:
+    """An error that names the line of a byte position in a text."""
+    line = data.count(b"\n", 0, position) + 1
+    return SolutionError(f"line {line}: {text}")
+
+
+def line_after(data: bytes, position: int, count: int) -> int:
+    """Where the line begins that comes `count` whole lines after a byte position."""
+    ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=position) == ord("\n"))
+    return position + (int(ends[count - 1]) + 1 if count else 0)
+
+
+@dataclass
+class Cursor:
+    """A place in a text that moves on line by line; for the few lines that are not a column of numbers."""
+
+    data: bytes
+    position: int = 0
+    before: int = 0  # start of the line last read
+
+    @property
+    def at_end(self) -> bool:
+        """Whether all lines are read."""
+        return self.position >= len(self.data)
+
+    def line(self, expected: str) -> bytes:
+        """The next line, stripped. Raises SolutionError when the text ends before the line does."""
+        end = self.data.find(b"\n", self.position)
+        if end < 0:
+            raise fault(
+                self.data,
+                self.position,
+                f"the file is cut off where {expected} should be; let the solver write it again",
+            )
+        self.before, self.position = self.position, end + 1
+        return self.data[self.before : end].strip()
+
+    def count(self, expected: str) -> int:
+        """The next line as an integer that is not negative. Raises SolutionError."""
+        value = self.integer(expected)
+        if value < 0:
+            raise self.fault(f"{value} is not {expected}")
+        return value
+
+    def integer(self, expected: str) -> int:
+        """The next line as an integer. Raises SolutionError."""
+        line = self.line(expected)
+        if not re.fullmatch(rb"-?\d{1,12}", line):
+            raise self.fault(f"{shown(line)} is not {expected}")
+        return int(line)
+
+    def number(self, text: bytes) -> float:
+        """A number on the line last read. Raises SolutionError."""
+        return _number(self.data, self.before, text)
+
+    def fault(self, text: str) -> SolutionError:
+        """An error about the line last read."""
+        return fault(self.data, self.before, f"{text}; let the solver write the file again")
+
+
+def shown(text: bytes) -> str:
+    """A short quotation for a message."""
+    return repr(text[:40].decode(errors="replace"))
+
+
+def is_number(text: bytes) -> bool:
+    """Whether a word is a number as solvers write them."""
+    return len(text) <= TOKEN_LIMIT and _NUMBER.fullmatch(text) is not None
+
+
+def number_of(text: bytes) -> float | None:
+    """The number that a word spells as solvers do, or None."""
+    found = _NUMBER.fullmatch(text)
+    if found is None or len(text) > TOKEN_LIMIT:
+        return None
+    sign, digits = found.groups()
+    return float(sign + digits.translate(_FORTRAN)) if digits else float(sign + b"inf")
+
+
+def numbers(data: bytes, start: int, stop: int) -> Floats:
+    """The numbers in a text that has one on each line from byte `start` to `stop`; a new line must end the last one.
+
+    Raises SolutionError with the line of what is not a number.
+    """
+    pieces = [_floats(piece, _tokens(piece, 1)) for piece in _pieces(data, start, stop)]
+    return np.concatenate([np.empty(0), *pieces])
+
+
+def named_numbers(data: bytes, start: int, stop: int, per_line: int) -> tuple[Bytes, Floats]:
+    """Names (k,) and values (k,) of a text whose lines are `name value ...` with `per_line` words each.
+
+    What follows the value must be numbers too, and is left out. Raises SolutionError with the line at fault.
+    """
+    names, values = labelled_numbers(data, start, stop, per_line, label=0, numeric=tuple(range(1, per_line)))
+    return names, values[:, 0].copy()
+
+
+def labelled_numbers(
+    data: bytes, start: int, stop: int, per_line: int, *, label: int, numeric: tuple[int, ...]
+) -> tuple[Bytes, Floats]:
+    """Labels (k,) and numbers (k, len(numeric)) of a text of lines of `per_line` words.
+
+    label, numeric: places of the label and of the numbers among the words of a line; other words are left out.
+    Raises SolutionError with the line at fault.
+    """
+    names: list[Bytes] = [np.empty(0, dtype="S1")]
+    values = [np.empty((0, len(numeric)))]
+    chosen = np.isin(np.arange(per_line), numeric)
+    for piece in _pieces(data, start, stop):
+        tokens = _tokens(piece, per_line)
+        names.append(_names(piece.text, tokens.take(slice(label, None, per_line))))
+        values.append(_floats(piece, tokens.take(np.tile(chosen, len(names[-1])))).reshape(-1, len(numeric)))
+    return np.concatenate(names), np.concatenate(values)
+
+
+def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
+    """The names and values of a parsed document as arrays. Raises SolutionError for a name that is too long, or NaN."""
+    long = next((name for name in names if len(name) > TOKEN_LIMIT), None)
+    if long is not None:
+        raise SolutionError(
+            f"the name {shown(long.encode(errors='replace'))}... has more than {TOKEN_LIMIT} characters; "
+            "give the solution of the file that was written"
+        )
+    numbers_ = np.array(values, dtype=np.float64)
+    if np.isnan(numbers_).any():
+        at = int(np.argmax(np.isnan(numbers_)))
+        raise SolutionError(f"{names[at]} has no value; let the solver write the file again")
+    return np.array([name.encode(errors="replace") for name in names] or np.empty(0, "S1")), numbers_
+
+
+def words_of_line(data: bytes, position: int) -> list[bytes]:
+    """The words of the line that begins at a byte position; none at the end of the text."""
+    end = data.find(b"\n", position)
+    return data[position : len(data) if end < 0 else end].split()
+
+
+class _Piece(NamedTuple):
+    """Some whole lines of a text: bytes from `start` to `stop`."""
+
+    data: bytes
+    start: int
+    stop: int
+
+    @property
+    def text(self) -> Letters:
+        return np.frombuffer(self.data, np.uint8, self.stop - self.start, self.start)
+
+    def fault(self, offset: int, text: str) -> SolutionError:
+        return fault(self.data, self.start + offset, f"{text}; let the solver write the file again")
+
+
+class _Tokens(NamedTuple):
+    """Where words begin and end in a piece."""
+
+    starts: Positions
+    ends: Positions
+
+    def take(self, which: slice | Bools) -> _Tokens:
+        return _Tokens(self.starts[which], self.ends[which])
+
+
+def _pieces(data: bytes, start: int, stop: int) -> Iterator[_Piece]:
+    while start < stop:
+        end = data.rfind(b"\n", start, min(start + _PIECE, stop)) + 1 or data.find(b"\n", start, stop) + 1
+        if not end:
+            raise fault(
+                data, start, "the file is cut off in the middle of this line; let the solver write it again"
+            )
+        yield _Piece(data, start, end)
+        start = end
+
+
+def _tokens(piece: _Piece, per_line: int) -> _Tokens:
+    text = piece.text
+    blank = text <= ord(" ")
+    control = blank & (text != ord(" ")) & (text != ord("\n")) & (text != ord("\t"))
+    if control.any():
+        raise piece.fault(int(np.argmax(control)), "there is a byte that no text has; the file is damaged")
+    edges = np.flatnonzero(np.diff(blank, prepend=True))
+    tokens = _Tokens(edges[0::2], edges[1::2])
+    _check_words(piece, tokens, per_line)
+    return tokens
+
+
+def _check_words(piece: _Piece, tokens: _Tokens, per_line: int) -> None:
+    ends_of_lines = np.flatnonzero(piece.text == ord("\n"))
+    words = np.diff(np.searchsorted(tokens.starts, ends_of_lines), prepend=0)
+    wrong = words != per_line
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise piece.fault(int(ends_of_lines[at]), f"{words[at]} words stand where {per_line} should")
+    long = tokens.ends - tokens.starts > TOKEN_LIMIT
+    if long.any():
+        raise piece.fault(
+            int(tokens.starts[np.argmax(long)]), f"a word is longer than {TOKEN_LIMIT} characters"
+        )
+
+
+def _names(text: Letters, tokens: _Tokens) -> Bytes:
+    length = tokens.ends - tokens.starts
+    offset = np.arange(length.max())
+    letters = text.take(tokens.starts[:, None] + offset, mode="clip")
+    letters[offset >= length[:, None]] = 0
+    return letters.view(f"S{len(offset)}").ravel()
+
+
+def _floats(piece: _Piece, tokens: _Tokens) -> Floats:
+    """The given words of a piece as numbers."""
+    text = np.where(_inside(tokens, len(piece.text)), piece.text, np.uint8(ord(" ")))
+    values = _fast_floats(text.tobytes())
+    if values is not None and len(values) == len(tokens.starts) and not np.isnan(values).any():
+        return values
+    spans = zip(tokens.starts + piece.start, tokens.ends + piece.start, strict=True)
+    return np.array([_number(piece.data, start, piece.data[start:end]) for start, end in spans])
+
+
+def _inside(tokens: _Tokens, size: int) -> Bools:
+    change = np.zeros(size + 1, dtype=np.int8)  # the last word may end where the piece does
+    change[tokens.starts] = 1
+    change[tokens.ends] = -1
+    return np.cumsum(change[:size], dtype=np.int8).view(bool)
+
+
+def _fast_floats(text: bytes) -> Floats | None:
+    """Numbers between blanks, or None if something else is there. Python's own rounding: exact."""
+    text = text.translate(_FORTRAN)
+    if b"#" in text:
+        text = _WINDOWS_INFINITY.sub(b"inf", text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # numpy before 2.3 warns where later ones raise
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (ValueError, DeprecationWarning):
+            return None
+
+
+def _number(data: bytes, position: int, text: bytes) -> float:
+    value = number_of(text)
+    if value is None:
+        raise fault(data, position, f"{shown(text)} is not a number; let the solver write the file again")
+    return value

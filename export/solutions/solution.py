@@ -1,0 +1,211 @@
+"""A solution: what a solver's file says, mapped by name onto a problem and checked against the instance.
+
+Nothing in the file is believed: integers are rounded, objective and violations are computed again from the
+declaration, and a claim that they contradict is not passed on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ...models.errors import SolutionError, UnsupportedByFormatError
+from ...models.field.field import CrossField
+from ...models.formulations.problem import Problem, Violation, lifted
+from ...models.instance.grid import Floats
+from ..formats.registry import FORMATS, carried
+from ..writing.canonical import Canonical
+from .contradictions import TOLERANCE, Claims, contradictions
+from .readers.registry import read_raw
+from .readers.text import RawSolution, Status, values_for, values_in_order
+
+ROUND: Final = 1e-5
+"""An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
+
+LARGEST: Final = 1e8
+"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a
+column's, and could not be squared or be a jump of 32 bits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A point of a problem with what was claimed and what was recomputed.
+
+    problem: as the file's columns have it (with products lifted, where the format needed it); point: float
+    (columns,), or None.
+    claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual
+    bound, where one is known. status is what remains of the claim. rounded: the furthest that rounding moved
+    an integer column. tolerance: how far the point may be off before it contradicts the claim, in units of a
+    column. interrupted: whether the user ended the search.
+    """
+
+    problem: Problem
+    point: Floats | None
+    claimed: Status
+    message: str
+    reader: str
+    reported: float | None = None
+    bound: float | None = None
+    rounded: float = 0.0
+    unknown: int = 0
+    seconds: float | None = None
+    interrupted: bool = False
+    tolerance: float = TOLERANCE
+
+    @cached_property
+    def contradictions(self) -> tuple[str, ...]:
+        """What the recomputed point says against the claims of the file; empty when they agree or there is no point."""
+        if self.objective is None or self.violation is None:
+            return ()
+        claims = Claims(self.claimed, self.reported, self.bound, self.rounded)
+        return contradictions(self.problem, claims, self.objective, self.violation, self.tolerance)
+
+    @property
+    def status(self) -> Status:
+        """What is claimed, or UNKNOWN when the point contradicts it."""
+        return Status.UNKNOWN if self.contradictions else self.claimed
+
+    @property
+    def doubt(self) -> str:
+        """Why the point is no answer to go on with; empty when it is one."""
+        if self.contradictions:
+            return f"says {self.claimed}, but {'; '.join(self.contradictions)}"
+        if self.point is not None and not self.claimed.promises_point:
+            return f"says {self.claimed} ({self.message or 'and no more'}): the values in it are no answer"
+        return ""
+
+    @cached_property
+    def objective(self) -> float | None:
+        """The objective at the point, recomputed."""
+        return None if self.point is None else self.problem.objective_value(self.point)
+
+    @cached_property
+    def violation(self) -> Violation | None:
+        """The worst violations at the point, recomputed."""
+        return None if self.point is None else self.problem.violation(self.point)
+
+    @cached_property
+    def field(self) -> CrossField:
+        """The cross field of the point. Raises SolutionError when there is none."""
+        if self.point is None:
+            raise SolutionError(
+                f"there is no point in the solution ({self.status}): {self.message or 'no message'}"
+            )
+        return self.problem.field(self.point)
+
+
+def read_solution(
+    path: str | Path,
+    problem: Problem,
+    *,
+    held: Mapping[str, Problem] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Solution:
+    """The solution that a file holds for the problem; the format is found by content.
+
+    Named values are mapped by name, positional ones by the column order of the .nl, LP or MPS file. A file
+    without a point gives a Solution without one.
+    held: by format, the problem as the file that the solver was given holds it, with its products lifted or
+    not: `Manifest.held`. Without it, positional values are taken to follow a file as it is written today, and
+    names of lifted products tell that they were.
+    tolerance: how far the point may be off, in units of a column, before its status is no longer what the
+    file claims.
+    Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
+    Raises InputError when the file cannot be read, and SolutionError, naming it, when it is malformed or of
+    another problem.
+    """
+    raw = read_raw(path)
+    if raw.stamp and raw.stamp != problem.stamp:
+        raise SolutionError(
+            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; instance, options or fixed jumps "
+            "differ, give the manifest that lies beside the solver's model",
+            file=path,
+        )
+    if not raw.has_point:
+        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
+    try:
+        return replace(_mapped(raw, _form(raw, problem, held or {})), tolerance=tolerance)
+    except SolutionError as error:
+        raise SolutionError(str(error), file=path) from error
+
+
+def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
+    """What the solver was given: by the manifest, or else by the names of lifted products."""
+    if raw.names is None:
+        return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
+    forms = {each.sha256: each for each in held.values()}
+    if len(forms) == 1:
+        return Canonical(*forms.values())
+    liftable = "p1" in problem.blocks and "z" not in problem.blocks
+    named = liftable and np.strings.startswith(raw.names, b"z_").any()
+    return Canonical(lifted(problem) if named else problem)
+
+
+def _carried(problem: Problem, name: str) -> Problem:
+    try:
+        return carried(problem, FORMATS[name])
+    except UnsupportedByFormatError as error:
+        raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
+
+
+def _mapped(raw: RawSolution, form: Canonical) -> Solution:
+    problem = form.problem
+    point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
+    _check_range(point, problem)
+    point, moved = _rounded(point, problem)
+    return Solution(
+        problem,
+        point,
+        raw.status,
+        raw.message,
+        raw.reader,
+        raw.objective,
+        raw.bound,
+        rounded=moved,
+        unknown=unknown,
+    )
+
+
+def _check_range(point: Floats, problem: Problem) -> None:
+    if not np.isfinite(point).all():
+        raise SolutionError("holds values that are not finite numbers; let the solver write it again")
+    at = int(np.argmax(np.abs(point)))
+    if abs(point[at]) > LARGEST:
+        name = Canonical(problem).column_names[at].decode()
+        raise SolutionError(
+            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
+        )
+
+
+def _by_position(raw: RawSolution, form: Canonical) -> Floats:
+    """The point of a file without names; a column in no term, which the solver's model lacks, is anything."""
+    problem, order = form.problem, form.order(raw.order)
+    point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
+    point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
+    return point[: problem.columns]
+
+
+def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
+    problem, found = form.problem, values_for(form.column_names, raw)
+    if found.missing:
+        raise SolutionError(
+            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} names are unknown; "
+            "it is of another instance, formulation or option"
+        )
+    if found.unknown > len(raw.values) // 2:
+        raise SolutionError(
+            f"{found.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+        )
+    return found.values, found.unknown
+
+
+def _rounded(point: Floats, problem: Problem) -> tuple[Floats, float]:
+    nearest = np.round(point)
+    gap = np.abs(point - nearest)
+    chosen = problem.integer & (gap <= ROUND)
+    return np.where(chosen, nearest + 0.0, point), float(gap[chosen].max(initial=0.0))

@@ -1,0 +1,321 @@
+"""The one table of solvers: what each reads, refuses, starts from, proves, what brings it, what drives it.
+
+It is true of solvers anywhere, not only of those that are installed here. `crossfield list`, the manifests,
+starting points, solving, verification, the library and the docs are generated from it; a solver is added by
+one entry.
+
+A refusal names a trait of a problem *as the format holds it* (LP and MPS hold (8) and (9) with lifted
+products), and the stage at which it strikes: `read`: the file is not taken; `solve`: it is read, but not
+solved, or not to a proven optimum. The tests hand each combination to the real solver.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+
+from ..models.errors import UnsupportedByFormatError
+from ..models.formulations.declaration import Formulation
+from ..models.formulations.problem import Problem
+from ..models.instance.instance import Instance
+from .formats.registry import FORMATS, carried
+
+Stage = Literal["read", "solve", "local"]
+Proof = Literal["global", "convex", "local"]
+
+
+class Refusal(NamedTuple):
+    """Why a solver does not take a trait, and where that shows; `local`: it answers, without proof."""
+
+    stage: Stage
+    reason: str
+
+
+TRAITS: Final[dict[str, Callable[[Problem], bool]]] = {
+    "a cosine": lambda p: max(p.objective_degree, p.row_degree) > 4,
+    "anything beyond linear": lambda p: max(p.objective_degree, p.row_degree) > 1,
+    "quadratic rows": lambda p: p.row_degree == 2,
+    "integers and a quadratic objective": lambda p: (
+        bool(p.integer.any()) and p.objective_degree == 2 and p.row_degree < 2
+    ),
+    "a non-convex quadratic objective": lambda p: (
+        p.objective_degree == 2 and p.row_degree < 2 and not p.convex
+    ),
+    "integers": lambda p: bool(p.integer.any()),
+    "non-convexity": lambda p: not p.convex and max(p.objective_degree, p.row_degree) > 1,
+}
+"""What a solver may not take."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A Python package or an executable that reads our files, and may bring solvers.
+
+    algebra, behaviour: the formats of which it tells coefficients, or values at points. needs: its package,
+    or its executable. tolerance: relative difference of the numbers that it tells, 0 for equal to the bit.
+    free: what its free edition takes. adds: pattern of the columns that it adds when it reads or writes a
+    model.
+    """
+
+    name: str
+    title: str
+    algebra: tuple[str, ...]
+    behaviour: tuple[str, ...]
+    needs: str
+    install: str
+    tolerance: float = 0.0
+    free: str = ""
+    adds: str = ""
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """The formats it reads."""
+        return self.algebra + self.behaviour
+
+    @property
+    def present(self) -> bool:
+        """Whether it is installed."""
+        if self.install.startswith("apt "):
+            return shutil.which(self.needs) is not None
+        return find_spec(self.needs) is not None
+
+    @property
+    def solvers(self) -> tuple[str, ...]:
+        """The names of the solvers that it brings; none where it only reads."""
+        return tuple(name for name, solver in SOLVERS.items() if solver.program == self.name)
+
+
+PROGRAMS: Final = {
+    entry.name: entry
+    for entry in (
+        Program("highs", "HiGHS", ("lp", "mps"), (), "highspy", "pip install highspy"),
+        Program(
+            "gurobi", "Gurobi", ("lp", "mps"), (), "gurobipy", "pip install gurobipy",
+            free="2000 columns and rows, 200 columns with quadratic terms", adds=r"Constant|(?:MPS_)?Rg.*",
+        ),
+        Program(
+            "cplex", "CPLEX", ("lp", "mps"), (), "cplex", "pip install cplex", 1e-15,
+            free="1000 columns and 1000 rows", adds=r"Rg.*",
+        ),
+        Program(
+            "xpress", "Xpress", ("lp", "mps"), (), "xpress", "pip install xpress",
+            free="5000 rows and columns, 200 with quadratic terms",
+        ),
+        Program(
+            "scip", "SCIP", ("lp", "mps"), ("nl", "osil"), "pyscipopt", "pip install pyscipopt",
+            adds=r"nlobjvar|quadobjvar|qmatrixvar|objconstvar",
+        ),
+        Program("cbc", "CBC", ("lp", "mps"), (), "cbc", "apt install coinor-cbc", 1e-6),
+        Program(
+            "glpk", "GLPK", ("lp", "mps"), ("mod",), "glpsol", "apt install glpk-utils", 1e-14, adds=r"~r_\d+"
+        ),
+        Program("asl", "AMPL Solver Library", (), ("nl",), "gjh_asl_json", "apt install gjh-asl-json"),
+        Program("casadi", "CasADi", (), ("nl",), "casadi", "pip install casadi"),
+        Program(
+            "gams", "GAMS", (), ("gms",), "gamspy_base", "pip install gamspy_base gamspy_baron",
+            free="2000 linear or 1000 nonlinear columns and rows, 50 for BARON", adds=r"objvar",
+        ),
+    )
+}  # fmt: skip
+"""The programs that our files are for, as far as they can be had for free.
+
+Each has a module in export/verify/programs.
+"""
+
+
+class StartFile(NamedTuple):
+    """The file from which a solver starts: its layout (see export/bundle/starts.py), suffix, and use.
+
+    convex: whether the solver uses it for convex problems only.
+    """
+
+    layout: str
+    suffix: str
+    use: str
+    convex: bool = False
+
+
+class WindowUse(NamedTuple):
+    """What a solver solves of a window, and the side in pixels of the first: what it closes in seconds."""
+
+    formulation: str
+    side: int
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A solver: the formats it reads, the preferred one first; what brings it; what it refuses, by trait.
+
+    program: the name of the program that brings it. package: a Python package that it needs besides. proves:
+    of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
+    start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
+    that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
+    problems for which others come first. window: how it solves windows, where it does.
+    """
+
+    name: str
+    title: str
+    formats: tuple[str, ...]
+    program: str
+    refusals: dict[str, Refusal] = field(default_factory=dict)
+    package: str = ""
+    proves: Proof = "global"
+    start: StartFile | None = None
+    driver: str = ""
+    not_for: tuple[str, ...] = ()
+    window: WindowUse | None = None
+
+    def refusal(self, held: Problem, *stages: Stage) -> Refusal | None:
+        """Its first refusal of a problem, as a format holds it, at one of these stages (all by default)."""
+        for trait, refusal in self.refusals.items():
+            if TRAITS[trait](held) and (refusal.stage in stages or not stages):
+                return refusal
+        return None
+
+    @property
+    def missing(self) -> str:
+        """How to install it where it is not here; empty where it is."""
+        if not PROGRAMS[self.program].present:
+            return PROGRAMS[self.program].install
+        return f"pip install {self.package}" if self.package and find_spec(self.package) is None else ""
+
+
+_LINEAR_ONLY: Final = {"anything beyond linear": Refusal("read", "it takes linear models only")}
+
+SOLVERS: Final = {
+    entry.name: entry
+    for entry in (
+        Solver(
+            "gurobi", "Gurobi", ("mps", "lp"), "gurobi",
+            start=StartFile("list", ".mst", "gurobi_cl InputFile=START.mst MODEL.mps"),
+        ),
+        Solver(
+            "cplex", "CPLEX", ("mps", "lp"), "cplex",
+            {
+                "quadratic rows": Refusal(
+                    "solve",
+                    "error 5002: CPLEX takes quadratic rows only when they are convex; "
+                    "write milp-mccormick or miqp-mccormick",
+                ),
+                "a non-convex quadratic objective": Refusal(
+                    "solve",
+                    "error 5002: CPLEX takes a non-convex objective only "
+                    "with its parameter optimalitytarget = 3",
+                ),
+            },
+            start=StartFile("cplex", ".mst", "read MODEL.mps, then read START.mst"),
+        ),
+        Solver(
+            "xpress", "Xpress", ("mps", "lp"), "xpress",
+            start=StartFile("slx", ".slx", "READPROB MODEL.mps, then READSLXSOL START.slx", convex=True),
+        ),
+        Solver(
+            "highs", "HiGHS", ("mps", "lp"), "highs",
+            {
+                "quadratic rows": Refusal("read", "HiGHS reads no quadratic rows"),
+                "integers and a quadratic objective": Refusal(
+                    "solve", "HiGHS reads an MIQP, but does not solve it"
+                ),
+                "a non-convex quadratic objective": Refusal(
+                    "solve",
+                    "HiGHS solves convex QPs only, and may call a stationary point of another one optimal",
+                ),
+            },
+            start=StartFile("highs", ".sol", "highs --read_solution_file START.sol MODEL.mps"),
+            driver="highs", not_for=("QP",), window=WindowUse("milp-mccormick", 5),
+        ),
+        Solver(
+            "scip", "SCIP", ("nl", "mps", "lp", "osil"), "scip",
+            start=StartFile("scip", ".sol", "read MODEL.mps (or .nl), then read START.sol"),
+        ),
+        Solver(
+            "baron", "BARON", ("gms", "nl"), "gams",
+            {
+                "a cosine": Refusal(
+                    "solve",
+                    "BARON has no trigonometric functions; "
+                    "write minlp-quartic, which is the same problem for whole jumps",
+                )
+            },
+            package="gamspy_baron",
+        ),
+        Solver(
+            "ipopt", "Ipopt", ("nl", "gms"), "casadi",
+            {
+                "integers": Refusal("solve", "Ipopt drops integrality; relax it, or fix the jumps"),
+                "non-convexity": Refusal("local", "Ipopt finds local optima"),
+            },
+            proves="local", driver="casadi",
+        ),
+        Solver(
+            "bonmin", "Bonmin", ("nl", "gms"), "casadi",
+            {
+                "non-convexity": Refusal(
+                    "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
+                )
+            },
+            proves="convex", driver="casadi", window=WindowUse("miqp-exact", 4),
+        ),
+        Solver(
+            "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",
+            {
+                "a cosine": Refusal("solve", "CPLEX takes nothing beyond quadratic"),
+                "quadratic rows": Refusal("solve", "CPLEX takes quadratic rows only when they are convex"),
+                "non-convexity": Refusal("solve", "CPLEX takes convex problems up to quadratic"),
+            },
+        ),
+        Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY),
+        Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY),
+    )
+}  # fmt: skip
+"""The table of solvers. Those that are driven here stand in the order in which they are preferred."""
+
+DRIVEN: Final = {name: solver for name, solver in SOLVERS.items() if solver.driver}
+"""The solvers that are driven here."""
+
+
+class Taking(NamedTuple):
+    """Whether a solver takes a problem, in which format, and the reason for any answer but `yes`.
+
+    answer: `yes`, `local` (it answers without proof) or `no`.
+    """
+
+    answer: Literal["yes", "local", "no"]
+    format: str
+    reason: str
+
+
+def takes(problem: Problem, solver: str) -> Taking:
+    """Whether the solver takes the problem, and in which format: the first one with the best answer."""
+    found = [takes_in(problem, solver, name) for name in SOLVERS[solver].formats]
+    return min(found, key=lambda each: ("yes", "local", "no").index(each.answer))
+
+
+def takes_in(problem: Problem, solver: str, name: str) -> Taking:
+    """Whether the solver takes the problem in the format of that name."""
+    try:
+        held = carried(problem, FORMATS[name])
+    except UnsupportedByFormatError as error:
+        return Taking("no", name, str(error))
+    entry = SOLVERS[solver]
+    refusal = entry.refusal(held, "read", "solve") or entry.refusal(held)
+    if refusal is None:
+        return Taking("yes", name, "")
+    return Taking("local" if refusal.stage == "local" else "no", name, refusal.reason)
+
+
+def takers(problem: Problem) -> dict[str, Taking]:
+    """What each solver says to a problem."""
+    return {name: takes(problem, name) for name in SOLVERS}
+
+
+def smallest(formulation: Formulation) -> Problem:
+    """The formulation on two pixels: enough to ask what a format carries and a solver takes."""
+    pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
+    instance = Instance("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)
+    return Problem(instance, formulation, np.zeros(1, dtype=np.int32) if formulation.fixed else None)

@@ -1,0 +1,178 @@
+"""A driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
+
+Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline
+gap stamp`: a crash of a solver takes the child alone, and its log is the child's output. The log's first line
+says that the solver starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point
+so far. It ends with its parent: when its standard input closes.
+
+The stamp says of which problem the model is, and is repeated in the message.
+
+Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better
+points only, and the start is the answer when there is none.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from ...models.instance.grid import Floats
+from ...models.processes.deadline import Deadline
+from ...models.processes.side_by_side import leave_with_parent
+from ..solutions.readers.ampl import write_ampl_sol
+from .job import LEAST
+from .nl_model import NlModel, ca, read_nl
+
+# AMPL's solve codes: 0 solved, 100 solved?, 200 infeasible, 300 unbounded, 400 limit with point, 500 failure.
+_CODES: Final = {
+    "Solve_Succeeded": 0,
+    "Solved_To_Acceptable_Level": 100,
+    "Feasible_Point_Found": 100,
+    "Infeasible_Problem_Detected": 200,
+    "Diverging_Iterates": 300,
+    "User_Requested_Stop": 400,
+    "Maximum_Iterations_Exceeded": 400,
+    "Maximum_CpuTime_Exceeded": 400,
+    "Maximum_WallTime_Exceeded": 400,
+    "Search_Direction_Becomes_Too_Small": 100,
+    "SUCCESS": 0,
+    "INFEASIBLE": 220,
+    "CONTINUOUS_UNBOUNDED": 300,
+    "LIMIT_EXCEEDED": 400,
+    "USER_INTERRUPT": 400,
+}
+_FAILURE: Final = 500
+_STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
+_NO_POINT: Final = 1e49
+"""Bonmin's objective when it has no incumbent is 1e50."""
+
+
+class Stop(ca.Callback):
+    """Called by Ipopt at every iterate; asks it to stop once an interrupt has come."""
+
+    def __init__(self, columns: int, rows: int) -> None:
+        """A callback for a problem of that size."""
+        ca.Callback.__init__(self)
+        self.sizes = {"x": columns, "f": 1, "g": rows, "lam_x": columns, "lam_g": rows, "lam_p": 0}
+        self.wanted = False
+        self.construct("stop", {})
+
+    def on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        """Remember the interrupt."""
+        self.wanted = True
+
+    def get_n_in(self) -> int:
+        """Number of inputs, as CasADi asks for it."""
+        return int(ca.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        """One output: whether to stop."""
+        return 1
+
+    def get_name_in(self, i: int) -> str:
+        """Names of inputs are those of a solver's outputs."""
+        return str(ca.nlpsol_out(i))
+
+    def get_name_out(self, _i: int) -> str:
+        """Name of the output."""
+        return "ret"
+
+    def get_sparsity_in(self, i: int) -> Any:
+        """Shape of an input."""
+        return ca.Sparsity.dense(self.sizes[str(ca.nlpsol_out(i))], 1)
+
+    def eval(self, _arguments: Sequence[Any]) -> list[int]:
+        """1 to stop, 0 to go on."""
+        return [int(self.wanted)]
+
+
+class AmplAnswer(NamedTuple):
+    """The solver's own words, AMPL's solve code, and the point in .nl order, empty when there is none."""
+
+    words: str
+    code: int
+    point: Floats
+
+
+def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
+    """Options of the solver for a time limit and a relative gap."""
+    if solver == "ipopt":
+        return {
+            "ipopt.max_wall_time": seconds,
+            "ipopt.tol": 1e-10,
+            "ipopt.max_iter": 10000,
+            # Fixed integers make equations of the facets.
+            # Without a little room Ipopt then stops early and says optimal.
+            "ipopt.bound_relax_factor": 1e-9,
+            "ipopt.honor_original_bounds": "yes",
+            "ipopt.sb": "yes",
+        }
+    return {
+        "bonmin.time_limit": seconds,
+        "bonmin.allowable_fraction_gap": gap,
+        "bonmin.algorithm": "B-BB",
+        # These two start a search in the search, which heeds neither a limit nor an interrupt.
+        "bonmin.heuristic_dive_MIP_fractional": "no",
+        "bonmin.heuristic_dive_MIP_vectorLength": "no",
+    }
+
+
+def solve(
+    solver: str, model: NlModel, seconds: float, gap: float, started: Callable[[], object] = lambda: None
+) -> AmplAnswer:
+    """How the solver ended. `started` is called when it is about to begin.
+
+    Must run in the main thread of a process of its own: it takes over the handling of SIGINT.
+    """
+    chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
+    stop = Stop(len(model.start), len(model.row_lower))
+    signal.signal(signal.SIGINT, stop.on_signal)  # Bonmin puts a handler of its own in its place
+    best = None
+    if solver == "ipopt":
+        chosen["iteration_callback"] = stop
+    else:
+        chosen["discrete"] = model.discrete.tolist()
+        best = model.value_of_start
+        chosen |= {} if best is None else {"bonmin.cutoff": best}
+    run = ca.nlpsol("solver", solver, model.problem, chosen)
+    started()
+    ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
+    answer = run(x0=model.start, **ends)
+    words = str(run.stats()["return_status"])
+    code = _CODES.get(words, _FAILURE)
+    words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
+    if solver == "bonmin" and float(answer["f"]) >= _NO_POINT:
+        return _without_better(words, code, model, best)
+    return AmplAnswer(words, code, np.zeros(0) if code == 300 else np.array(answer["x"]).ravel())
+
+
+def _without_better(words: str, code: int, model: NlModel, best: float | None) -> AmplAnswer:
+    """The answer of a search by Bonmin that found nothing: the start, where it is feasible."""
+    if best is None:
+        return AmplAnswer(words, 470 if code == 400 else code, np.zeros(0))
+    return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, model.start)
+
+
+def main(arguments: list[str]) -> int:
+    """0 when a .sol was written; the solver's status stands in it."""
+    solver, path, solution, deadline, gap, stamp = arguments
+    leave_with_parent()
+    model = read_nl(Path(path))
+    seconds = max(Deadline(float(deadline)).left(), LEAST)
+    columns, rows = len(model.start), len(model.row_lower)
+    line = f"{solver}: {columns} columns, {rows} rows, at most {seconds:.3g} s"
+    # What is printed is the log.
+    answer = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201
+    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {answer.words}\n{stamp}"
+    write_ampl_sol(solution, message, answer.point, rows, answer.code, columns=columns)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,242 @@
+"""The ways to a field: one table for `crossfield solve --method`, `crossfield run` and the docs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.instance.instance import Instance
+from ...models.processes.deadline import Deadline
+from ...models.processes.side_by_side import cores
+from ...models.search.box_qp import fitted
+from ...models.search.greedy import greedy
+from ...models.search.improvement import first_field
+from ...models.search.power_field import power_field
+from ...models.search.search import search
+from ..solutions.solution import Solution
+from .job import Limits
+from .two_stage import find_jumps, fit_angles, jumps_until
+from .windows import WINDOW_SOLVERS, search_windows
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A field and how it was found: method, seconds, counts, and the solution where a solver gave it."""
+
+    method: str
+    field: CrossField
+    seconds: float
+    solution: Solution | None = None
+    interrupted: bool = False
+    counts: tuple[tuple[str, int], ...] = ()
+
+    def facts(self) -> dict[str, Any]:
+        """What a report says of it: energies in both norms, singularities, skew, claims beside values."""
+        answer = self.field
+        facts: dict[str, Any] = {
+            "method": self.method,
+            "energy_2_norm": answer.energy(2).total,
+            "energy_1_norm": answer.energy(1).total,
+            "singularities": len(answer.singularities.index),
+            "degenerate_pixels": int(answer.degenerate.sum()),
+            "mean_abs_beta_degrees": float(np.degrees(np.abs(answer.beta).mean())),
+            "seconds": round(self.seconds, 3),
+            "interrupted": self.interrupted,
+            **dict(self.counts),
+        }
+        return facts if self.solution is None else facts | solution_facts(self.solution)
+
+
+def solution_facts(solution: Solution) -> dict[str, Any]:
+    """What a solution file claims, beside what was recomputed from the instance."""
+    violation = solution.violation
+    facts = {
+        "formulation": solution.problem.name,
+        "lifted": solution.problem.formulation.lifted,
+        "status": str(solution.status),
+        "claimed": str(solution.claimed),
+        "contradictions": list(solution.contradictions),
+        "message": solution.message,
+        "objective_reported": solution.reported,
+        "objective_recomputed": solution.objective,
+        "dual_bound": solution.bound,
+        "worst_violation": None if violation is None else violation.worst,
+        "worst_family": None if violation is None else violation.worst_family,
+        "furthest_rounding": solution.rounded,
+        "unknown_names": solution.unknown,
+        "interrupted": solution.interrupted,
+        "seconds": None if solution.seconds is None else round(solution.seconds, 3),
+    }
+    return {key: finite(value) for key, value in facts.items()}
+
+
+def finite(value: Any) -> Any:
+    """The value; None for an infinity, which JSON has not."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _tell_nobody(_text: str) -> None:
+    pass
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
+
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver:
+    one of those that the method can do with; None: the method's choice.
+    """
+
+    instance: Instance
+    folder: Path
+    limits: Limits = field(default_factory=Limits)
+    options: dict[str, Any] = field(default_factory=dict)
+    start: CrossField | None = None
+    solver: str | None = None
+    progress: Progress = _tell_nobody
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to a field. find: the fields it comes to, one by one, for a later one may fail.
+
+    The last one is its answer. solvers: those that may be chosen for it; timed: whether it goes on up to the
+    time limit, or ends when it is done; in_runs: whether `run` tries it.
+    """
+
+    name: str
+    summary: str
+    find: Callable[[Request], Iterator[Candidate]]
+    solvers: tuple[str, ...] = ()
+    timed: bool = True
+    in_runs: bool = True
+
+
+def _greedy(request: Request) -> Iterator[Candidate]:
+    request.progress("greedy field")
+    yield _timed("greedy", lambda: greedy(request.instance))
+
+
+def _power(request: Request) -> Iterator[Candidate]:
+    request.progress("power field")
+    power = _timed("power", lambda: power_field(request.instance))
+    yield power
+    yield _timed("power + QP", lambda: fitted(power.field))
+
+
+def _search(request: Request) -> Iterator[Candidate]:
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
+    request.progress("search: starting fields")
+    found = search(
+        request.instance,
+        seconds=request.limits.seconds,
+        jobs=_processes(request),
+        start=request.start,
+        progress=_teller(request, deadline, "search", "rounds"),
+    )
+    seconds = time.perf_counter() - begin
+    interrupted = found.ended == "interrupted"
+    yield Candidate(
+        "search", found.field, seconds, interrupted=interrupted, counts=(("rounds", found.rounds),)
+    )
+
+
+def _windows(request: Request) -> Iterator[Candidate]:
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
+    request.progress("windows: greedy field")
+    start = request.start or first_field(request.instance)
+    found = search_windows(
+        start,
+        seconds=request.limits.until(deadline).seconds,
+        solver=request.solver or "bonmin",
+        jobs=_processes(request),
+        progress=_teller(request, deadline, "windows", "windows"),
+    )
+    seconds = time.perf_counter() - begin
+    counts = (("windows", found.windows), ("windows_closed", found.closed), ("windows_lower", found.lower))
+    interrupted = found.ended == "interrupted"
+    yield Candidate("windows", found.field, seconds, interrupted=interrupted, counts=counts)
+
+
+def _processes(request: Request) -> int:
+    return request.limits.threads or cores()
+
+
+def _teller(request: Request, deadline: Deadline, method: str, things: str) -> Callable[[int, float], None]:
+    """What tells how far a search is: how many of the things it counts, the energy, and the time left."""
+
+    def tell(count: int, energy: float) -> None:
+        request.progress(
+            f"{method}: energy {energy:.5g} after {count} {things}, at most {deadline.left():.0f} s more; "
+            "Ctrl-C keeps the best field so far"
+        )
+
+    return tell
+
+
+def _two_stage(request: Request) -> Iterator[Candidate]:
+    deadline = Deadline.after(request.limits.seconds)
+    limits = request.limits.until(jumps_until(deadline))
+    request.progress(
+        f"HiGHS: MILP for the jumps, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far"
+    )
+    milp = find_jumps(request.instance, request.folder, limits=limits, start=request.start, **request.options)
+    yield _of("MILP", milp)
+    request.progress("Ipopt: angles for the jumps of the MILP")
+    yield _of("two-stage", fit_angles(milp.field, request.folder, limits=request.limits.until(deadline)))
+
+
+METHODS: Final = {
+    method.name: method
+    for method in (
+        Method(
+            "greedy",
+            "the greedy strategy of BendFields, then the best angles: the baseline",
+            _greedy,
+            timed=False,
+        ),
+        Method(
+            "power",
+            "smooth exp(4 i theta), right angles; then the best angles for its jumps",
+            _power,
+            timed=False,
+        ),
+        Method(
+            "search",
+            "local search over jumps and singularities from the greedy field on, up to the time limit",
+            _search,
+        ),
+        Method(
+            "windows",
+            "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit",
+            _windows,
+            solvers=tuple(WINDOW_SOLVERS),
+            in_runs=False,
+        ),
+        Method(
+            "two-stage",
+            "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
+            _two_stage,
+        ),
+    )
+}
+"""The table of methods; command line, runs, docs and tests are generated from it."""
+
+
+def _timed(method: str, find: Callable[[], CrossField]) -> Candidate:
+    begin = time.perf_counter()
+    found = find()
+    return Candidate(method, found, time.perf_counter() - begin)
+
+
+def _of(method: str, solution: Solution) -> Candidate:
+    seconds = solution.seconds or 0.0
+    return Candidate(method, solution.field, seconds, solution, solution.interrupted)

@@ -1,0 +1,199 @@
+"""Everything at once: an instance, its files, every field that can be had here, pictures, a report."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+from ...models.errors import CrossfieldError
+from ...models.field.file import write_field
+from ...models.instance.instance import Instance
+from ...models.search.improvement import first_field
+from ...models.storage import make_folder, write_bytes
+from ..bundle.manifest import Manifest, write_all
+from ..formats.registry import generator
+from ..solutions.solution import Solution
+from .job import Limits
+from .methods import METHODS, Candidate, Method, Progress, Request, finite, solution_facts
+
+PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
+REPORT: Final = "report.json"
+
+
+def facts_with_energies(solution: Solution) -> dict[str, Any]:
+    """The facts of a solution and, where it has a point, the energies of its field in both norms."""
+    facts = solution_facts(solution)
+    if solution.point is None:
+        return facts
+    return facts | {
+        "energy_2_norm": finite(solution.field.energy(2).total),
+        "energy_1_norm": finite(solution.field.energy(1).total),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a run found. candidates: every field, best (lowest 2-norm energy) first.
+
+    Manifests: the written sets. failures: reasons by method; interrupted: the method, or `drawing`, that
+    Ctrl-C ended, and the run with it; empty when none did.
+    """
+
+    instance: Instance
+    candidates: tuple[Candidate, ...]
+    manifests: tuple[Manifest, ...]
+    failures: dict[str, str] = field(default_factory=dict)
+    interrupted: str = ""
+
+    @property
+    def best(self) -> Candidate:
+        """The field that is kept and drawn."""
+        return self.candidates[0]
+
+    @property
+    def files(self) -> int:
+        """Number of solver files, lists of names not counted."""
+        names = [entry["name"] for manifest in self.manifests for entry in manifest.document["files"]]
+        return sum(not name.removesuffix(".gz").endswith((".row", ".col")) for name in names)
+
+    def document(self) -> dict[str, Any]:
+        """The report as JSON: instance, methods, files."""
+        instance = self.instance
+        return {
+            "format": "crossfield-report",
+            "version": 1,
+            "generator": generator(),
+            "instance": {
+                "name": instance.name,
+                "source": instance.source,
+                "gauge": instance.gauge,
+                "sha256": instance.sha256,
+                "height": instance.grid.height,
+                "width": instance.grid.width,
+                "pixels": instance.grid.size,
+                "pairs": len(instance.grid.first),
+                "stroke_pixels": len(instance.theta),
+                "parts": instance.grid.parts,
+                "pixel_size": instance.pixel_size,
+            },
+            "best": self.best.method,
+            "methods": [candidate.facts() for candidate in self.candidates],
+            "failures": self.failures,
+            "interrupted": self.interrupted or None,
+            "files": self.files,
+            "refused": {
+                m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
+            },
+        }
+
+
+def plan(limits: Limits) -> str:
+    """How long the searches of a run may take in all, and each."""
+    timed = [method.name for method in _tried() if method.timed]
+    each = ", ".join(f"{name} {limits.seconds:g} s" for name in timed)
+    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures come on top"
+
+
+def _tried() -> list[Method]:
+    return [method for method in METHODS.values() if method.in_runs]
+
+
+def run(
+    instance: Instance,
+    folder: str | Path,
+    *,
+    limits: Limits | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    jobs: int = 1,
+    progress: Progress = lambda _: None,
+) -> Report:
+    """The report of a run.
+
+    The folder then holds instance, solver files, the best field, pictures and report.json.
+        DIR/models     every formulation in every format, manifests, the instance
+        DIR/solve      what the local solvers read and left
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
+
+    options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
+    method that searches; `progress` is first told what that makes in all. A method that fails is noted in the
+    report; the fields that were found stand. Ctrl-C ends the present method with its best field and the run
+    with it: no further method is tried and nothing drawn. Before the first field is there it goes on as
+    KeyboardInterrupt. Raises OutputError.
+    """
+    folder, limits = make_folder(folder), limits or Limits()
+    for stale in (REPORT, *map(_picture, PICTURES)):
+        (folder / stale).unlink(missing_ok=True)
+    progress(plan(limits))
+    progress("greedy field")
+    start = first_field(instance)
+    manifests = write_all(
+        instance,
+        folder / "models",
+        start=start,
+        options=options,
+        dialects=dialects,
+        jobs=jobs,
+        progress=lambda name: progress(f"writing {name}"),
+    )
+    found = _tried_in_turn(
+        Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
+    )
+    # Equal but for rounding: the one that was found first.
+    ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
+    report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted)
+    for suffix in (".npz", ".json", ".rawfield"):
+        write_field(report.best.field, folder / f"field{suffix}")
+    if not report.interrupted:
+        report = _drawn(report, folder, progress)
+    write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
+    return report
+
+
+@dataclass
+class _Findings:
+    """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
+
+    candidates: list[Candidate] = field(default_factory=list)
+    failures: dict[str, str] = field(default_factory=dict)
+    interrupted: str = ""
+
+
+def _tried_in_turn(request: Request) -> _Findings:
+    """What the methods of a run find, one after the other, until one of them is interrupted."""
+    found = _Findings()
+    for method in _tried():
+        try:
+            for candidate in method.find(request):
+                found.candidates.append(candidate)
+                found.interrupted = found.interrupted or (method.name if candidate.interrupted else "")
+        except CrossfieldError as error:
+            found.failures[method.name] = str(error)
+        except KeyboardInterrupt:
+            if not found.candidates:
+                raise
+            found.interrupted = method.name
+        if found.interrupted:
+            break
+    return found
+
+
+def _drawn(report: Report, folder: Path, progress: Progress) -> Report:
+    """The report, its pictures drawn, or marked where Ctrl-C ended that."""
+    from ..pictures.draw import draw
+
+    try:
+        for kind in PICTURES:
+            progress(f"drawing {kind}")
+            subject = report.instance if kind == "instance" else report.best.field
+            draw(subject, folder / _picture(kind), kind=kind)
+    except KeyboardInterrupt:
+        return replace(report, interrupted="drawing")
+    return report
+
+
+def _picture(kind: str) -> str:
+    return f"{kind}.png"

@@ -1,0 +1,97 @@
+"""The two stages of section 5 of the paper: a MILP for the jumps, then the box QP for the angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ...models.field.field import CrossField
+from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.problem import formulate
+from ...models.instance.instance import Instance
+from ...models.processes.deadline import Deadline
+from ...models.search.improvement import first_field
+from ..solutions.solution import Solution
+from .job import Limits
+from .local import solve
+
+_ANGLES: Final = 0.2
+"""Share of the time that the second stage keeps, and least seconds: its process has to start."""
+_ANGLES_LEAST: Final = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class TwoStage:
+    """Both solutions; `field` is that of the second stage, or of the first where the second left no point."""
+
+    milp: Solution
+    qp: Solution
+
+    @property
+    def field(self) -> CrossField:
+        """The field with the jumps of the first stage and the angles of the second."""
+        return self.qp.field if self.qp.point is not None else self.milp.field
+
+
+def fit_angles(
+    field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None
+) -> Solution:
+    """The solution of `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage.
+
+    It is the field of least 2-norm energy for these jumps within the windows (section 5 of the paper; a
+    convex QP).
+    folder, limits and errors: as for `solve`.
+    """
+    return solve(
+        formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field
+    )
+
+
+def find_jumps(
+    instance: Instance,
+    folder: str | Path | None = None,
+    *,
+    limits: Limits | None = None,
+    start: CrossField | None = None,
+    **options: Any,
+) -> Solution:
+    """The solution of `milp-mccormick` by HiGHS: the first stage.
+
+    start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x
+    10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
+    """
+    limits = limits or Limits()
+    deadline = Deadline.after(limits.seconds)
+    start = start or first_field(instance)
+    chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
+    problem = formulate(instance, "milp-mccormick", **chosen)
+    return solve(problem, None, folder, limits=limits.until(deadline), start=start)
+
+
+def two_stage(
+    instance: Instance,
+    folder: str | Path | None = None,
+    *,
+    limits: Limits | None = None,
+    start: CrossField | None = None,
+    **options: Any,
+) -> TwoStage:
+    """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
+
+    `.milp` and `.qp` are the two, `.field` the one with the jumps of the first and the angles of the second
+    (section 5 of the paper).
+    folder: as for `solve`. start: the first incumbent, the improved greedy field when None. limits: for both
+    stages together.
+    options: facet, stroke_norm, beta_norm. Raises MissingSolverError, SolverError, SolutionError.
+    """
+    limits = limits or Limits()
+    deadline = Deadline.after(limits.seconds)
+    milp = find_jumps(instance, folder, limits=limits.until(jumps_until(deadline)), start=start, **options)
+    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits.until(deadline)))
+
+
+def jumps_until(deadline: Deadline) -> Deadline:
+    """When the first stage has to end: a fifth or 2 s before the deadline, but not sooner than half way."""
+    left = deadline.left()
+    return deadline.later(-min(max(_ANGLES * left, _ANGLES_LEAST), left / 2))

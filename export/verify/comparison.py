@@ -1,0 +1,178 @@
+"""What a model file means to a program, compared with the problem: names, types, bounds, coefficients, and values at points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.formulations.problem import Problem
+from ...models.instance.grid import Bools, Floats, Ints
+from ..writing.canonical import Canonical
+from ..writing.names import ONE, column_names, row_names
+from ..writing.terms import terms
+from .programs.reading import Evaluation, Meaning, Points, places
+
+VALUES: Final = 1e-9
+"""Relative difference up to which values at a point agree: sums are taken in another order."""
+
+
+def names_of(matrix: np.ndarray[Any, Any]) -> list[str]:
+    """Names as text, from rows of bytes padded with NUL."""
+    return [bytes(row).rstrip(b"\0").decode() for row in matrix]
+
+
+def names_of_rows(problem: Problem) -> list[str]:
+    """Names of all rows of a problem."""
+    return names_of(row_names(problem)) if problem.rows else []
+
+
+def of_problem(problem: Problem) -> Meaning:
+    """What an LP or MPS file of the problem should mean, from the problem's arrays: ONE is its last column."""
+    form = Canonical(problem)
+    one = [ONE.decode()] * form.has_one
+    n, ones = problem.columns, np.ones(len(one))
+    at, value = _of_degree(problem, 1)
+    products, product = _of_degree(problem, 2)
+    return Meaning.of(
+        names_of(column_names(problem)) + one,
+        names_of_rows(problem) or ["c_ONE"],
+        lower=np.concatenate([problem.lower, ones]),
+        upper=np.concatenate([problem.upper, ones]),
+        integer=np.concatenate([problem.integer, ones == 0]),
+        costs=np.concatenate([form.costs, form.constant * ones]),
+        row_lower=form.row_lower if problem.rows else ones,
+        row_upper=form.row_upper if problem.rows else ones,
+        quadratic=terms(*form.products(), indices=2, products=2),
+        matrix=terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
+        row_quadratic=terms(products, product, indices=3, products=2),
+    )
+
+
+def _of_degree(problem: Problem, degree: int) -> tuple[Ints, Floats]:
+    """Entries (row, columns...) and coefficients of the rows' terms of a degree."""
+    at: list[Ints] = [np.zeros((0, degree + 1), np.int64)]
+    values: list[Floats] = [np.zeros(0)]
+    start = 0
+    for family in problem.rows:
+        row = np.arange(start, start + family.count)
+        for term in family.of_degree(degree):
+            at.append(np.stack([row, *term.factors], axis=1).astype(np.int64))
+            values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
+        start += family.count
+    return np.concatenate(at), np.concatenate(values)
+
+
+def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
+    """Objective (k,) and rows (k, rows), their constants on the right side, at points (k, columns)."""
+    objective = np.array([problem.objective_value(point) for point in points])
+    rows = [
+        np.concatenate([np.zeros(0), *(family.values(point) + family.limit for family in problem.rows)])
+        for point in points
+    ]
+    return objective, np.array(rows).reshape(len(points), problem.row_count)
+
+
+def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
+    """What differs between the algebra of a file and the problem, the first thing only; empty when nothing does.
+
+    tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
+    compared as well.
+    """
+    expected = of_problem(problem)
+    for kind in ("columns", "rows"):
+        wrong = _names_differ(getattr(found, kind), getattr(expected, kind), kind)
+        if wrong:
+            return wrong
+    found = found.ordered(expected.columns, expected.rows)
+    checks = (_number_difference(found, expected, name, tolerance) for name in _NUMBERS)
+    wrong = next(filter(None, checks), "")
+    if wrong:
+        return wrong
+    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.columns))])
+    objective, rows = values_at(problem, points)
+    accuracy = max(VALUES, 100 * tolerance)
+    return _value_difference("the objective", found.objective(given), objective, accuracy) or (
+        _value_difference("a row", found.activities(given), rows, accuracy) if problem.rows else ""
+    )
+
+
+_NUMBERS: Final = ("integer", "lower", "upper", "costs", "quadratic", "row_lower", "row_upper", "matrix", "row_quadratic")  # fmt: skip
+
+
+def _names_differ(found: Sequence[str], expected: Sequence[str], kind: str) -> str:
+    if sorted(found) == sorted(expected):
+        return ""
+    extra, missing = sorted(set(found) - set(expected)), sorted(set(expected) - set(found))
+    parts = [
+        f"{word} {', '.join(names[:3])}" for word, names in (("adds", extra), ("lacks", missing)) if names
+    ]
+    return f"{len(found)} {kind} instead of {len(expected)}: {'; '.join(parts) or 'some twice'}"
+
+
+def _number_difference(found: Meaning, expected: Meaning, name: str, tolerance: float) -> str:
+    mine, theirs = getattr(expected, name), getattr(found, name)
+    index = f"{name}_at"
+    if hasattr(expected, index) and not np.array_equal(getattr(expected, index), getattr(found, index)):
+        return f"{name}: {len(theirs)} coefficients instead of {len(mine)}, or at other places"
+    wrong = np.nonzero(~_close(theirs, mine, tolerance))[0]
+    if not len(wrong):
+        return ""
+    labels = expected.rows if name.startswith("row_") else expected.columns
+    at = getattr(expected, index)[wrong[0]].tolist() if hasattr(expected, index) else labels[wrong[0]]
+    return f"{name} at {at} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
+
+
+def _close(found: Any, expected: Any, tolerance: float) -> Bools:
+    if not tolerance or expected.dtype == bool:
+        return np.asarray(found == expected)
+    return np.asarray(np.isclose(found, expected, rtol=tolerance, atol=tolerance * 1e-3))
+
+
+def _value_difference(what: str, found: Floats, expected: Floats, accuracy: float) -> str:
+    told = ~np.isnan(found)
+    wrong = told & ~np.isclose(found, expected, rtol=accuracy, atol=accuracy)
+    if not wrong.any():
+        return ""
+    place = tuple(np.argwhere(wrong)[0])
+    return f"{what} at point {place[0]} is {found[place]:.12g} instead of {expected[place]:.12g}"
+
+
+def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -> str:
+    """What differs between the behaviour of a file and the problem, the first thing only; empty when nothing does."""
+    columns, rows = names_of(column_names(problem)), names_of_rows(problem)
+    lacking = set(columns) - set(found.columns) if found.may_lack else set()
+    wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]
+    strangers = _names_differ(found.columns, wanted, "columns") or _names_differ(found.rows, rows, "rows")
+    if strangers:
+        return strangers
+    at, c, r = places(columns, wanted), places(found.columns, wanted), places(found.rows, rows)
+    if found.integer is not None and (found.integer[c] != problem.integer[at]).any():
+        return "other columns are integer"
+    if found.discrete is not None and found.discrete != problem.integer.sum():
+        return f"{found.discrete} discrete columns instead of {problem.integer.sum()}"
+    form = Canonical(problem)
+    bounds = [
+        ("lower", found.lower[c], problem.lower[at]),
+        ("upper", found.upper[c], problem.upper[at]),
+        ("row_lower", found.row_lower[r], form.row_lower),
+        ("row_upper", found.row_upper[r], form.row_upper),
+    ]
+    for name, theirs, mine in bounds:
+        wrong = np.nonzero(~_close(theirs, mine, found.rounding))[0]
+        if len(wrong):
+            return f"{name} is {theirs[wrong[0]]!s} instead of {mine[wrong[0]]!s} ({len(wrong)} such)"
+    objective, activities = values_at(problem, points.of(columns))
+    return _value_difference("the objective", found.objective, objective, VALUES) or _value_difference(
+        "a row", found.activities[:, r], activities, VALUES
+    )
+
+
+def _unused(problem: Problem, columns: list[str]) -> set[str]:
+    """Names of columns that stand in no term."""
+    used = np.zeros(problem.columns, dtype=bool)
+    for family in (*problem.objective, *problem.rows):
+        for symbol in family.variables:
+            used[family.columns(symbol)] = True
+    return {columns[place] for place in np.nonzero(~used)[0].tolist()}

@@ -1,0 +1,127 @@
+"""CPLEX as a consumer of LP and MPS, through its Python API.
+
+The community edition solves up to 1000 columns and rows.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cplex
+import numpy as np
+from cplex.exceptions import CplexError, CplexSolverError
+
+from ...solutions.readers.text import RawSolution, Status
+from ...writing.terms import Terms, terms
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
+
+_SIZE_LIMIT = 1016
+_INFINITY = 1e20
+
+
+def version() -> str:
+    """Its version."""
+    return str(cplex.Cplex().get_version())
+
+
+def _load(path: Path) -> Any:
+    model = cplex.Cplex()
+    for stream in ("log", "results", "warning", "error"):
+        getattr(model, f"set_{stream}_stream")(None)
+    try:
+        model.read(str(path))
+    except CplexError as error:
+        raise Refused(str(error)) from error
+    return model
+
+
+def read(path: Path) -> Meaning:
+    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times.
+
+    Quadratic rows come after the others.
+    """
+    model = _load(path)
+    columns, goal = model.variables, model.objective
+    if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
+        raise Refused("it is not minimised, or has a constant beside ONE")
+    plain, products = model.linear_constraints, model.quadratic_constraints
+    senses = np.array([*plain.get_senses(), *products.get_senses()])
+    limits = np.array([*plain.get_rhs(), *products.get_rhs()])
+    matrix, cubes = _rows(plain, products)
+    mixed = "MI" in model.problem_type[model.get_problem_type()]
+    return Meaning.of(
+        columns.get_names(),
+        [*plain.get_names(), *products.get_names()],
+        lower=_infinite(columns.get_lower_bounds()),
+        upper=_infinite(columns.get_upper_bounds()),
+        integer=[kind in "BI" for kind in (columns.get_types() if mixed else "C" * columns.get_num())],
+        costs=goal.get_linear(),
+        row_lower=np.where(senses == "L", -np.inf, limits),
+        row_upper=np.where(senses == "G", np.inf, limits),
+        quadratic=_hessian(goal),
+        matrix=matrix,
+        row_quadratic=cubes,
+    )
+
+
+def _infinite(values: list[float]) -> Any:
+    given = np.array(values)
+    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
+
+
+def _hessian(goal: Any) -> Terms:
+    """The quadratic terms, from both triangles of x'Qx/2."""
+    lines = goal.get_quadratic() if goal.get_num_quadratic_nonzeros() else []
+    entries = [(i, j, q) for i, line in enumerate(lines) for j, q in zip(*line.unpack(), strict=True)]
+    return terms([e[:2] for e in entries], [e[2] / 2 for e in entries], indices=2, products=2)
+
+
+def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
+    lines = [*plain.get_rows(), *products.get_linear_components()]
+    linear = [(row, j, a) for row, line in enumerate(lines) for j, a in zip(*line.unpack(), strict=True)]
+    triples = enumerate(products.get_quadratic_components(), start=plain.get_num())
+    cubes = [
+        (row, i, j, a)
+        for row, part in triples
+        for i, j, a in zip(part.ind1, part.ind2, part.val, strict=True)
+    ]
+    return (
+        terms([e[:2] for e in linear], [e[2] for e in linear], indices=2),
+        terms([e[:3] for e in cubes], [e[3] for e in cubes], indices=3, products=2),
+    )
+
+
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+    """Its answer within the time."""
+    model = _load(path)
+    tolerances = model.parameters
+    tolerances.timelimit.set(seconds)
+    tolerances.threads.set(1)
+    for parameter, value in (
+        (tolerances.mip.tolerances.mipgap, 0.0),
+        (tolerances.mip.tolerances.absmipgap, 1e-9),
+        (tolerances.mip.tolerances.integrality, 0.0),
+        (tolerances.simplex.tolerances.feasibility, 1e-9),
+        (tolerances.simplex.tolerances.optimality, 1e-9),
+        (tolerances.barrier.convergetol, 1e-12),
+        (tolerances.barrier.qcpconvergetol, 1e-12),
+    ):
+        parameter.set(value)
+    try:
+        model.solve()
+    except CplexSolverError as error:
+        if error.args[2] == _SIZE_LIMIT:
+            raise TooLarge from error
+        raise Refused(str(error)) from error
+    answer = model.solution
+    words, names = answer.get_status_string(), model.variables.get_names()
+    mixed = "MI" in model.problem_type[model.get_problem_type()]
+    if not answer.is_primal_feasible():
+        status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
+        return told(status, words)
+    status = Status.OPTIMAL_GLOBAL if "optimal" in words else Status.LIMIT_WITH_POINT
+    bound = answer.MIP.get_best_objective() if mixed else None
+    objective = answer.get_objective_value()
+    return told(status, words, names, answer.get_values(), objective=objective, bound=bound)

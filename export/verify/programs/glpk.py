@@ -1,0 +1,169 @@
+"""GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
+
+What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
+is a row there as well, and columns are indexed: alpha[1,2].
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ...solutions.readers.text import RawSolution, Status
+from ...solvers_table import PROGRAMS
+from ...writing.terms import terms
+from .protocol import Refused, executable
+from .reading import Evaluation, Meaning, Points, told
+
+_KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
+_OBJECTIVE: Final = "energy"
+
+
+def version() -> str:
+    """Its version."""
+    said = subprocess.run(
+        [executable("glpk"), "--version"], check=False, capture_output=True, text=True
+    ).stdout
+    found = re.search(r"(\d+\.\d+)", said)
+    return found[1] if found else "unknown"
+
+
+def _run(path: Path, *arguments: str) -> str:
+    kind = path.suffix.removeprefix(".")
+    given = [_KINDS[kind], str(path)]
+    if kind == "mod":
+        given += ["--data", str(path.with_suffix(".dat"))]
+    done = subprocess.run(
+        [executable("glpk"), *given, *arguments],
+        check=False,
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    if done.returncode:
+        lines = [line for line in done.stdout.splitlines() if line.startswith(str(path))]
+        raise Refused(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")
+    return done.stdout
+
+
+def read(path: Path) -> Meaning:
+    """The file as GLPK reads it."""
+    _run(path, "--check", "--wglp", "model.glp")
+    lines = [line.split() for line in Path("model.glp").read_text().splitlines()]
+    head = next(line for line in lines if line[0] == "p")
+    if head[2] != "min":
+        raise Refused("it is not minimised")
+    names = {kind: [line[3] for line in lines if line[:2] == ["n", kind]] for kind in "ij"}
+    entries = [
+        (int(i), int(j), float(value)) for key, i, j, value in (line for line in lines if line[0] == "a")
+    ]
+    if any(not j for _, j, _ in entries):
+        raise Refused("it has a constant beside ONE")
+    costs = np.zeros(len(names["j"]))
+    for _, j, value in (entry for entry in entries if not entry[0]):
+        costs[j - 1] = value
+    rest = [(i - 1, j - 1, value) for i, j, value in entries if i]
+    mixed = head[1] == "mip"
+    lower, upper = _limits(lines, "j", len(costs), 3 if mixed else 2)
+    row_lower, row_upper = _limits(lines, "i", len(names["i"]), 2)
+    continuous = {int(line[1]) - 1 for line in lines if line[0] == "j" and line[2] == "c"}
+    integer = [mixed and place not in continuous for place in range(len(costs))]  # binary by default
+    model = Meaning.of(
+        names["j"],
+        names["i"],
+        lower=lower,
+        upper=upper,
+        integer=integer,
+        costs=costs,
+        row_lower=row_lower,
+        row_upper=row_upper,
+        matrix=terms([e[:2] for e in rest], [e[2] for e in rest], indices=2),
+    )
+    return _without_objective(model, path) if path.suffix == ".mod" else model
+
+
+def evaluate(path: Path, points: Points) -> Evaluation:
+    """The AMPL model as GLPK reads it; it leaves columns out that are in no term, as AMPL does."""
+    model = read(path)
+    given = points.of(model.columns)
+    return Evaluation(
+        model.columns,
+        model.lower,
+        model.upper,
+        model.integer,
+        model.rows,
+        model.row_lower,
+        model.row_upper,
+        model.objective(given),
+        model.activities(given),
+        rounding=PROGRAMS["glpk"].tolerance,
+        may_lack=True,
+    )
+
+
+def _without_objective(model: Meaning, path: Path) -> Meaning:
+    """The model under our names, its objective not among the rows."""
+    goal = model.rows.index(_OBJECTIVE)
+    kept = model.matrix_at[model.matrix_at[:, 0] != goal]
+    return replace(
+        model,
+        columns=_ours(model.columns, path),
+        rows=_ours([name for name in model.rows if name != _OBJECTIVE], path),
+        row_lower=np.delete(model.row_lower, goal),
+        row_upper=np.delete(model.row_upper, goal),
+        matrix_at=np.stack([kept[:, 0] - (kept[:, 0] > goal), kept[:, 1]], axis=1),
+        matrix=model.matrix[model.matrix_at[:, 0] != goal],
+    )
+
+
+def _ours(names: list[str], path: Path) -> list[str]:
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
+    printed = re.search(r"_%0(\d+)d", path.read_text())
+    assert printed
+    return [_our_name(name, int(printed[1])) for name in names]
+
+
+def _our_name(name: str, digits: int) -> str:
+    stem, index = name.removesuffix("]").split("[")
+    return "_".join([stem, *(part.zfill(digits) if part.isdigit() else part for part in index.split(","))])
+
+
+def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
+    """Bounds of rows or columns: a letter (free, lower, upper, double, s: fixed) at place `at`, and numbers.
+
+    Rows without a line are free; columns have at least 0, and at most 1 in a model with integers.
+    """
+    lower, upper = np.zeros(count), np.full(count, 1.0 if at == 3 else np.inf)
+    if kind == "i":
+        lower[:] = -np.inf
+    for line in (line for line in lines if line[0] == kind and len(line) > at):
+        place, letter, numbers = int(line[1]) - 1, line[at], [float(text) for text in line[at + 1 :]]
+        lower[place] = numbers[0] if letter in "lds" else -np.inf
+        upper[place] = numbers[-1] if letter in "uds" else np.inf
+    return lower, upper
+
+
+_STATUS: Final = {"o": Status.OPTIMAL_GLOBAL, "f": Status.LIMIT_WITH_POINT, "n": Status.INFEASIBLE}
+
+
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+    """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
+    said = _run(path, "--tmlim", str(max(1, round(seconds))), "--wglp", "model.glp", "-w", "answer.txt")
+    names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
+    names = _ours(names, path) if path.suffix == ".mod" else names
+    answer = [line.split() for line in Path("answer.txt").read_text().splitlines()]
+    head = next(line for line in answer if line[0] == "s")
+    place = 2 if head[1] == "mip" else 3
+    status = _STATUS.get(head[4], Status.LIMIT_WITHOUT_POINT)
+    words = " ".join(re.findall(r"^(.*(?:SOLUTION FOUND|TIME LIMIT).*)$", said, re.MULTILINE))
+    if head[1] == "bas":
+        status = Status.OPTIMAL_GLOBAL if head[4:6] == ["f", "f"] else Status.LIMIT_WITHOUT_POINT
+    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
+        return told(status, words)
+    values = np.array([float(line[place]) for line in answer if line[0] == "j"])
+    return told(status, words, names, values, objective=float(head[-1]))

@@ -1,0 +1,117 @@
+"""Gurobi as a consumer of LP and MPS, through gurobipy. Its free licence ends at 2000 columns and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import gurobipy
+import numpy as np
+
+from ...solutions.readers.text import RawSolution, Status
+from ...writing.terms import Terms, terms
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
+
+_SIZE_LIMIT = 10010
+
+
+def version() -> str:
+    """Its version."""
+    return ".".join(map(str, gurobipy.gurobi.version()))
+
+
+@contextmanager
+def _loaded(path: Path) -> Iterator[Any]:
+    with (
+        gurobipy.Env(params={"OutputFlag": 0}) as environment,
+        gurobipy.read(str(path), environment) as model,
+    ):
+        yield model
+
+
+def read(path: Path) -> Meaning:
+    """The file as Gurobi reads it; quadratic rows come after the others."""
+    with _loaded(path) as model:
+        if model.ModelSense != gurobipy.GRB.MINIMIZE or model.ObjCon != 0:
+            raise Refused("it is not minimised, or has a constant beside ONE")
+        variables, plain, products = model.getVars(), model.getConstrs(), model.getQConstrs()
+        senses = np.array([r.Sense for r in plain] + [r.QCSense for r in products])
+        limits = np.array([r.RHS for r in plain] + [r.QCRHS for r in products])
+        goal = model.getObjective()
+        square = _products(goal) if isinstance(goal, gurobipy.QuadExpr) else []
+        matrix, cubes = _rows(model, plain, products)
+        return Meaning.of(
+            [v.VarName for v in variables],
+            [r.ConstrName for r in plain] + [r.QCName for r in products],
+            lower=model.getAttr("LB", variables),
+            upper=model.getAttr("UB", variables),
+            integer=[v.VType in "BI" for v in variables],
+            costs=model.getAttr("Obj", variables),
+            row_lower=np.where(senses == "<", -np.inf, limits),
+            row_upper=np.where(senses == ">", np.inf, limits),
+            quadratic=terms(
+                [entry[:2] for entry in square], [entry[2] for entry in square], indices=2, products=2
+            ),
+            matrix=matrix,
+            row_quadratic=cubes,
+        )
+
+
+def _rows(model: Any, plain: list[Any], products: list[Any]) -> tuple[Terms, Terms]:
+    sparse = model.getA().tocoo()
+    at, value = list(zip(sparse.row.tolist(), sparse.col.tolist(), strict=True)), sparse.data.tolist()
+    cubes: list[tuple[int, int, int]] = []
+    factors: list[float] = []
+    for place, row in enumerate(products, start=len(plain)):
+        expression = model.getQCRow(row)
+        for first, second, coefficient in _products(expression):
+            cubes.append((place, first, second))
+            factors.append(coefficient)
+        rest = expression.getLinExpr()
+        for term in range(rest.size()):
+            at.append((place, rest.getVar(term).index))
+            value.append(rest.getCoeff(term))
+    return terms(at, value, indices=2), terms(cubes, factors, indices=3, products=2)
+
+
+def _products(expression: Any) -> list[tuple[int, int, float]]:
+    return [
+        (expression.getVar1(term).index, expression.getVar2(term).index, expression.getCoeff(term))
+        for term in range(expression.size())
+    ]
+
+
+_STATUS = {
+    gurobipy.GRB.OPTIMAL: Status.OPTIMAL_GLOBAL,
+    gurobipy.GRB.INFEASIBLE: Status.INFEASIBLE,
+    gurobipy.GRB.INF_OR_UNBD: Status.INFEASIBLE,
+    gurobipy.GRB.TIME_LIMIT: Status.LIMIT_WITH_POINT,
+}
+
+
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+    """Its answer within the time."""
+    with _loaded(path) as model:
+        for option, value in (
+            ("TimeLimit", seconds), ("MIPGap", 0.0), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
+            ("OptimalityTol", 1e-9), ("IntFeasTol", 1e-9), ("BarConvTol", 1e-12), ("Threads", 1),
+        ):  # fmt: skip
+            model.setParam(option, value)
+        try:
+            model.optimize()
+        except gurobipy.GurobiError as error:
+            if error.errno == _SIZE_LIMIT:
+                raise TooLarge from error
+            raise Refused(f"Gurobi error {error.errno}: {error}") from error
+        status = _STATUS.get(model.Status, Status.ERROR)
+        variables = model.getVars()
+        names = [v.VarName for v in variables]
+        if not model.SolCount:
+            without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
+            return told(without, f"status {model.Status}")
+        values = model.getAttr("X", variables)
+        bound = model.ObjBound if model.IsMIP or model.IsQCP else None
+        return told(status, f"status {model.Status}", names, values, objective=model.ObjVal, bound=bound)

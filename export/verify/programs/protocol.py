@@ -1,0 +1,45 @@
+"""What the module of a program has, and what it raises.
+
+Which programs there are stands in the table of solvers.
+A program's module is imported in a child process only (worker.py). It has
+
+    version() -> str                                 of the program
+    read(path) -> Meaning                            the algebra of an LP or MPS file, where it tells it
+    evaluate(path, points) -> Evaluation             the behaviour of a file of another format
+    solve(path, seconds, solver) -> RawSolution      its answer, where it solves
+
+and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from ...solvers_table import PROGRAMS
+
+
+class Refused(Exception):  # noqa: N818 - it is an answer
+    """What a program says when it does not take a file."""
+
+
+class NotTold(Exception):  # noqa: N818 - it is an answer
+    """What a program read, but does not tell in a form that can be compared."""
+
+
+class TooLarge(Exception):  # noqa: N818 - it is an answer
+    """A file beyond the size of a program's free edition."""
+
+
+def executable(name: str) -> str:
+    """The path of a program's executable."""
+    return shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs
+
+
+def file_names(path: Path) -> tuple[list[str], list[str]]:
+    """Names of columns and of rows of an .nl file, from the .col and .row beside it.
+
+    That of the objective is left out.
+    """
+    columns, rows = (path.with_suffix(suffix).read_text().split() for suffix in (".col", ".row"))
+    return columns, [name for name in rows if name != "obj"]

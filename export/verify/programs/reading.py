@@ -1,0 +1,173 @@
+"""What a model file means to the program that read it, as plain arrays.
+
+Comparison.py says how that differs from the problem. Two forms. A `Meaning` is the algebra: costs, quadratic
+terms and rows by coefficient, as readers of LP and MPS give it. An `Evaluation` is the behaviour: values of
+objective and rows at points, as readers of .nl and GAMS give it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Final, Self, TypeVar
+
+import numpy as np
+
+from ....models.instance.grid import Bools, Floats, Ints
+from ...solutions.readers.text import RawSolution, Status
+from ...writing.terms import Terms, terms
+
+
+@dataclass(frozen=True, eq=False)
+class Meaning:
+    """A quadratic model: costs, limits and coefficients in the order of `columns` and `rows`.
+
+    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column);
+    row_quadratic at (row, i, j).
+    """
+
+    columns: list[str]
+    lower: Floats
+    upper: Floats
+    integer: Bools
+    costs: Floats
+    quadratic_at: Ints
+    quadratic: Floats
+    rows: list[str]
+    row_lower: Floats
+    row_upper: Floats
+    matrix_at: Ints
+    matrix: Floats
+    row_quadratic_at: Ints
+    row_quadratic: Floats
+
+    @classmethod
+    def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
+        """The model of these columns and rows.
+
+        `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out.
+        """
+        for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
+            found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
+            given |= {f"{name}_at": found.at, name: found.value}
+        arrays = {"integer": np.zeros(len(columns), dtype=bool)} | given
+        kinds = {name: bool if name == "integer" else None for name in arrays}
+        return cls(columns=columns, rows=rows, **{key: np.asarray(arrays[key], kinds[key]) for key in arrays})
+
+    def objective(self, points: Floats) -> Floats:
+        """The objective at points (k, columns)."""
+        first, second = self.quadratic_at.T
+        return points @ self.costs + (points[:, first] * points[:, second]) @ self.quadratic
+
+    def activities(self, points: Floats) -> Floats:
+        """The rows at points (k, columns), shape (k, rows)."""
+        values = np.zeros((len(points), len(self.rows)))
+        row, column = self.matrix_at.T
+        np.add.at(values.T, row, (points[:, column] * self.matrix).T)
+        row, first, second = self.row_quadratic_at.T
+        np.add.at(values.T, row, (points[:, first] * points[:, second] * self.row_quadratic).T)
+        return values
+
+    def ordered(self, columns: list[str], rows: list[str]) -> Meaning:
+        """The same model with its columns and rows in another order."""
+        c, r = places(self.columns, columns), places(self.rows, rows)
+        back_c, back_r = np.argsort(c), np.argsort(r)
+        per_column = {name: getattr(self, name)[c] for name in ("lower", "upper", "integer", "costs")}
+        per_row = {name: getattr(self, name)[r] for name in ("row_lower", "row_upper")}
+        matrix = np.stack([back_r[self.matrix_at[:, 0]], back_c[self.matrix_at[:, 1]]], axis=1)
+        cubes = np.column_stack([back_r[self.row_quadratic_at[:, 0]], back_c[self.row_quadratic_at[:, 1:]]])
+        return Meaning.of(
+            columns,
+            rows,
+            **per_column,
+            **per_row,
+            quadratic=terms(back_c[self.quadratic_at], self.quadratic, indices=2, products=2),
+            matrix=terms(matrix, self.matrix, indices=2),
+            row_quadratic=terms(cubes, self.row_quadratic, indices=3, products=2),
+        )
+
+
+def places(have: list[str], wanted: list[str]) -> Ints:
+    """Where each of the wanted names stands among those there are."""
+    number = {name: place for place, name in enumerate(have)}
+    return np.array([number[name] for name in wanted], dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
+
+    integer is None where the program does not tell it, discrete then counts them. What is not told of the
+    values is NaN. rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term
+    are left out.
+    """
+
+    columns: list[str]
+    lower: Floats
+    upper: Floats
+    integer: Bools | None
+    rows: list[str]
+    row_lower: Floats
+    row_upper: Floats
+    objective: Floats
+    activities: Floats
+    rounding: float = 0.0
+    may_lack: bool = False
+    discrete: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points by column name, values (k, columns); the first `random` of them are anywhere, the rest feasible.
+
+    objective: our values there (k,), for programs that judge a point instead of evaluating it.
+    """
+
+    names: list[str]
+    values: Floats
+    objective: Floats
+    random: int
+
+    def of(self, columns: list[str]) -> Floats:
+        """The points with their columns in that order."""
+        return self.values[:, places(self.names, columns)]
+
+
+def told(
+    status: Status,
+    words: str,
+    columns: Sequence[str] = (),
+    values: Sequence[float] | Floats = (),
+    *,
+    objective: float | None = None,
+    bound: float | None = None,
+) -> RawSolution:
+    """What a program answers through an interface of its own, in the form in which files are read."""
+    names = np.array([name.encode() for name in columns], dtype=np.bytes_)
+    return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
+
+
+_TOLD: Final = "the program itself"
+T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
+
+
+def save(given: Meaning | Evaluation | Points | RawSolution, path: Path) -> None:
+    """Write the arrays to a .npz."""
+    arrays: dict[str, Any] = {
+        name: np.asarray(value) for name, value in vars(given).items() if value is not None
+    }
+    np.savez(path, **arrays)
+
+
+def load(kind: type[T], path: Path) -> T:
+    """What `save` wrote."""
+    with np.load(path, allow_pickle=False) as archive:
+        values = {name: _plain(value) for name, value in archive.items()}
+    if "status" in values:
+        values["status"] = Status(values["status"])
+    return kind(**dict.fromkeys(field.name for field in fields(kind)) | values)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if value.ndim == 0 or value.dtype.kind == "U" else value

@@ -1,0 +1,209 @@
+"""SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
+
+A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
+variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is
+within a hair of ours when a hair more is feasible and a hair less is not.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version as installed
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyscipopt
+
+from ...solutions.readers.text import RawSolution, Status
+from ...writing.terms import Terms, terms
+from .protocol import Refused, file_names
+from .reading import Evaluation, Meaning, Points, told
+
+_INFINITY: Final = 1e19  # SCIP's is 1e20
+_CONSTANT: Final = "objconstvar"
+_OBJECTIVE_COLUMNS: Final = frozenset({"quadobjvar", "qmatrixvar", "nlobjvar", _CONSTANT})
+_OBJECTIVE_ROWS: Final = frozenset({"quadobj", "qmatrix", "objcons"})
+_HAIR: Final = 1e-5
+
+
+def version() -> str:
+    """Its version, and that of PySCIPOpt."""
+    return f"{pyscipopt.Model().version()} (PySCIPOpt {installed('pyscipopt')})"
+
+
+def _load(path: Path) -> Any:
+    scip = pyscipopt.Model()
+    scip.hideOutput()
+    try:
+        scip.readProblem(str(path))
+    except Exception as error:  # PySCIPOpt raises plain ones
+        raise Refused(f"SCIP cannot read it: {error}") from error
+    if scip.getObjectiveSense() != "minimize":
+        raise Refused("it is not minimised")
+    return scip
+
+
+def read(path: Path) -> Meaning:
+    """The LP or MPS file as SCIP reads it."""
+    scip = _load(path)
+    if scip.getObjoffset() != 0:
+        raise Refused("it has a constant beside ONE")
+    variables = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
+    rows = [row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS]
+    goals = [row for row in scip.getConss() if row.name in _OBJECTIVE_ROWS]
+    number = {v.name: place for place, v in enumerate(variables)}
+    matrix, cubes = _terms(scip, rows, number)
+    beside, squares = _terms(scip, goals, number)
+    if len(beside.value):
+        raise Refused("its quadratic objective has linear terms beside the costs")
+    lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in variables])
+    row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in rows])
+    return Meaning.of(
+        list(number),
+        [row.name for row in rows],
+        lower=lower,
+        upper=upper,
+        integer=[v.vtype() in {"BINARY", "INTEGER"} for v in variables],
+        costs=[v.getObj() for v in variables],
+        row_lower=row_lower,
+        row_upper=row_upper,
+        quadratic=Terms(squares.at[:, 1:], squares.value),
+        matrix=matrix,
+        row_quadratic=cubes,
+    )
+
+
+def _limits(ends: list[tuple[float, float]]) -> tuple[Any, Any]:
+    lower, upper = np.array(ends, dtype=float).reshape(-1, 2).T
+    return np.where(lower < -_INFINITY, -np.inf, lower), np.where(upper > _INFINITY, np.inf, upper)
+
+
+def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, Terms]:
+    """Linear and quadratic terms of rows; the variable that stands for the objective is left out."""
+    linear: list[tuple[int, int, float]] = []
+    square: list[tuple[int, int, int, float]] = []
+    for place, row in enumerate(rows):
+        if row.getConshdlrName() == "linear":
+            linear += [(place, number[name], value) for name, value in scip.getValsLinear(row).items()]
+            continue
+        if not scip.checkQuadraticNonlinear(row):
+            raise Refused(f"row {row.name} is not quadratic there")
+        products, squares, rest = scip.getTermsQuadratic(row)
+        square += [(place, number[a.name], number[b.name], value) for a, b, value in products]
+        square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
+        linear += [(place, number[v.name], cost) for v, _, cost in squares]
+        linear += [(place, number[v.name], value) for v, value in rest if v.name in number]
+    return (
+        terms([e[:2] for e in linear], [e[2] for e in linear], indices=2),
+        terms([e[:3] for e in square], [e[3] for e in square], indices=3, products=2),
+    )
+
+
+def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
+    """The columns of a file as SCIP reads them: whether each is discrete, and its bounds."""
+    scip = _load(path)  # its variables die with it
+    ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
+    lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
+    ends = zip(lower.tolist(), upper.tolist(), strict=True)
+    return {v.name: (v.vtype() != "CONTINUOUS", *end) for v, end in zip(ours, ends, strict=True)}
+
+
+def evaluate(path: Path, points: Points) -> Evaluation:
+    """The .nl or OSiL file as SCIP reads it: columns, linear rows, its judgement of the objective."""
+    scip = _load(path)
+    variables = {v.name: v for v in scip.getVars()}
+    rows = {row.name: row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS}
+    columns, row_names = file_names(path) if path.suffix == ".nl" else (points.names, list(rows))
+    ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS]
+    lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
+    row_lower, row_upper = _limits([_row_limits(scip, rows[name]) for name in row_names])
+    given = points.of(columns)
+    return Evaluation(
+        [v.name for v in ours],
+        lower,
+        upper,
+        np.array([v.vtype() != "CONTINUOUS" for v in ours]),
+        row_names,
+        row_lower,
+        row_upper,
+        _objective(scip, variables, columns, points),
+        np.column_stack(
+            [np.zeros((len(given), 0)), *(_activity(scip, rows[name], columns, given) for name in row_names)]
+        ),
+    )
+
+
+def _objective(scip: Any, variables: dict[str, Any], columns: list[str], points: Points) -> Any:
+    values = np.full(len(points.values), np.nan)
+    given = points.of(columns)
+    for place in range(points.random, len(given)):
+        values[place] = _agreed(scip, variables, columns, given[place], float(points.objective[place]))
+    return values
+
+
+def _row_limits(scip: Any, row: Any) -> tuple[float, float]:
+    return scip.getLhs(row), scip.getRhs(row)
+
+
+def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
+    if row.getConshdlrName() != "linear":
+        return np.full(len(given), np.nan)
+    value = scip.getValsLinear(row)
+    return given @ np.array([value.get(name, 0.0) for name in columns])
+
+
+def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float) -> float:
+    """The claimed objective at a feasible point when SCIP agrees to within a hair, else infinity."""
+    extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS - {_CONSTANT}]
+    rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
+    solution = scip.createSol()
+    if _CONSTANT in variables:
+        constant = variables[_CONSTANT].getLbOriginal()
+        scip.setSolVal(solution, variables[_CONSTANT], constant)
+        rest += constant
+    for name, value in zip(columns, point, strict=True):
+        scip.setSolVal(solution, variables[name], value)
+
+    def feasible(step: float) -> bool:
+        for variable in extra:
+            scip.setSolVal(solution, variable, claim - rest - scip.getObjoffset() + step)
+        return bool(scip.checkSol(solution, original=True))
+
+    hair = _HAIR * max(1.0, abs(claim))
+    if not extra:  # a linear objective is evaluated
+        value = scip.getSolObjVal(solution)
+        return value if feasible(0.0) else np.inf
+    return claim if feasible(hair) and not feasible(-hair) else np.inf
+
+
+_STATUS: Final = {
+    "optimal": Status.OPTIMAL_GLOBAL,
+    "gaplimit": Status.OPTIMAL_GLOBAL,
+    "infeasible": Status.INFEASIBLE,
+    "timelimit": Status.LIMIT_WITH_POINT,
+}
+
+
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+    """Its answer within the time."""
+    scip = _load(path)
+    for option, value in (
+        ("limits/time", seconds),
+        ("limits/gap", 0.0),
+        ("limits/absgap", 1e-9),
+        ("numerics/feastol", 1e-9),
+        ("numerics/dualfeastol", 1e-9),
+        ("misc/catchctrlc", False),
+    ):
+        scip.setParam(option, value)
+    scip.optimize()
+    words = scip.getStatus()
+    status = _STATUS.get(words, Status.ERROR)
+    if not scip.getNSols():
+        without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
+        return told(without, words, bound=scip.getDualbound())
+    best = scip.getBestSol()
+    ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
+    values = np.array([scip.getSolVal(best, v) for v in ours])
+    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound()}
+    return told(status, words, [v.name for v in ours], values, **numbers)

@@ -1,0 +1,125 @@
+"""Xpress as a consumer of LP and MPS, through its Python API. The community edition is limited in size."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+with warnings.catch_warnings(action="ignore"):  # it tells which licence it uses
+    import xpress
+
+from ...solutions.readers.text import RawSolution, Status
+from ...writing.terms import terms
+from .protocol import Refused, TooLarge
+from .reading import Meaning, told
+
+_INFINITY = 1e20
+_ROWS, _COLUMNS = 1, 2
+
+
+def version() -> str:
+    """Its version."""
+    return str(xpress.__version__)
+
+
+def _load(path: Path) -> Any:
+    with warnings.catch_warnings(action="ignore"):
+        model = xpress.problem()
+    model.setControl("outputlog", 0)
+    try:
+        model.readProb(str(path))
+    except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
+        _complain(error)
+    return model
+
+
+def _complain(error: Exception) -> None:
+    if "too many rows and columns" in str(error):
+        raise TooLarge from error
+    raise Refused(str(error)) from error
+
+
+def read(path: Path) -> Meaning:
+    """The file as Xpress reads it."""
+    model = _load(path)
+    if model.attributes.objsense != 1 or model.attributes.objrhs != 0:
+        raise Refused("it is not minimised, or has a constant beside ONE")
+    n, m = model.attributes.cols, model.attributes.rows
+    kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
+    start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
+    row = np.repeat(np.arange(m), np.diff(start))
+    cubes, factors = _row_products(model)
+    hessian = _hessian(model, n)
+    return Meaning.of(
+        list(model.getNameList(_COLUMNS, 0, n - 1)),
+        list(model.getNameList(_ROWS, 0, m - 1)),
+        lower=_infinite(model.getLB(0, n - 1)),
+        upper=_infinite(model.getUB(0, n - 1)),
+        integer=[kind in "BI" for kind in model.getColType(0, n - 1)],
+        costs=model.getObj(0, n - 1),
+        row_lower=np.where(kinds == "L", -np.inf, limits),
+        row_upper=np.where(kinds == "G", np.inf, limits),
+        quadratic=hessian,
+        matrix=terms(np.stack([row, column], axis=1), value, indices=2),
+        row_quadratic=terms(cubes, factors, indices=3, products=2),
+    )
+
+
+def _infinite(values: list[float]) -> Any:
+    given = np.array(values, dtype=float)
+    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
+
+
+def _hessian(model: Any, n: int) -> Any:
+    """The quadratic terms, from the upper triangle of x'Qx/2."""
+    start, column, value = (np.array(part) for part in model.getMQObj(0, n - 1))
+    row = np.repeat(np.arange(n), np.diff(start)) if len(value) else np.zeros(0, int)
+    halved = np.where(row == column, value / 2, value) if len(value) else np.zeros(0)
+    return terms(np.stack([row, column.astype(int)], axis=1), halved, indices=2, products=2)
+
+
+def _row_products(model: Any) -> tuple[list[tuple[int, int, int]], list[float]]:
+    """The products of rows, from one triangle of x'Qx."""
+    cubes: list[tuple[int, int, int]] = []
+    factors: list[float] = []
+    for row in model.getQRows():
+        first, second, value = model.getQRowQMatrixTriplets(row)
+        for i, j, q in zip(first, second, value, strict=True):
+            cubes.append((int(row), int(i), int(j)))
+            factors.append(q if i == j else 2 * q)
+    return cubes, factors
+
+
+_STATUS = {
+    "OPTIMAL": Status.OPTIMAL_GLOBAL,
+    "FEASIBLE": Status.LIMIT_WITH_POINT,
+    "INFEASIBLE": Status.INFEASIBLE,
+}
+
+
+def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+    """Its answer within the time."""
+    model = _load(path)
+    for option, value in (
+        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
+        ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
+    ):  # fmt: skip
+        model.setControl(option, value)
+    # Before the search: when it is cut short, the names are those of the presolved model, and the values of the whole one.
+    names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
+    try:
+        _, found = model.optimize()
+    except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
+        _complain(error)
+    words = str(found).removeprefix("SolStatus.")
+    status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
+    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
+        return told(status, words)
+    mixed = model.attributes.mipents or model.attributes.qconstraints
+    bound = model.attributes.bestbound if mixed else None
+    objective = model.attributes.objval
+    return told(status, words, names, model.getSolution(), objective=objective, bound=bound)

@@ -1,0 +1,475 @@
+"""Every written file handed to every free program: read, compared, evaluated, and on request solved.
+
+For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its
+format. What a program reads is compared with the problem by name: sense, constant, costs, quadratic terms,
+types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it: the point is
+checked against the problem, its energy computed again, and the optima of one problem compared with each other
+across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes
+silently: what was not tried is a finding, with its reason.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.errors import InputError
+from ...models.field.field import CrossField
+from ...models.formulations.problem import Problem
+from ...models.instance.grid import Floats
+from ...models.instance.instance import QUARTER
+from ...models.storage import read_bytes, sha256_of, write_bytes
+from ..bundle.manifest import Manifest, read_manifest
+from ..formats.registry import FORMATS, carried, generator
+from ..solutions.readers.text import RawSolution, Status, values_for
+from ..solutions.solution import ROUND
+from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
+from ..writing.names import column_names
+from .comparison import difference, evaluation_difference, names_of
+from .programs.reading import Evaluation, Meaning, Points, load, save
+from .programs.worker import Worker
+
+RESULT: Final = "verify.json"
+SEED: Final = 1
+RANDOM: Final = 4
+"""Random points at which files are evaluated."""
+FEASIBLE: Final = 2
+"""Complete points of random fields at which files are evaluated as well."""
+TOLERANCE: Final = 1e-6
+"""Relative difference up to which optima agree (absolute below 1)."""
+FEASIBLE_WITHIN: Final = 5e-6
+"""Violation up to which a point is feasible: solvers keep to 1e-6 in rows that they scale."""
+READING_SECONDS: Final = 60.0
+
+
+class Verdict(StrEnum):
+    """How a file fared with a consumer."""
+
+    AGREES = "agrees"
+    LIMIT = "time limit"
+    REFUSED = "refused, as stated"
+    NOT_TRIED = "not tried"
+    DIFFERS = "differs"
+    FAILED = "failed"
+
+
+_BAD: Final = frozenset({Verdict.DIFFERS, Verdict.FAILED})
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What became of a file at a consumer: reading it, or solving it with one of its solvers.
+
+    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound;
+    energy: the objective again, with every other column at the value that follows from angles and jumps.
+    group: where it is equal, so is the optimum; relaxes: the group of which the file holds a relaxation,
+    whose optimum is no higher.
+    """
+
+    problem: str
+    file: str
+    consumer: str
+    step: str
+    verdict: Verdict
+    reason: str = ""
+    objective: float | None = None
+    bound: float | None = None
+    energy: float | None = None
+    seconds: float | None = None
+    proven: bool = False
+    group: str = ""
+    relaxes: str = ""
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All findings, the versions of the programs that took part, and how to install those that are absent."""
+
+    folder: Path
+    findings: list[Finding] = field(default_factory=list)
+    versions: dict[str, str] = field(default_factory=dict)
+    absent: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def bad(self) -> list[Finding]:
+        """The findings that should not be."""
+        return [finding for finding in self.findings if finding.verdict in _BAD]
+
+    @property
+    def ok(self) -> bool:
+        """Whether no consumer differs or failed."""
+        return not self.bad
+
+    def document(self) -> dict[str, Any]:
+        """The content of verify.json."""
+        return {
+            "format": "crossfield-verification",
+            "version": 1,
+            "generator": generator(),
+            "ok": self.ok,
+            "versions": self.versions,
+            "absent": self.absent,
+            "findings": [
+                {key: value for key, value in asdict(each).items() if value not in (None, "")}
+                for each in self.findings
+            ],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class _Subject:
+    """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
+
+    manifest: Manifest
+    problem: Problem
+    held: Problem
+    name: str
+    format: str
+    path: Path
+    points: Path
+
+    def finding(
+        self, consumer: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any
+    ) -> Finding:
+        own, of = self.held.sha256[:16], self.problem.sha256[:16]
+        group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
+        return Finding(
+            _title(self.problem),
+            self.name,
+            consumer,
+            step,
+            verdict,
+            reason,
+            **numbers,
+            group=group,
+            relaxes=relaxes,
+        )
+
+
+def _title(problem: Problem) -> str:
+    return f"{problem.instance.name} {problem.name}"
+
+
+def verify(
+    folder: str | Path,
+    *,
+    seconds: float | None = None,
+    consumers: list[str] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Verification:
+    """What became of all the files in a folder at all the consumers that are here.
+
+    Also written there as verify.json. seconds: for each solve; None: nothing is solved. consumers: names, all
+    by default. progress: called with each file and consumer. Raises InputError when the folder holds no
+    manifest, and what reading manifests raises.
+    """
+    folder = Path(folder)
+    wanted = [PROGRAMS[name] for name in consumers or PROGRAMS]
+    manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
+    if not manifests:
+        raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
+    found = Verification(folder, absent={each.name: each.install for each in wanted if not each.present})
+    with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
+        subjects, broken = _subjects(manifests, Path(temporary))
+        found.findings.extend(broken)
+        for consumer in (each for each in wanted if each.present):
+            chosen = [subject for subject in subjects if subject.format in consumer.formats]
+            with Worker(consumer.name, Path(temporary) / consumer.name) as worker:
+                bench = _Bench(consumer, worker, Path(temporary) / consumer.name / "result.npz", seconds)
+                found.versions[consumer.name] = worker.ask({"step": "version"}, READING_SECONDS)["words"]
+                for subject in chosen:
+                    progress(f"{subject.name}: {consumer.title}")
+                    found.findings.extend(bench.findings(subject))
+    found.findings[:] = compared(found.findings)
+    write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
+    return found
+
+
+def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject], list[Finding]]:
+    """The files that are as the manifests say, and findings about those that are not."""
+    subjects: list[_Subject] = []
+    broken: list[Finding] = []
+    for number, manifest in enumerate(manifests):
+        problem = manifest.problem()
+        place = temporary / f"set{number}"
+        place.mkdir()
+        for entry in manifest.document["files"]:
+            source = manifest.folder / entry["name"]
+            if not source.is_file() or sha256_of(source) != entry["sha256"]:
+                words = "is not the file that the manifest describes; export again"
+                broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.FAILED, words))
+                continue
+            path = _unpacked(source, place)
+            if path.suffix == FORMATS[entry["format"]].suffix:
+                held = carried(problem, FORMATS[entry["format"]])
+                if entry["lifted"] != held.formulation.lifted:
+                    said, holds = entry["lifted"], held.formulation.lifted
+                    words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
+                    broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
+                points = place / f"points_{len(held.blocks)}.npz"
+                if not points.exists():
+                    save(_points(held), points)
+                subjects.append(
+                    _Subject(
+                        manifest,
+                        problem,
+                        held,
+                        entry["name"],
+                        entry["format"],
+                        path,
+                        points,
+                    )
+                )
+    return subjects, broken
+
+
+def _unpacked(source: Path, folder: Path) -> Path:
+    """A plain copy of the file."""
+    path = folder / source.name.removesuffix(".gz")
+    if source.suffix == ".gz":
+        path.write_bytes(gzip.decompress(read_bytes(source)))
+    else:
+        shutil.copyfile(source, path)
+    return path
+
+
+def _points(problem: Problem) -> Points:
+    """Points anywhere, then complete points of random fields, which keep bounds, rows and integrality."""
+    rng = np.random.default_rng(SEED)
+    anywhere = rng.normal(size=(RANDOM, problem.columns))
+    feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
+    values = np.concatenate([anywhere, np.array(feasible)])
+    objective = np.array([problem.objective_value(point) for point in values])
+    return Points(names_of(column_names(problem)), values, objective, RANDOM)
+
+
+def random_field(problem: Problem, seed: int) -> CrossField:
+    """A random field on the problem's instance within all bounds; jumps that are data are kept."""
+    rng, instance = np.random.default_rng(seed), problem.instance
+    alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
+    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
+    jumps = rng.integers(instance.p_min, instance.p_max + 1).astype(np.int32)
+    return CrossField(instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    """A consumer at work: its child process, where that leaves arrays, and seconds for a solve."""
+
+    program: Program
+    worker: Worker
+    result: Path
+    seconds: float | None
+    solved: set[tuple[str, str]] = field(default_factory=set)
+
+    def findings(self, subject: _Subject) -> Iterator[Finding]:
+        """What the consumer makes of a file: of reading it, and of each of its solvers.
+
+        Two files of the same problem are solved once.
+        """
+        read = self._read(subject)
+        yield read
+        if self.seconds is None:
+            return
+        for solver in self.program.solvers:
+            key = (solver, subject.held.sha256)
+            if read.verdict in {Verdict.AGREES, Verdict.NOT_TRIED} and key not in self.solved:
+                self.solved.add(key)
+                yield self._solve(subject, solver)
+
+    def _ask(self, subject: _Subject, step: str, seconds: float, **more: Any) -> dict[str, Any]:
+        self.result.unlink(missing_ok=True)
+        task = {
+            "step": step,
+            "path": str(subject.path),
+            "points": str(subject.points),
+            "result": str(self.result),
+        }
+        return self.worker.ask(task | {"seconds": seconds} | more, seconds)
+
+    def _read(self, subject: _Subject) -> Finding:
+        algebra = subject.format in self.program.algebra
+        refusal = _refusal(self.program.name, subject, "read")
+        answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
+        if answer["kind"] != "done":
+            return self._unread(subject, answer, refusal)
+        if refusal:
+            words = f"it was read, though {refusal}"
+            return subject.finding(self.program.name, "read", Verdict.DIFFERS, words)
+        points = load(Points, subject.points)
+        if algebra:
+            model = load(Meaning, self.result)
+            wrong = difference(model, subject.held, self.program.tolerance, points.values)
+        else:
+            wrong = evaluation_difference(load(Evaluation, self.result), subject.held, points)
+        return subject.finding(self.program.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong)
+
+    def _unread(self, subject: _Subject, answer: dict[str, Any], refusal: str) -> Finding:
+        if answer["kind"] == "too large":
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
+        if answer["kind"] == "not told":
+            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, answer["words"])
+        if answer["kind"] == "refused" and refusal:
+            return subject.finding(self.program.name, "read", Verdict.REFUSED, refusal)
+        return subject.finding(self.program.name, "read", Verdict.FAILED, answer["words"])
+
+    def _too_large(self, subject: _Subject) -> str:
+        held = subject.held
+        return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
+
+    def _solve(self, subject: _Subject, solver: str) -> Finding:
+        refusal = _refusal(solver, subject, "solve")
+        if refusal:
+            return subject.finding(solver, "solve", Verdict.REFUSED, refusal)
+        local = _refusal(solver, subject, "local")
+        if local:
+            return subject.finding(solver, "solve", Verdict.NOT_TRIED, local)
+        if missing := SOLVERS[solver].missing:
+            reason = f"{SOLVERS[solver].title} is not installed: {missing}"
+            return subject.finding(solver, "solve", Verdict.NOT_TRIED, reason)
+        assert self.seconds is not None
+        begin = time.perf_counter()
+        answer = self._ask(subject, "solve", self.seconds, solver=solver)
+        if answer["kind"] == "too large":
+            return subject.finding(solver, "solve", Verdict.NOT_TRIED, self._too_large(subject))
+        if answer["kind"] != "done":
+            return subject.finding(solver, "solve", Verdict.FAILED, answer["words"])
+        return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
+
+
+def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
+    """Why the solver refuses at that stage, as the table of solvers states it; empty when it does not."""
+    refusal = SOLVERS[solver].refusal(subject.held, stage) if solver in SOLVERS else None
+    return "" if refusal is None else refusal.reason
+
+
+def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Finding:
+    """What a solver's answer is worth: its point checked, objective and energy computed again."""
+    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
+    if not len(answer.values):
+        limit = answer.status == Status.LIMIT_WITHOUT_POINT
+        verdict = Verdict.LIMIT if limit else Verdict.FAILED
+        return subject.finding(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
+    point, wrong = _point(held, answer)
+    objective = held.objective_value(point)
+    energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
+    numbers |= {"objective": objective, "energy": energy}
+    worst = held.violation(point)
+    if not wrong and worst.worst > FEASIBLE_WITHIN:
+        wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
+    proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+    claim = answer.objective
+    if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
+        # Before the end a solver's own variable for it may be loose.
+        wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
+    wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
+    if wrong:
+        return subject.finding(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
+    return subject.finding(
+        solver,
+        "solve",
+        Verdict.AGREES if proven else Verdict.LIMIT,
+        "" if proven else answer.message,
+        proven=proven,
+        **numbers,
+    )
+
+
+def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
+    """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
+    options = problem.formulation.options
+    if (
+        options.relax or options.facet == "printed"
+    ):  # then z need not be p1 beta, and the field is another point
+        return ""
+    if same(energy, objective) or (not proven and energy < objective):
+        return ""
+    return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or abs(value) >= 1e19 else float(value)
+
+
+def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
+    """The point by name, integers rounded; a column that the solver does not tell is at zero.
+
+    And what is wrong with it.
+    """
+    names = np.array([name.encode() for name in names_of(column_names(problem))])
+    values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
+    point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
+    return np.where(
+        problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point
+    ), wrong
+
+
+def same(first: float, second: float) -> bool:
+    """Whether two optima agree."""
+    return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
+
+
+def compared(findings: list[Finding]) -> list[Finding]:
+    """The findings; solves whose optimum or bound contradicts the best of their problem are different."""
+    return [_against(finding, findings) for finding in findings]
+
+
+def _against(finding: Finding, findings: list[Finding]) -> Finding:
+    if finding.step != "solve" or finding.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
+        return finding
+    wrong = _beside_others(finding, findings) or _above_what_it_relaxes(finding, findings)
+    if wrong:
+        return replace(finding, verdict=Verdict.DIFFERS, reason=wrong)
+    return replace(finding, reason=_as_relaxation(finding, findings)) if finding.relaxes else finding
+
+
+def _beside_others(finding: Finding, findings: list[Finding]) -> str:
+    """How a proven optimum or a bound contradicts the best point of the same problem.
+
+    Empty when it does not.
+    """
+    best = _best(findings, finding.group)
+    if best is None:
+        return ""
+    if finding.proven and finding.objective is not None and not same(finding.objective, best):
+        return f"its optimum is {finding.objective:.9g}, another has {best:.9g}"
+    if finding.bound is not None and finding.bound > best and not same(finding.bound, best):
+        return f"its bound {finding.bound:.9g} is above a point of {best:.9g}"
+    return ""
+
+
+def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
+    """How the proven optimum of a relaxation lies above a point of the problem itself.
+
+    Empty when it does not.
+    """
+    best = _best(findings, finding.relaxes)
+    lower = finding.objective if finding.proven else finding.bound
+    if best is None or lower is None or lower <= best or same(lower, best):
+        return ""
+    return f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {best:.9g}"
+
+
+def _as_relaxation(finding: Finding, findings: list[Finding]) -> str:
+    """What is told of the solve of a relaxation, beside the best point of the problem itself, if any."""
+    best, told = _best(findings, finding.relaxes), f"; {finding.reason}" if finding.reason else ""
+    beside = (
+        f", no higher than {best:.9g} of the problem itself" if best is not None and finding.proven else ""
+    )
+    return f"a relaxation: products lifted without integrality{beside}{told}"
+
+
+def _best(findings: list[Finding], group: str) -> float | None:
+    """The least objective that was found in a group."""
+    values = [each.objective for each in findings if each.group == group and each.objective is not None]
+    return min(values, default=None)

@@ -1,0 +1,148 @@
+"""The canonical form between a problem and what writes its files or reads their answers.
+
+Which columns the files have (ONE among them), of which kind they are, what they cost, what limits the rows,
+in which order each kind of file lists the columns: every answer is given here, once. MathOptInterface's
+bridges and linopy's `matrices` are the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from ...models.formulations.problem import Block, Coefficient, Problem, Term
+from ...models.instance.grid import Bools, Floats, Ints
+from .glpk_order import glpk_order
+from .names import Names
+from .nl_layout import Layout
+from .records import Texts, check_coefficients, of_bytes
+
+Kind = Literal["continuous", "binary", "integer"]
+
+Order = Literal["nl", "lp", "mps", "mod"]
+"""Kinds of files by the order of their columns: .nl has one of its own, LP and MPS put ONE first and last,
+and of a .mod GLPK numbers the columns as it meets them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Canonical:
+    """A problem as files hold it, with products lifted where the format needs that (`registry.carried`)."""
+
+    problem: Problem
+
+    @cached_property
+    def names(self) -> Names:
+        """Names of columns and rows as pieces of records."""
+        return Names(self.problem)
+
+    @cached_property
+    def column_names(self) -> Texts:
+        """Names of the problem's columns, shape (columns,)."""
+        return of_bytes(self.names.all.table)
+
+    @cached_property
+    def constant(self) -> float:
+        """The constant of the objective."""
+        return float(self.problem.merged_objective(0)[1][0])
+
+    @property
+    def has_one(self) -> bool:
+        """Whether LP and MPS have the column ONE, fixed to 1.
+
+        They have it for a constant, which is its cost, and for a model without rows, whose only row is
+        `c_ONE: ONE = 1`.
+        """
+        return not self.problem.rows or self.constant != 0
+
+    @property
+    def column_count(self) -> int:
+        """Number of columns of LP and MPS."""
+        return self.problem.columns + self.has_one
+
+    @cached_property
+    def costs(self) -> Floats:
+        """Cost of every column, shape (columns,), zero for most.
+
+        Raises UnsupportedByFormatError for an extreme one.
+        """
+        index, coefficient = self.problem.merged_objective(1)
+        costs = np.zeros(self.problem.columns)
+        costs[index[:, 0]] = coefficient
+        check_coefficients(coefficient, "the objective")
+        return costs
+
+    def products(self) -> tuple[Ints, Floats]:
+        """The objective's products: columns (k, 2) and coefficients (k,).
+
+        Raises UnsupportedByFormatError for an extreme one.
+        """
+        index, coefficient = self.problem.merged_objective(2)
+        check_coefficients(coefficient, "the objective")
+        return index, coefficient
+
+    @cached_property
+    def binary(self) -> Bools:
+        """True for binary columns: integers with exactly the bounds [0, 1], shape (columns,).
+
+        The header of an .nl file counts more columns as binary: `layout.binary`.
+        """
+        return np.concatenate([block.integer & _zero_to_one(block) for block in self.problem.blocks.values()])
+
+    def kind(self, block: Block) -> Kind:
+        """The kind of a block of columns; binary only when all of them are."""
+        if not block.integer:
+            return "continuous"
+        return "binary" if _zero_to_one(block).all() else "integer"
+
+    def blocks(self, kind: Kind) -> list[Block]:
+        """The blocks of a kind that have columns, in order."""
+        return [block for block in self.problem.blocks.values() if block.count and self.kind(block) == kind]
+
+    @cached_property
+    def row_lower(self) -> Floats:
+        """Left sides of all rows, constants moved there, -inf where there is none, shape (rows,)."""
+        return self._sides("<=", -np.inf)
+
+    @cached_property
+    def row_upper(self) -> Floats:
+        """Right sides of all rows, inf where there is none, shape (rows,)."""
+        return self._sides(">=", np.inf)
+
+    def _sides(self, without: str, infinity: float) -> Floats:
+        sides = [
+            np.full(family.count, infinity) if family.family.sense == without else family.limit
+            for family in self.problem.rows
+        ]
+        return np.concatenate([np.zeros(0), *sides]) + 0.0
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Order of columns and rows in the .nl file."""
+        return Layout(self.problem)
+
+    def order(self, file: Order) -> Ints:
+        """The problem's column at each place of a file; ONE is the number after its last column."""
+        if file == "nl":
+            return self.layout.order
+        if file == "mod":
+            return glpk_order(self.problem)
+        own, one = np.arange(self.problem.columns, dtype=np.int32), [self.problem.columns] * self.has_one
+        return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
+
+    def row_count(self, file: Order) -> int:
+        """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
+        return self.problem.row_count + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
+
+
+def _zero_to_one(block: Block) -> Bools:
+    found: Bools = (block.lower == 0) & (block.upper == 1)
+    return found
+
+
+def coefficient(term: Term) -> Coefficient:
+    """The coefficient of a term of a row. Raises UnsupportedByFormatError for an extreme one."""
+    check_coefficients(term.coefficient, f"row family {term.family.family.tag}")
+    return term.coefficient

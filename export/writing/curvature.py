@@ -1,0 +1,95 @@
+"""Curvature of objective and rows, from the declaration, and QPLIB's three letters that sum it up."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ...models.formulations.problem import Bound, Problem
+from .canonical import Canonical
+
+NEGLIGIBLE: Final = 1e-9
+"""An eigenvalue this small beside the largest counts as zero."""
+
+
+def of_objective(problem: Problem) -> tuple[str, str]:
+    """Curvature of the objective (linear, convex, indefinite or nonconvex) and how it is known."""
+    degree = problem.objective_degree
+    if degree <= 1:
+        return "linear", "the objective is linear: its Hessian is zero"
+    if degree > 2:
+        kind = "a cosine of integers" if degree == 99 else f"products of p1 and skews, degree {degree}"
+        return "nonconvex", f"the objective holds {kind}: its Hessian is not constant"
+    if all(_is_convex(family) for family in problem.objective):
+        return (
+            "convex",
+            "a sum of squares of linear expressions with positive weights: no eigenvalue is negative",
+        )
+    return "indefinite", "the objective holds products that are no squares"
+
+
+def _is_convex(family: Bound) -> bool:
+    """Whether each summand of a quadratic family has a Hessian without negative eigenvalue."""
+    products = family.of_degree(2)
+    if not products:
+        return True
+    values = np.stack([np.broadcast_to(term.coefficient, (family.count,)) for term in products], axis=1)
+    values = values[:1] if (values == values[0]).all() else values
+    hessian = np.zeros((len(values), len(family.variables), len(family.variables)))
+    for term, value in zip(products, values.T, strict=True):
+        first, second = map(family.variables.index, term.symbols)
+        hessian[:, first, second] += value
+        hessian[:, second, first] += value
+    found = np.linalg.eigvalsh(hessian)
+    return bool((found[:, 0] >= -NEGLIGIBLE * np.maximum(found[:, -1], 0.0)).all())
+
+
+def of_rows(problem: Problem) -> str:
+    """Curvature of the rows: none, linear, convex, indefinite or nonconvex."""
+    if not problem.rows:
+        return "none"
+    if problem.row_degree <= 1:
+        return "linear"
+    curved = [family for family in problem.rows if family.degree > 1]
+    if problem.row_degree > 2:
+        return "nonconvex"
+    return (
+        "convex"
+        if all(family.family.sense == "<=" and _is_convex(family) for family in curved)
+        else "indefinite"
+    )
+
+
+def probtype(problem: Problem) -> str | None:
+    """QPLIB's three letters, of objective, variables and constraints; None for what is beyond quadratic.
+
+    L linear, D convex and diagonal, C convex, Q any; C continuous, B binary, M with binaries, I integer, G
+    with integers; N none, B bounds, L linear, C convex, Q any.
+    """
+    if max(problem.objective_degree, problem.row_degree) > 2:
+        return None
+    return _objective_letter(problem) + _variables_letter(problem) + _constraints_letter(problem)
+
+
+def _objective_letter(problem: Problem) -> str:
+    kind, _ = of_objective(problem)
+    if kind == "convex":
+        index, _ = problem.merged_objective(2)
+        return "D" if (index[:, 0] == index[:, 1]).all() else "C"
+    return {"linear": "L"}.get(kind, "Q")
+
+
+def _variables_letter(problem: Problem) -> str:
+    binary, integer = Canonical(problem).binary, problem.integer
+    if not integer.any():
+        return "C"
+    if (binary == integer).all():
+        return "B" if integer.all() else "M"
+    return "I" if integer.all() and not binary.any() else "G"
+
+
+def _constraints_letter(problem: Problem) -> str:
+    bounded = bool(np.isfinite(problem.lower).any() or np.isfinite(problem.upper).any())
+    kinds = {"none": "B" if bounded else "N", "linear": "L", "convex": "C"}
+    return kinds.get(of_rows(problem), "Q")

@@ -1,0 +1,128 @@
+"""Expressions of a declaration as text, in their factored form: one walk for every algebraic language.
+
+The walk knows precedence, signs and brackets. A language says how symbols, constants and powers look. What
+holds no variable is *data*: the walk hands its largest such pieces over as a whole, so that a language may
+print them or evaluate them. The result is a list of pieces, bytes for what all records share and parts
+(records.py) for what differs.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import sympy as sp
+
+from ...models.formulations.problem import Bound
+from ...models.formulations.symbols import SCALARS, VARIABLES
+from .records import Piece, Pieces
+
+
+class Language(ABC):
+    """How an algebraic language writes the leaves of an expression."""
+
+    @abstractmethod
+    def symbol(self, symbol: sp.Symbol) -> Piece:
+        """A symbol."""
+
+    @abstractmethod
+    def is_data(self, expression: sp.Expr) -> bool:
+        """Whether an expression is handed to `constant` and `coefficient` as a whole."""
+
+    @abstractmethod
+    def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """A summand that is data: with its sign and a blank (`- 3`), or with negative numbers in brackets."""
+
+    @abstractmethod
+    def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
+        """A factor that is data, signed or bracketed like `constant`."""
+
+    @abstractmethod
+    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
+        """The power of a base (not bracketed) with an exponent of at least 2."""
+
+    def expression(self, expression: sp.Expr) -> list[Piece]:
+        """An expression; its first term has a sign only when it is negative."""
+        terms = self._terms(expression)
+        return [piece for place, term in enumerate(terms) for piece in self._term(term, signed=place > 0)]
+
+    def alone(self, expression: sp.Expr) -> list[Piece]:
+        """An expression that is no part of another: a negative number needs no brackets."""
+        negative = not expression.free_symbols and expression.is_negative
+        return [b"-", *self.expression(-expression)] if negative else self.expression(expression)
+
+    def summands(self, expression: sp.Expr) -> list[list[Piece]]:
+        """The terms of an expression, each with its sign."""
+        return [self._term(term, signed=True) for term in self._terms(expression)]
+
+    def _terms(self, expression: sp.Expr) -> list[sp.Expr]:
+        """Its terms in a fixed order, those that are data as one, in the place of their first."""
+        terms = expression.as_ordered_terms()
+        data = [term for term in terms if self.is_data(term)]
+        merged = sp.Add(*data)
+        return (
+            [merged if term is data[0] else term for term in terms if term not in data[1:]] if data else terms
+        )
+
+    def _term(self, term: sp.Expr, *, signed: bool) -> list[Piece]:
+        if self.is_data(term):
+            constant = self.constant(term, signed=signed)
+            return [b" ", constant] if signed else [constant]
+        number, symbol = term.as_coeff_Mul()
+        if symbol.is_Symbol and number.is_Rational and number.p == 1 < number.q:
+            return [*self._term(symbol, signed=signed), f"/{number.q}".encode()]
+        factors = sorted(term.as_ordered_factors(), key=_rank)
+        coefficient = sp.Mul(*(factor for factor in factors if self.is_data(factor)))
+        rest = [self._factor(factor) for factor in factors if not self.is_data(factor)]
+        product = [piece for place, factor in enumerate(rest) for piece in ([b"*"] if place else []) + factor]
+        return self._lead(coefficient, signed=signed) + product
+
+    def _lead(self, coefficient: sp.Expr, *, signed: bool) -> list[Piece]:
+        """What stands before the variables of a term: its sign and its coefficient, 1 left out."""
+        if abs(coefficient) == 1:
+            minus = coefficient == -1
+            return [b" - " if minus else b" + "] if signed else [b"-"] * minus
+        number = self.coefficient(coefficient, signed=signed)
+        return [b" ", number, b"*"] if signed else [number, b"*"]
+
+    def _factor(self, factor: sp.Expr) -> list[Piece]:
+        if factor.is_Symbol:
+            return [self.symbol(factor)]
+        if factor.is_Add:
+            return [b"(", *self.expression(factor), b")"]
+        if factor.is_Pow and factor.exp.is_Integer and factor.exp >= 2:
+            return self.power(self.expression(factor.base), int(factor.exp))
+        if isinstance(factor, sp.cos | sp.floor):
+            return [f"{factor.func.__name__}(".encode(), *self.expression(factor.args[0]), b")"]
+        raise AssertionError(f"no declaration holds {factor.func}")
+
+
+def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
+    """Order of the factors of a product: weights, data, variables, and then what is no symbol."""
+    return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
+
+
+def is_data(family: Bound, expression: sp.Expr) -> bool:
+    """Whether an expression of a family holds no column."""
+    return not expression.free_symbols & set(family.variables)
+
+
+def split(family: Bound, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
+    """A sum or a product in two: its data as one expression (or None), and its other parts in order."""
+    data = [part for part in chain.args if is_data(family, part)]
+    others = [part for part in chain.args if part not in data]
+    return (chain.func(*data) if data else None), others
+
+
+def wrapped(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
+    """The summands with line breaks between them, so that a line grows little beyond `width` bytes."""
+    pieces: list[Piece] = []
+    used = 0
+    for summand in summands:
+        size = sum(len(piece) if isinstance(piece, bytes) else piece.width for piece in summand)
+        if used and used + size > width:
+            pieces.append(b"\n" + indent)
+            used = len(indent)
+        pieces += summand
+        used += size
+    return pieces

@@ -1,0 +1,364 @@
+"""Blocks of equal records as bytes: one template, holes filled by NumPy, no Python per record.
+
+A record is a list of parts: literal bytes, words from a table (names, numbers) or decimal integers. A block
+of records is a matrix of bytes, one row a record. Literals are laid out once; a hole is filled for all
+records of the block by one strided copy of whole words. Where the words of a block differ in length they are
+padded with NUL, and the padding is dropped in one step; names of one family all have one length, so that most
+blocks have none. Memory is one block however many records there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.errors import UnsupportedByFormatError
+from ...models.formulations.monomials import ranked
+from ...models.instance.grid import Bools, Floats
+
+Bytes = NDArray[np.uint8]
+Cells = NDArray[Any]
+"""Words of equal length, one item each."""
+Texts = NDArray[np.bytes_]
+
+BLOCK: Final = 8192
+"""Records per block: their bytes stay in the processor's cache."""
+
+LEAST: Final = 1e-9
+MOST: Final = 1e15
+"""Readers drop or refuse coefficients outside (LEAST, MOST): docs/format-rules.md, W5 and M23."""
+
+_FEW: Final = 100
+"""Whole numbers within so small a range are numbered without sorting."""
+
+
+class Part(Protocol):
+    """A hole of a record, filled for the records start..stop."""
+
+    @property
+    def width(self) -> int:
+        """Bytes of the longest one."""
+
+    def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
+        """The bytes of these records, one item each, and whether some are padded with NUL."""
+
+
+@dataclass(frozen=True, eq=False)
+class Words:
+    """Words of a table (k, width), one per record by its code; without codes the records are the words in order."""
+
+    table: Bytes
+    codes: NDArray[Any] | None
+
+    @property
+    def width(self) -> int:
+        """Bytes of the longest word."""
+        return int(self.table.shape[1])
+
+    @cached_property
+    def _padded(self) -> bool:
+        return bool((self.table[:, -1] == 0).any())
+
+    @cached_property
+    def _words(self) -> Cells:
+        return as_cells(np.ascontiguousarray(self.table))
+
+    def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
+        """The words of these records."""
+        chosen = self._words[start:stop] if self.codes is None else self._words.take(self.codes[start:stop])
+        return chosen, self._padded
+
+    def at(self, codes: NDArray[Any]) -> Words:
+        """The same table, read through other codes."""
+        return Words(self.table, codes if self.codes is None else self.codes[codes])
+
+
+@dataclass(frozen=True, eq=False)
+class Decimals:
+    """Integers >= 0 in decimal, one per record, without leading zeros."""
+
+    values: NDArray[Any]
+
+    @property
+    def width(self) -> int:
+        """Digits of the largest value."""
+        return len(str(int(self.values.max(initial=0))))
+
+    def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
+        """The digits of these records; no padding where all have the same number of digits, as most blocks do."""
+        values = self.values[start:stop]
+        width, least = len(str(int(values.max()))), len(str(int(values.min())))
+        out = digits(values, width)
+        for place in range(width - least):
+            out[values < 10 ** (width - 1 - place), place] = 0
+        return as_cells(out), least < width
+
+
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """Values in their own little-endian bytes, one per record: for binary files."""
+
+    values: NDArray[Any]
+
+    @property
+    def width(self) -> int:
+        """Bytes of one value."""
+        return int(self.values.dtype.itemsize)
+
+    def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
+        """These values."""
+        return self.values[start:stop], False
+
+
+@dataclass(frozen=True, eq=False)
+class Tagged:
+    """Words after a tag that all records share: names of one family."""
+
+    tag: bytes
+    words: Words
+
+    @property
+    def width(self) -> int:
+        """Bytes of the longest one."""
+        return len(self.tag) + self.words.width
+
+    def at(self, codes: NDArray[Any]) -> Tagged:
+        """The same names, read through other codes."""
+        return Tagged(self.tag, self.words.at(codes))
+
+
+Piece = bytes | Part | Tagged
+Pieces = Sequence[Piece]
+
+
+@dataclass(frozen=True, eq=False)
+class OnlyWhere:
+    """Pieces that only some records have."""
+
+    present: Bools
+    pieces: Pieces
+
+
+def render(parts: Sequence[Piece | OnlyWhere], count: int, *, padded: bool = True) -> Iterator[bytes]:
+    """The bytes of `count` records, block by block. padded: drop NUL bytes (never for binary records)."""
+    if count == 0 or not parts:
+        return
+    template = _Template(parts)
+    for start in range(0, count, BLOCK):
+        line, gaps = template.line(start, min(start + BLOCK, count))
+        yield line[line != 0].tobytes() if padded and gaps else line.tobytes()
+
+
+def filled(parts: Pieces, count: int) -> Bytes:
+    """The records as a matrix of bytes (count, width), padding kept."""
+    if count == 0:
+        return np.zeros(
+            (0, sum(len(part) if isinstance(part, bytes) else part.width for part in parts)), np.uint8
+        )
+    return _Template(parts).line(0, count)[0].reshape(count, -1)
+
+
+class _Template:
+    """The pieces of a record, and the matrix of bytes of the block at hand: literals stay, holes are filled anew.
+
+    A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
+    which is rare.
+    """
+
+    def __init__(self, parts: Sequence[Piece | OnlyWhere]) -> None:
+        self._pieces: list[bytes | Part] = []
+        self._optional: list[tuple[slice, Bools]] = []
+        for part in parts:
+            first = len(self._pieces)
+            for piece in part.pieces if isinstance(part, OnlyWhere) else (part,):
+                self._pieces += (piece.tag, piece.words) if isinstance(piece, Tagged) else (piece,)
+            if isinstance(part, OnlyWhere):
+                self._optional.append((slice(first, len(self._pieces)), part.present))
+        self._parts = {id(piece): piece for piece in self._pieces if not isinstance(piece, bytes)}
+        self._widths: list[int] = []
+
+    def line(self, start: int, stop: int) -> tuple[Bytes, bool]:
+        """The bytes of these records in a row, and whether there are NUL bytes to drop."""
+        cells, padded = {}, False
+        for key, part in self._parts.items():
+            cells[key], gaps = part.cells(start, stop)
+            padded |= gaps
+        self._lay_out(cells, stop - start)
+        for hole, key in self._holes:
+            hole[: stop - start] = cells[key]
+        present = [where[start:stop] for _, where in self._optional]
+        if all(where.all() for where in present):
+            return self._matrix[: stop - start].reshape(-1), padded
+        return self._chosen(present), padded
+
+    def _lay_out(self, cells: dict[int, Cells], rows: int) -> None:
+        """Literals in their places, and where the holes are, when a width has changed."""
+        widths = [
+            len(piece) if isinstance(piece, bytes) else cells[id(piece)].dtype.itemsize
+            for piece in self._pieces
+        ]
+        if widths == self._widths:
+            return
+        self._widths, self._ends = widths, [0, *accumulate(widths)]
+        texts = (
+            piece if isinstance(piece, bytes) else bytes(width)
+            for piece, width in zip(self._pieces, widths, strict=True)
+        )
+        self._matrix = np.tile(np.frombuffer(b"".join(texts), dtype=np.uint8), (rows, 1))
+        self._holes = [
+            (self._column(first, cells[id(piece)].dtype), id(piece))
+            for first, piece in zip(self._ends, self._pieces, strict=False)
+            if not isinstance(piece, bytes)
+        ]
+
+    def _column(self, first: int, kind: Any) -> Cells:
+        """The column of the matrix that begins at a byte, one item a record."""
+        return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
+
+    def _chosen(self, present: Sequence[Bools]) -> Bytes:
+        """The bytes of the records at hand without the pieces that they lack.
+
+        Few patterns of presence occur: what stands side by side in one of them is moved for all of its
+        records at once.
+        """
+        pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
+        there = np.bincount(pattern)
+        found = {
+            number: self._stretches([bool(number >> bit & 1) for bit in range(len(present))])
+            for number in np.flatnonzero(there).tolist()
+        }
+        lengths = np.zeros(len(there), dtype=np.intp)
+        lengths[list(found)] = [sum(last - first for first, last in runs) for runs in found.values()]
+        ends = np.cumsum(lengths[pattern])
+        line = np.empty(ends[-1], dtype=np.uint8)
+        for number, runs in found.items():
+            at = np.flatnonzero(pattern == number)
+            to = ends[at] - lengths[number]
+            for first, last in runs:
+                kind = f"V{last - first}"
+                anywhere = np.ndarray((len(line) - (last - first) + 1,), kind, line, 0, (1,))
+                anywhere[to] = self._column(first, kind)[at]
+                to += last - first
+        return line
+
+    def _stretches(self, present: Sequence[bool]) -> list[tuple[int, int]]:
+        """First and last byte of what stands side by side in a record that has these optional pieces."""
+        cuts = [0]
+        for (place, _), there in zip(self._optional, present, strict=True):
+            if not there:
+                cuts += [self._ends[place.start], self._ends[place.stop]]
+        cuts.append(self._ends[-1])
+        return [(first, last) for first, last in zip(cuts[::2], cuts[1::2], strict=True) if first < last]
+
+
+def as_cells(matrix: Bytes) -> Cells:
+    """The rows of a matrix of bytes (count, width), each contiguous, as items that NumPy moves as a whole."""
+    width = matrix.shape[1]
+    kind = f"u{width}" if width in {1, 2, 4, 8} else f"V{width}"
+    return matrix.view(kind)[:, 0]
+
+
+_FOUR: Final = np.array([b"%04d" % value for value in range(10_000)]).view(np.uint32)
+"""The decimals 0000 to 9999, four bytes each."""
+
+
+def digits(values: NDArray[Any], width: int) -> Bytes:
+    """Decimal digits with leading zeros, shape (len(values), width): four at a time from a table."""
+    groups = -(-width // 4)
+    out = np.empty((len(values), groups), dtype=np.uint32)
+    rest = values
+    for place in range(groups - 1, 0, -1):
+        high = rest // 10_000
+        out[:, place] = _FOUR.take(rest - high * 10_000)
+        rest = high
+    out[:, 0] = _FOUR.take(rest)
+    return out.view(np.uint8)[:, 4 * groups - width :]
+
+
+def table(words: Sequence[bytes]) -> Bytes:
+    """Words as a matrix of bytes padded with NUL."""
+    return of_texts(np.array(words, dtype=np.bytes_) if len(words) else np.zeros(0, "S1"))
+
+
+def of_texts(texts: Texts) -> Bytes:
+    """An array of texts as a matrix of bytes padded with NUL, as wide as the longest."""
+    width = int(np.strings.str_len(texts).max(initial=1))
+    return np.ascontiguousarray(texts).view(np.uint8).reshape(len(texts), texts.itemsize)[:, :width]
+
+
+def of_bytes(matrix: Bytes) -> Texts:
+    """The texts in the rows of a matrix of bytes padded with NUL: the way back from `of_texts`."""
+    return np.ascontiguousarray(matrix).view(f"S{matrix.shape[1]}").ravel()
+
+
+def number(value: float) -> str:
+    """The shortest text that reads back as exactly this double: 3, 0.1, 1e-06."""
+    value = float(value)
+    if value.is_integer() and abs(value) < MOST:
+        return str(int(value))
+    return repr(value)
+
+
+def numbers(values: Floats) -> Texts:
+    """The shortest texts that read back as exactly these doubles, as `number` has them; made by Python's own loop over a list."""
+    whole = (np.rint(values) == values) & (np.abs(values) < MOST)
+    texts = np.zeros(len(values), dtype="S24")
+    for chosen, given in ((whole, values[whole].astype(np.int64)), (~whole, values[~whole])):
+        if len(given):
+            texts[chosen] = repr(given.tolist())[1:-1].encode().split(b", ")
+    return texts
+
+
+def signed(values: Floats) -> Texts:
+    """The numbers after their sign and a blank: `+ 3`, `- 0.5`."""
+    return np.strings.add(np.where(values < 0, b"- ", b"+ "), numbers(np.abs(values)))
+
+
+def bounds(values: Floats) -> Texts:
+    """Numbers, `-inf` or `+inf` (docs/format-rules.md, W4)."""
+    return np.where(values == np.inf, np.bytes_(b"+inf"), numbers(values))
+
+
+def words(values: Floats | float, text: Callable[[Floats], Texts] = numbers) -> bytes | Words:
+    """Numbers as words: literal bytes for one number, a table of the distinct ones for an array."""
+    if np.ndim(values) == 0:
+        return bytes(text(np.array([values], dtype=np.float64))[0])
+    distinct, codes = _distinct(np.asarray(values, dtype=np.float64) + 0.0)
+    return Words(of_texts(text(distinct)), codes)
+
+
+def scalar_when_constant(values: Floats) -> Floats | float:
+    """The one number that all values are, or the values."""
+    return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
+
+
+def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
+    """Numbers in ascending order, all of `values` among them, and the place of each; no sorting for few whole ones."""
+    least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, -1.0)
+    few = 0 <= most - least < _FEW and max(-least, most) < MOST
+    if few and (values == np.rint(values)).all():
+        return np.arange(least, most + 1), (values - least).astype(np.uint8)
+    place, rank = ranked(values)
+    return values[place], rank
+
+
+def check_coefficients(values: Floats | float, where: str) -> None:
+    """Nothing, when every coefficient but zero lies in [1e-9, 1e15); else raises UnsupportedByFormatError."""
+    size = np.abs(np.atleast_1d(np.asarray(values, dtype=np.float64)))
+    wrong = ~np.isfinite(size) | (size >= MOST) | ((size < LEAST) & (size > 0))
+    if wrong.any():
+        worst = float(size[wrong][0])
+        remedy = _LARGER if worst < LEAST else _SMALLER
+        raise UnsupportedByFormatError(
+            f"{where} has the coefficient {worst!r}; readers drop or refuse what is outside [1e-9, 1e15): {remedy}"
+        )
+
+
+_LARGER: Final = "make w, w_strokes or w_beta larger (0 leaves a term out), or the direction of a stroke that is nearly horizontal exactly 0"
+_SMALLER: Final = "make w_strokes or w_beta smaller"

@@ -1,0 +1,134 @@
+"""Bytes on their way to a file: counted and hashed as they pass, or compressed, in threads beside the writer.
+
+zlib, hashlib and the system let other threads run while they work, so that a file takes as long as the
+slowest of its steps, or as long as all of them shared by the cores. A small file begins no thread.
+
+A compressed file is one gzip member without name and time. It is made of pieces that are compressed on their
+own and end on a byte boundary (Z_FULL_FLUSH), as pigz does it, so that the pieces of one file go to all
+cores; piece by piece the bytes depend on the content alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import struct
+import zlib
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Final, Self
+
+from ...models.storage import replacing
+
+LEVEL: Final = 2
+"""Of zlib: twice as fast as its default, and files of one record repeated are no larger for it."""
+
+PIECE: Final = 1 << 22
+"""Bytes that are compressed on their own: enough for the loss at their seams to be nothing."""
+
+_AHEAD: Final = 16
+"""Pieces that may wait for another thread: enough to keep it busy, few enough to keep memory flat."""
+
+SHARE: Final = 1 << 21
+"""Bytes that are handed to another thread at once: enough for the handing over to be nothing."""
+
+_SHARES: Final = 16
+"""Shares that may wait for each thread."""
+
+_HEAD: Final = b"\x1f\x8b\x08\0\0\0\0\0\0\xff"
+_TAIL: Final = b"\x03\0"
+"""An empty last block."""
+
+
+def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
+    """Number of bytes and SHA-256 of the file now at `path`, compressed when it ends in .gz. Raises OutputError."""
+    digest, size = hashlib.sha256(), 0
+
+    def hash_all(share: list[bytes]) -> None:
+        for chunk in share:
+            digest.update(chunk)
+
+    with replacing(path) as stream, _Beside(hash_all, stream.writelines) as beside:
+        for share, length in gathered(gzipped(chunks) if path.suffix == ".gz" else chunks, SHARE):
+            beside(share, wait=length < SHARE)
+            size += length
+    return {"bytes": size, "sha256": digest.hexdigest()}
+
+
+class _Beside:
+    """Hands chunks to several tasks, each in order in a thread of its own, which runs a few chunks behind.
+
+    What a task raises comes back from a later call or at the end.
+    """
+
+    def __init__(self, *tasks: Callable[[list[bytes]], None]) -> None:
+        self._tasks = tasks
+        self._pools = [ThreadPoolExecutor(1) for _ in tasks]
+        self._waiting: deque[Future[None]] = deque()
+
+    def __call__(self, chunks: list[bytes], *, wait: bool) -> None:
+        """Hand over chunks. wait: work them off here, so that a small file begins no thread."""
+        if wait:
+            self._settle(0)
+            for task in self._tasks:
+                task(chunks)
+        else:
+            self._settle(len(self._tasks) * _SHARES)
+            self._waiting += [
+                pool.submit(task, chunks) for pool, task in zip(self._pools, self._tasks, strict=True)
+            ]
+
+    def _settle(self, most: int) -> None:
+        """Wait until no more than that are under way."""
+        while len(self._waiting) > most:
+            self._waiting.popleft().result()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        for pool in self._pools:
+            pool.shutdown(cancel_futures=kind is not None)
+        if kind is None:
+            self._settle(0)
+
+
+def gzipped(chunks: Iterable[bytes]) -> Iterator[bytes]:
+    """The bytes of a gzip file that holds the chunks, in order."""
+    check = size = 0
+    yield _HEAD
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        waiting: deque[Future[bytes]] = deque()
+        for piece in joined(chunks, PIECE):
+            waiting.append(pool.submit(_deflated, piece))
+            check, size = zlib.crc32(piece, check), size + len(piece)
+            if len(waiting) > _AHEAD:
+                yield waiting.popleft().result()
+        yield from (future.result() for future in waiting)
+    yield _TAIL + struct.pack("<II", check, size & 0xFFFFFFFF)
+
+
+def joined(chunks: Iterable[bytes], least: int) -> Iterator[bytes]:
+    """The same bytes in pieces of at least that length, the last one aside."""
+    return (b"".join(parts) for parts, _ in gathered(chunks, least))
+
+
+def gathered(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes], int]]:
+    """The same chunks in lists of at least that many bytes, the last one aside, and the length of each."""
+    parts: list[bytes] = []
+    length = 0
+    for chunk in chunks:
+        parts.append(chunk)
+        length += len(chunk)
+        if length >= least:
+            yield parts, length
+            parts, length = [], 0
+    if parts:
+        yield parts, length
+
+
+def _deflated(piece: bytes) -> bytes:
+    packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+    return packer.compress(piece) + packer.flush(zlib.Z_FULL_FLUSH)

@@ -1,0 +1,29 @@
+"""Coefficients by index: what a program read, and what OSiL lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models.instance.grid import Floats, Ints
+
+
+class Terms(NamedTuple):
+    """Coefficients by index: at (k, indices) and value (k,); sorted, each index once, no zeros."""
+
+    at: Ints
+    value: Floats
+
+
+def terms(at: Iterable[Sequence[int]], value: Iterable[float], *, indices: int, products: int = 0) -> Terms:
+    """The terms of that many indices, the last `products` of which have no order among themselves."""
+    index = np.array(list(at) if not isinstance(at, np.ndarray) else at, dtype=np.int64).reshape(-1, indices)
+    given = np.array(list(value) if not isinstance(value, np.ndarray) else value, dtype=np.float64)
+    if products:
+        index[:, indices - products :] = np.sort(index[:, indices - products :], axis=1)
+    unique, inverse = np.unique(index, axis=0, return_inverse=True)
+    total = np.zeros(len(unique))
+    np.add.at(total, inverse.ravel(), given)
+    return Terms(unique[total != 0], total[total != 0])

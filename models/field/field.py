@@ -1,0 +1,226 @@
+"""A cross field: two lines at every pixel, the jumps between neighbours, and what they mean.
+
+A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with
+jump p the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the
+paper).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from ..errors import InstanceError
+from ..instance.angles import line_difference
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
+from .jumps import best_jumps, parity_sign, stepped
+
+Norm = Literal[1, 2]
+
+DEGENERATE: Final = np.radians(2.5)
+"""Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The three sums of an energy and their total, each already weighted."""
+
+    smooth: float
+    strokes: float
+    beta: float
+
+    @property
+    def total(self) -> float:
+        """Smooth + strokes + beta."""
+        return self.smooth + self.strokes + self.beta
+
+
+@dataclass(frozen=True)
+class Singularities:
+    """2 x 2 blocks round which the crosses turn.
+
+    row, column: int (k,), the block's common corner is the lower right corner of pixel [row, column].
+    index: float (k,), turns of the cross on a counter-clockwise walk (y up): multiples of 1/4.
+    """
+
+    row: Ints
+    column: Ints
+    index: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class CrossField:
+    """Angles alpha, beta (n,) in radians and integer jumps p (m,) on the grid of an instance.
+
+    n pixels and m pairs in the order of `instance.grid`. Line u is at alpha + beta, line v at alpha + pi/2 -
+    beta, counter-clockwise from +x with y up; p compares the label of a pair's first pixel with that of its
+    second (docs/mathematics.md, 2 and 3).
+    Raises InstanceError when a shape does not fit the grid or a value is not finite.
+    """
+
+    instance: Instance
+    alpha: Floats
+    beta: Floats
+    p: Ints
+
+    def __post_init__(self) -> None:
+        """Take over read-only copies and check shapes and values."""
+        grid = self.instance.grid
+        given: dict[str, np.ndarray[Any, Any]] = {
+            "alpha": np.array(self.alpha, dtype=np.float64),
+            "beta": np.array(self.beta, dtype=np.float64),
+            "p": whole_numbers(self.p, "p"),
+        }
+        for (name, value), size in zip(given.items(), (grid.size, grid.size, len(grid.first)), strict=True):
+            if value.shape != (size,):
+                raise InstanceError(
+                    f"{name} has shape {value.shape}, but the grid of {self.instance.name} needs ({size},)"
+                )
+            if not np.isfinite(value).all():
+                raise InstanceError(f"{name} holds a value that is not finite")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def u(self) -> Floats:
+        """Unit vectors (x, y), y up, of line u; shape (n, 2)."""
+        return _unit(self.alpha + self.beta)
+
+    @cached_property
+    def v(self) -> Floats:
+        """Unit vectors (x, y), y up, of line v; shape (n, 2)."""
+        return _unit(self.alpha + HALF - self.beta)
+
+    @property
+    def residual_a(self) -> Floats:
+        """A = alpha_i - alpha_j + pi/2 p of each pair, shape (m,)."""
+        grid = self.instance.grid
+        return self.alpha[grid.first] - self.alpha[grid.second] + HALF * self.p
+
+    @property
+    def residual_b(self) -> Floats:
+        """B = (-1)^p beta_i - beta_j of each pair, shape (m,)."""
+        grid = self.instance.grid
+        return parity_sign(self.p) * self.beta[grid.first] - self.beta[grid.second]
+
+    @property
+    def residual_r(self) -> Floats:
+        """R = alpha + beta - theta of each stroke pixel, shape (s,)."""
+        at = self.instance.stroke_index
+        return self.alpha[at] + self.beta[at] - self.instance.target
+
+    def energy(self, norm: Norm = 2) -> Energy:
+        """The energy with squares (2) or absolute values (1) throughout, as three sums and their total.
+
+        2 sum (|A| + |B|) over pairs, w_strokes sum w |R| over stroke pixels, w_beta sum |beta| over pixels,
+        or all of them squared (docs/mathematics.md, 5).
+        """
+        instance = self.instance
+        size = np.abs if norm == 1 else np.square
+        return Energy(
+            smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
+            strokes=instance.w_strokes * float(np.sum(instance.w * size(self.residual_r))),
+            beta=instance.w_beta * float(np.sum(size(self.beta))),
+        )
+
+    @cached_property
+    def pixel_energy(self) -> Floats:
+        """Smooth 2-norm energy per pixel, each pair shared by its two pixels; shape (n,)."""
+        grid = self.instance.grid
+        share = self.residual_a**2 + self.residual_b**2
+        ends, halves = np.concatenate([grid.first, grid.second]), np.concatenate([share, share])
+        at_pixel: Floats = np.bincount(ends, halves, grid.size).astype(np.float64)
+        return at_pixel
+
+    @cached_property
+    def singularities(self) -> Singularities:
+        """Blocks of 2 x 2 pixels with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
+        grid = self.instance.grid
+        bottom, side, top, left = grid.blocks.T
+        turn = self.p[bottom] + self.p[side] - self.p[top] - self.p[left]
+        at = np.nonzero(turn)[0]
+        corner = grid.first[bottom[at]]
+        return Singularities(grid.rows[corner] - 1, grid.columns[corner], -turn[at] / 4)
+
+    @cached_property
+    def degenerate(self) -> Bools:
+        """True where both lines are the same to within 5 degrees; shape (n,)."""
+        close: Bools = np.abs(self.beta) > QUARTER - DEGENERATE
+        return close
+
+    @property
+    def angle_between(self) -> Floats:
+        """Angle between the two lines, in [0, pi/2] radians; shape (n,)."""
+        return line_difference(self.alpha + self.beta, self.alpha + HALF - self.beta)
+
+    def cross_error(self, u: Floats, v: Floats) -> Floats:
+        """Angle to the crosses with line angles u and v (n,), in radians.
+
+        For both assignments of lines the mean of the two line differences, the smaller one
+        (docs/mathematics.md, 9).
+        """
+        mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
+        straight = line_difference(mine, u) + line_difference(other, v)
+        crossed = line_difference(mine, v) + line_difference(other, u)
+        return np.minimum(straight, crossed) / 2
+
+    def with_best_jumps(self) -> CrossField:
+        """The field with the jump of least energy on each pair, within the instance's p_min and p_max."""
+        return CrossField(
+            self.instance, self.alpha, self.beta, best_jumps(self.instance, self.alpha, self.beta)
+        )
+
+    def image(self, values: np.ndarray[Any, Any], fill: float = np.nan) -> Floats:
+        """Values (n,) of the pixels as a picture [height, width], `fill` outside the mask."""
+        picture = np.full(self.instance.mask.shape, fill)
+        picture[self.instance.mask] = values
+        return picture
+
+
+def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
+    """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
+
+    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge
+    `box` the alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if
+    nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    """
+    lower = instance.alpha_lower
+    steps = np.ceil((lower - alpha) / HALF - 1e-12).astype(np.int32)
+    steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
+    alpha, beta, p = stepped(instance.grid, alpha, beta, p, steps)
+    kept = CrossField(
+        instance,
+        np.clip(alpha, lower, instance.alpha_upper),
+        np.clip(beta, -QUARTER, QUARTER),
+        np.clip(p, instance.p_min, instance.p_max),
+    )
+    best = kept.with_best_jumps()
+    return best if best.energy().total < kept.energy().total else kept
+
+
+def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
+    """The step of each stroke pixel's label, shape (s,):
+    of three the one with the least clipping and misfit of the stroke.
+
+    The label in the window, the next one (on the window's edge both fit), and the one in which u stays
+    nearest to the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the
+    energy punishes.
+    """
+    at = instance.stroke_index
+    lower, upper = instance.alpha_lower[at], instance.alpha_upper[at]
+    faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
+    candidates = np.stack([steps[at], steps[at] + 1, faithful])
+    moved = alpha[at] + HALF * candidates
+    shifted = np.clip(moved, lower, upper)
+    turned = np.clip(parity_sign(candidates) * beta[at], -QUARTER, QUARTER)
+    cost = np.abs(moved - shifted) + np.abs(shifted + turned - instance.target)
+    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
+    return best
+
+
+def _unit(angle: Floats) -> Floats:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)

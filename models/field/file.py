@@ -1,0 +1,266 @@
+"""Field files: .npz and documented JSON, which hold field and instance,
+and .rawfield with a mesh for Directional.
+
+.npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
+            version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
+            No pickles.
+.json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
+.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its page on file
+            formats): a line `4 F`, then for each face u, v, -u, -v as 12 numbers. Counter-clockwise in every
+            row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
+
+The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
+Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no 2 x 2 block
+of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
+2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from ..array_archive import Expected, pack_arrays, unpack_arrays
+from ..errors import InputError, InstanceError
+from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
+from ..instance.file import (
+    are_places,
+    arrays_of,
+    check_schema,
+    check_version,
+    decoded,
+    head_of,
+    number_table,
+    of_document,
+    parse_json,
+    to_json,
+    unpacked,
+)
+from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.instance import Instance
+from ..storage import read_bytes, write_bytes
+from .field import CrossField
+
+FORMAT: Final = "crossfield-field"
+VERSION: Final = 1
+_PREFIX = "instance_"
+_ARCHIVE: Final = {
+    "head": Expected(1, MAX_HEAD, "u"),
+    "alpha": Expected(1, MAX_GRID**2),
+    "beta": Expected(1, MAX_GRID**2),
+    "p": Expected(1, 2 * MAX_GRID**2),
+}
+_MOST_JUMP: Final = 1_000_000
+_MOST_ANGLE: Final = 1e6  # radians; beyond, nothing is left of the angle itself
+_Kind = TypeVar("_Kind")
+
+
+def write_field(field: CrossField, path: str | Path) -> Path:
+    """The path of the file that now holds the field; .npz, .json or .rawfield by the ending of its name.
+
+    A .rawfield gets its mesh beside it, with the ending .obj. Same field, same bytes.
+    Raises InputError for another ending and OutputError when a file cannot be written.
+    """
+    path = Path(path)
+    write = _of_suffix(_WRITERS, path, "written")
+    if write is _rawfield:
+        write_bytes(path.with_suffix(".obj"), _obj(field.instance))
+    return write_bytes(path, write(field))
+
+
+def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
+    """The field that a .npz or .json file holds, with its instance.
+
+    on: the instance that it must be on, when one is given.
+    Raises InputError for another ending, an unreadable file or another instance, and InstanceError, with file and place, for
+    a damaged one.
+    """
+    path = Path(path)
+    read = _of_suffix(_READERS, path, "read")
+    try:
+        field = read(read_bytes(path, MAX_ARCHIVE))
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+    if on is not None and field.instance.sha256 != on.sha256:
+        raise InputError(
+            f"is a field on another instance ({field.instance.summary}), not on this one ({on.summary}); "
+            "give a field of the same sketch, size and gauge",
+            file=path,
+        )
+    return field
+
+
+def _of_suffix(table: dict[str, _Kind], path: Path, verb: str) -> _Kind:
+    found = table.get(path.suffix.lower())
+    if found is None:
+        raise InputError(
+            f"a field cannot be {verb} as {path.suffix!r}; choose one of {', '.join(table)}", file=path
+        )
+    return found
+
+
+def _npz(field: CrossField) -> bytes:
+    head = json.dumps({"format": FORMAT, "version": VERSION})
+    arrays: dict[str, np.ndarray[Any, Any]] = {
+        "head": np.frombuffer(head.encode(), dtype=np.uint8),
+        "alpha": field.alpha,
+        "beta": field.beta,
+        "p": field.p,
+    }
+    return pack_arrays(arrays | {_PREFIX + name: array for name, array in arrays_of(field.instance).items()})
+
+
+def _of_npz(data: bytes) -> CrossField:
+    arrays = unpack_arrays(data, _ARCHIVE)
+    check_version(head_of(arrays), FORMAT, VERSION)
+    instance = _embedded(lambda given: unpacked(given, _PREFIX), data)
+    return _field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
+
+
+def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
+    """The instance inside a field file; errors say that they are about it."""
+    try:
+        return read(source)
+    except InstanceError as error:
+        raise InstanceError(f"its instance: {error}") from error
+
+
+def _json(field: CrossField) -> bytes:
+    grid = field.instance.grid
+    columns: tuple[np.ndarray[Any, Any], ...] = (
+        grid.rows,
+        grid.columns,
+        field.alpha,
+        field.beta,
+        *(_jumps(field, table) for table in grid.pair_number),
+    )
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    pixels = ",\n".join(f"    {json.dumps(row)}" for row in rows)
+    instance = to_json(field.instance).rstrip().replace("\n", "\n  ")
+    head = f'  "format": "{FORMAT}",\n  "version": {VERSION},\n  "instance": {instance},\n'
+    return f'{{\n{head}  "pixels": [\n{pixels}\n  ]\n}}\n'.encode()
+
+
+def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
+    """Jump of each pixel's pair in the table, None where there is no pair; shape (n,), objects."""
+    pair = table[field.instance.mask]
+    jumps = np.full(len(pair), None, dtype=object)
+    jumps[pair >= 0] = field.p[pair[pair >= 0]]
+    return jumps
+
+
+def _of_json(data: bytes) -> CrossField:
+    document = parse_json(decoded(data))
+    check_version(document, FORMAT, VERSION)
+    checked = check_schema(document, "field", __package__, rows={"pixels": _are_pixels})
+    instance = _embedded(of_document, checked["instance"])
+    row, column, alpha, beta, upper, right = zip(*checked["pixels"], strict=True)
+    _check_places(instance.grid, np.array([row, column], dtype=np.int32))
+    p = np.zeros(len(instance.grid.first), dtype=np.int32)
+    for name, table, jumps in zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True):
+        _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
+    try:
+        return _field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
+    except OverflowError as error:
+        raise InstanceError("holds a number beyond the range of doubles") from error
+
+
+def _are_pixels(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a pixel: [row, column, alpha, beta, jump or null, jump or null]."""
+    if not rows or not all(type(row) is list and len(row) == 6 for row in rows):
+        return False
+    table = number_table([[0 if value is None else value for value in row] for row in rows], 6)
+    if table is None or any(None in row[:4] for row in rows):
+        return False
+    jumps = table[:, 4:]
+    return are_places(table[:, :2]) and bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
+
+
+def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
+    """The field. Raises InstanceError for numbers that are no angles."""
+    for name, values in (("alpha", alpha), ("beta", beta)):
+        size = np.abs(np.asarray(values, dtype=np.float64))
+        if (np.isfinite(size) & (size > _MOST_ANGLE)).any():  # CrossField tells of those that are not finite
+            raise InstanceError(
+                f"{name} holds numbers beyond {_MOST_ANGLE:g}, which are no angles; write it again"
+            )
+    return CrossField(instance, alpha, beta, p)
+
+
+def _check_places(grid: Grid, places: Ints) -> None:
+    expected = np.stack([grid.rows, grid.columns])
+    if places.shape != expected.shape:
+        raise InstanceError(f"has {places.shape[1]} pixels, but its mask has {grid.size}")
+    wrong = (places != expected).any(axis=0)
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise InstanceError(
+            f"$.pixels[{at}]: is {places[:, at].tolist()}, but the mask has {expected[:, at].tolist()} there"
+        )
+
+
+def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> None:
+    """Put the jumps of the pixels, NaN where there is none, at their pairs in p."""
+    pair = table[grid.mask]
+    wrong: Bools = np.isnan(jumps) != (pair < 0)
+    if wrong.any():
+        raise InstanceError(
+            f"$.pixels[{int(np.argmax(wrong))}]: a jump belongs where the mask has the {name} neighbour, "
+            "null elsewhere"
+        )
+    p[pair[pair >= 0]] = jumps[pair >= 0].astype(np.int32)
+
+
+def _rawfield(field: CrossField) -> bytes:
+    vectors = np.zeros((field.instance.grid.size, 4, 3))
+    vectors[:, :, :2] = np.stack([field.u, field.v, -field.u, -field.v], axis=1)
+    rows = _lines(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
+    return f"4 {2 * len(vectors)}\n{rows}".encode()
+
+
+def _obj(instance: Instance) -> bytes:
+    """The mesh: vertices and, 1-based, the triangles (top left, bottom left, bottom right),
+    (top left, bottom right, top right).
+    """
+    places, corners = _corners(instance.grid)
+    x = instance.origin[0] + instance.pixel_size * places[:, 1]
+    y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
+    vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
+    faces = _lines(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
+    return (
+        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
+        f"row by row; y up\n{vertices}{faces}"
+    ).encode()
+
+
+def _corners(grid: Grid) -> tuple[Ints, Ints]:
+    """Vertices [row, column] (k, 2), and the vertex at top left, top right, bottom left,
+    bottom right of each pixel (n, 4).
+    """
+    down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
+    inside = np.pad(grid.mask, 1)
+    # Pixels round the corner: beyond it across, and on its two sides.
+    across = inside[row + down, column + right]
+    beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
+    apart = across & ~beside & (right == 1)
+    key = 2 * (row.astype(np.int64) * (grid.width + 1) + column) + apart
+    vertices, corners = np.unique(key, return_inverse=True)
+    places = np.stack(np.divmod(vertices // 2, grid.width + 1), axis=1)
+    return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
+
+
+def _lines(table: np.ndarray[Any, Any], lead: str = "") -> str:
+    return "".join(f"{lead}{' '.join(map(repr, row))}\n" for row in table.tolist())
+
+
+_WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
+    ".npz": _npz,
+    ".json": _json,
+    ".rawfield": _rawfield,
+}
+_READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _of_npz, ".json": _of_json}

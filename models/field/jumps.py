@@ -1,0 +1,54 @@
+"""The jumps between the crosses of neighbouring pixels: the sign they give beta, the best ones,
+and steps of the label.
+
+The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
+cross.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..instance.grid import Floats, Grid, Ints
+from ..instance.instance import HALF, Instance
+
+
+def parity_sign(p: Ints) -> Floats:
+    """The sign (-1)^p of each jump."""
+    return 1.0 - 2.0 * (p & 1).astype(np.float64)
+
+
+def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
+    """The jump of least 2-norm energy for each pair, in [p_min, p_max]; ties go to the smaller jump.
+
+    Shape (m,).
+    """
+    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max))[0]
+
+
+def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
+    """The best jump of each pair, in no range, and its energy; ties go to the smaller jump. Shapes (m,)."""
+    return _best(grid, alpha, beta)
+
+
+def _best(
+    grid: Grid, alpha: Floats, beta: Floats, within: tuple[Ints, Ints] | None = None
+) -> tuple[Ints, Floats]:
+    difference = alpha[grid.first] - alpha[grid.second]
+    near = np.floor(-difference / HALF).astype(np.int32)
+    around = np.arange(-1, 3, dtype=np.int32)[:, None]
+    # The best even and the best odd jump are the two beside -2d/pi, unless that is a whole number.
+    candidates = near + around if within is None else np.clip(np.clip(near, *within) + around, *within)
+    a = difference + HALF * candidates
+    b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
+    cost = np.round(2 * (a * a + b * b), 12)  # equal costs must not be told apart by rounding
+    at = (np.argmin(cost, axis=0), np.arange(len(difference)))
+    return candidates[at], cost[at]
+
+
+def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
+    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels;
+    no residual changes but in sign.
+    """
+    jumps = p - steps[grid.first] + steps[grid.second]
+    return alpha + HALF * steps, parity_sign(steps) * beta, jumps

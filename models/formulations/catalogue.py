@@ -1,0 +1,223 @@
+"""The nine formulations, each one function that reads from top to bottom like the paper.
+
+Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
+S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
+readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
+declaration.py; the symbols: symbols.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import sympy as sp
+
+from ..errors import FormulationError
+from .declaration import FORMULATIONS, S_C, E, Facet, Family, Formulation, I, formulation, row, term
+from .symbols import (
+    B_LIFTED,
+    A,
+    B,
+    R,
+    beta,
+    beta_i,
+    beta_j,
+    d,
+    gamma,
+    p,
+    p1,
+    p2,
+    p_max,
+    p_min,
+    pi,
+    psi,
+    s,
+    t,
+    u,
+    w,
+    w_beta,
+    w_strokes,
+    z,
+)
+
+TWO_NORM: Final = "the 2-norm energy"
+MIXED_NORM: Final = "the 1-norm of the smoothness with squares of stroke and skew terms"
+ONE_NORM: Final = "the 1-norm energy"
+AT_JUMPS: Final = "the 2-norm energy at given jumps"
+
+BY_HULL: Final = "z = p1 beta_i at every point with binary p1, by the four facets of its hull"
+BY_ROWS: Final = "the products p1 beta_i stand in the rows"
+
+PARITY: Final = 2 * ((A.subs(p1 + 2 * p2, p)) ** 2 + (sp.cos(pi * p) * beta_i - beta_j) ** 2)
+"""The smoothness of a pair with one integer jump, (1)-(4)."""
+QUARTIC: Final = 2 * (A**2 + B**2)
+"""The smoothness of a pair, (8)."""
+CUBIC: Final = sp.expand(sp.expand(QUARTIC).subs(p1**2, p1))
+"""(8) expanded, with p1^2 = p1: (9)."""
+
+Families = Iterator[Family]
+
+
+@formulation(
+    "minlp-parity", paper="1, (1)-(6)", kind="non-convex MINLP", short="parity",
+    minimises=TWO_NORM, how="p = p1 + 2 p2, and cos(pi p) = 1 - 2 p1",
+)  # fmt: skip
+def minlp_parity() -> Families:
+    """One integer jump per pair, its parity as cos(pi p)."""
+    yield term("smooth", E, PARITY)
+    yield from strokes(norm=2)
+    yield from skew(norm=2)
+
+
+@formulation(
+    "minlp-quartic", paper="2, (8)", kind="polynomial MINLP of degree 4", short="quartic",
+    minimises=TWO_NORM,
+    how="squares of alpha_i - alpha_j + pi/2 (p1 + 2 p2) and of (1 - 2 p1) beta_i - beta_j",
+)  # fmt: skip
+def minlp_quartic() -> Families:
+    """Parity bit p1 and even part p2, squares kept as squares."""
+    yield term("smooth", E, QUARTIC)
+    yield from jump_bounds()
+    yield from strokes(norm=2)
+    yield from skew(norm=2)
+
+
+@formulation(
+    "minlp-cubic", paper="2, (9)", kind="polynomial MINLP of degree 3", short="cubic",
+    minimises=TWO_NORM, how="the expanded squares with p1^2 = p1, which holds for binary p1 only",
+)  # fmt: skip
+def minlp_cubic() -> Families:
+    """Expanded, p1^2 replaced by p1: the full model of section 2."""
+    yield term("smooth", E, CUBIC)
+    yield from jump_bounds()
+    yield from strokes(norm=2)
+    yield from skew(norm=2)
+
+
+@formulation(
+    "miqcp-bilinear", paper="3, (10)-(17)", kind="non-convex MIQCP", short="bilin",
+    minimises=MIXED_NORM, how=BY_ROWS,
+)  # fmt: skip
+def miqcp_bilinear(stroke_norm: int = 2, beta_norm: int = 2) -> Families:
+    """1-norm smoothness with bilinear rows."""
+    yield term("smooth", E, 2 * s + 2 * t)
+    yield row(14, E, s >= A)
+    yield row(15, E, s >= -A)
+    yield row(16, E, t >= B)
+    yield row(17, E, t >= -B)
+    yield from jump_bounds()
+    yield from strokes(stroke_norm)
+    yield from skew(beta_norm)
+
+
+@formulation(
+    "miqcp-bilinear-l1", paper="3, (10)-(25)", kind="non-convex MIQCP, linear objective", short="bilin1",
+    minimises=ONE_NORM, how=BY_ROWS,
+)  # fmt: skip
+def miqcp_bilinear_l1(stroke_norm: int = 1, beta_norm: int = 1) -> Families:
+    """1-norm throughout with bilinear rows."""
+    yield from miqcp_bilinear.families(stroke_norm, beta_norm)
+
+
+@formulation(
+    "miqp-mccormick", paper="4, for Bonmin", kind="convex MIQP", short="miqp",
+    minimises=MIXED_NORM, how=BY_HULL,
+)  # fmt: skip
+def miqp_mccormick(facet: Facet = "hull", stroke_norm: int = 2, beta_norm: int = 2) -> Families:
+    """1-norm smoothness, products replaced by their facets."""
+    yield term("smooth", E, 2 * s + 2 * t)
+    yield row(14, E, s >= A)
+    yield row(15, E, s >= -A)
+    yield row(16, E, t >= B_LIFTED)
+    yield row(17, E, t >= -B_LIFTED)
+    yield from facets_of_z(facet)
+    yield from jump_bounds()
+    yield from strokes(stroke_norm)
+    yield from skew(beta_norm)
+
+
+@formulation(
+    "milp-mccormick", paper="4 and 5, the MILO model", kind="MILP", short="milp",
+    minimises=ONE_NORM, how=BY_HULL,
+)  # fmt: skip
+def milp_mccormick(facet: Facet = "hull", stroke_norm: int = 1, beta_norm: int = 1) -> Families:
+    """1-norm throughout, products replaced by their facets."""
+    yield from miqp_mccormick.families(facet, stroke_norm, beta_norm)
+
+
+@formulation(
+    "qp-fixed", paper="5, second stage", kind="box-constrained convex QP", short="qp",
+    minimises=AT_JUMPS, how="the jumps are data", fixed=("p1", "p2"),
+)  # fmt: skip
+def qp_fixed() -> Families:
+    """2-norm with the jumps as data."""
+    yield term("smooth", E, QUARTIC)
+    yield from strokes(norm=2)
+    yield from skew(norm=2)
+
+
+@formulation(
+    "miqp-exact", paper="ours", kind="convex MIQP", short="exact",
+    minimises=TWO_NORM, how=BY_HULL,
+)  # fmt: skip
+def miqp_exact() -> Families:
+    """2-norm with z = p1 beta by its hull: exactly (8), and convex."""
+    yield term("smooth", E, 2 * (d**2 + u**2))
+    yield row("cd", E, sp.Eq(d, A), "residual of (8)")
+    yield row("cu", E, sp.Eq(u, B_LIFTED), "residual of (8), lifted")
+    yield from facets_of_z("hull")
+    yield from jump_bounds()
+    yield from strokes(norm=2)
+    yield from skew(norm=2)
+
+
+# What several formulations share.
+
+
+def strokes(norm: int) -> Families:
+    """The stroke term, (5) or (20), and for the 1-norm its rows (22), (23)."""
+    if norm == 2:
+        yield term("strokes", S_C, w_strokes * w * R**2, "(5)")
+        return
+    yield term("strokes", S_C, w_strokes * w * gamma, "(20)")
+    yield row(22, S_C, gamma >= R)
+    yield row(23, S_C, gamma >= -R)
+
+
+def skew(norm: int) -> Families:
+    """The skew term, (6) or (21), and for the 1-norm its rows (24), (25). w_beta is meant once."""
+    if norm == 2:
+        yield term("skew", I, w_beta * beta**2, "(6)")
+        return
+    yield term("skew", I, w_beta * psi, "(21)")
+    yield row(24, I, psi >= beta)
+    yield row(25, I, psi >= -beta)
+
+
+def jump_bounds() -> Families:
+    """Rows p_min <= p1 + 2 p2 <= p_max, where the bounds of p1 and p2 do not say it already."""
+    yield row("jlo", E, p1 + 2 * p2 >= p_min, "(7), bounded", only=("p_min", 1))
+    yield row("jup", E, p1 + 2 * p2 <= p_max, "(7), bounded", only=("p_max", 0))
+
+
+def facets_of_z(facet: Facet) -> Families:
+    """The facets of z = p1 beta_i: (26)-(29). With `printed`, (26) is the lower bound of z and no row."""
+    if facet == "hull":
+        yield row(26, E, z >= -pi / 4 * p1, "(26), corrected")
+    yield row(27, E, z <= beta_i - pi / 4 * p1 + pi / 4)
+    yield row(28, E, z <= pi / 4 * p1)
+    yield row(29, E, z >= beta_i + pi / 4 * p1 - pi / 4)
+
+
+def declare(name: str, **chosen: Any) -> Formulation:
+    """The formulation of that name with the chosen options: facet, stroke_norm, beta_norm, relax.
+
+    An option that is None keeps its default. Raises FormulationError for an unknown name, option or value.
+    """
+    if name not in FORMULATIONS:
+        raise FormulationError(f"there is no formulation {name!r}; choose one of {', '.join(FORMULATIONS)}")
+    return FORMULATIONS[name].with_options({key: value for key, value in chosen.items() if value is not None})
+
+
+__all__ = ["AT_JUMPS", "CUBIC", "FORMULATIONS", "PARITY", "QUARTIC", "TWO_NORM", "declare", "facets_of_z"]

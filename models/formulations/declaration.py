@@ -1,0 +1,301 @@
+"""What a declared formulation is made of: families of terms and rows, options,
+and the table that a declaration enters.
+
+A formulation is a function that yields its families from top to bottom. Its parameters are its options, the
+first line of its docstring is its summary, and the decorator `formulation` states all else that is known of
+it. Nothing about it stands anywhere else.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from types import MappingProxyType
+from typing import Any, Final, Literal, get_args
+
+import sympy as sp
+
+from ..errors import FormulationError
+from .symbols import SLOTS, VARIABLES, IndexSet
+
+Facet = Literal["hull", "printed"]
+FACETS: Final[tuple[str, ...]] = get_args(Facet)
+NORMS: Final = (1, 2)
+
+I: Final[IndexSet] = "pixels"  # noqa: E741 - the paper's letter
+S_C: Final[IndexSet] = "strokes"
+E: Final[IndexSet] = "pairs"
+
+
+@dataclass(frozen=True)
+class Family:
+    """One expression over one index set: a term of the objective, or a row.
+
+    tag: short name, the stem of row names; a row's expression is a relation. paper: where it comes from.
+    only: (`p_min` or `p_max`, parity) for rows that are needed only where it has this parity, else None.
+    """
+
+    tag: str
+    over: IndexSet
+    expression: sp.Expr
+    paper: str
+    only: tuple[str, int] | None = None
+
+    @property
+    def is_row(self) -> bool:
+        """Whether it is a row; else it is a term of the objective."""
+        return bool(self.expression.is_Relational)
+
+    @property
+    def body(self) -> sp.Expr:
+        """The term itself, or left minus right side of a row."""
+        e = self.expression
+        return e.lhs - e.rhs if self.is_row else e
+
+    @property
+    def sense(self) -> str:
+        """`>=`, `<=` or `==` for a row, empty for a term of the objective."""
+        e = self.expression
+        return {"Eq": "=="}.get(e.func.__name__, e.rel_op) if self.is_row else ""
+
+    @property
+    def symbols(self) -> list[sp.Symbol]:
+        """Its symbols that are quantities on the grid, in the order of the notation."""
+        present = self.expression.free_symbols
+        return [symbol for symbol in SLOTS[self.over] if symbol in present]
+
+    def unknowns(self, fixed: tuple[str, ...] = ()) -> list[sp.Symbol]:
+        """Those of its symbols that mean variables, the ones that are fixed aside."""
+        return [
+            symbol
+            for symbol in self.symbols
+            if (quantity := SLOTS[self.over][symbol][0]) in VARIABLES and quantity not in fixed
+        ]
+
+
+def term(tag: str, over: IndexSet, expression: sp.Expr, paper: str = "") -> Family:
+    """A term of the objective: the sum of the expression over an index set.
+    paper: by default the formulation's own section.
+    """
+    return Family(tag, over, expression, paper)
+
+
+def row(
+    number: int | str,
+    over: IndexSet,
+    relation: sp.Expr,
+    paper: str = "",
+    *,
+    only: tuple[str, int] | None = None,
+) -> Family:
+    """A row for each element of an index set. number: of the equation in the paper,
+    or a tag where it has none.
+    """
+    tag = f"c{number}" if isinstance(number, int) else number
+    return Family(tag, over, relation, paper or f"({number})", only)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a formulation leaves open: facet of z, norms of the stroke and the skew term,
+    integrality dropped.
+    """
+
+    facet: Facet = "hull"
+    stroke_norm: int = 2
+    beta_norm: int = 2
+    relax: bool = False
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A line of the table of formulations.
+
+    name; paper: its section; kind: the class as people call it; short: how names of library entries carry it;
+    minimises: what its objective is, the same words for formulations with the same optimum; how: why it says
+    the same as the others with these words; families: yields terms and rows for the options that it takes;
+    fixed: variables that are data.
+    """
+
+    name: str
+    paper: str
+    kind: str
+    short: str
+    minimises: str
+    how: str
+    families: Callable[..., Iterator[Family]]
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """One line on what distinguishes it."""
+        first = (inspect.getdoc(self.families) or "").splitlines()[0].rstrip(".")
+        return first[0].lower() + first[1:]
+
+    @cached_property
+    def defaults(self) -> Options:
+        """The options it has when none is chosen."""
+        own = inspect.signature(self.families).parameters.values()
+        return Options(**{parameter.name: parameter.default for parameter in own})
+
+    @cached_property
+    def settable(self) -> frozenset[str]:
+        """Names of the options that may be chosen;
+        integrality can be dropped where a variable is an integer.
+        """
+        return frozenset(inspect.signature(self.families).parameters) | (
+            {"relax"} if not self.fixed else set()
+        )
+
+    @property
+    def equivalent(self) -> str:
+        """The first other formulation with the same optimum, empty when there is none."""
+        same = (other.name for other in FORMULATIONS.values() if other.minimises == self.minimises)
+        return next((name for name in same if name != self.name), "")
+
+    def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
+        """The formulation with the chosen options.
+
+        Raises FormulationError for an unknown or unfitting one.
+        """
+        options = self._options(chosen)
+        given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
+        families = [
+            family if family.paper else replace(family, paper=self.paper) for family in self.families(**given)
+        ]
+        objective = tuple(family for family in families if not family.is_row)
+        return Formulation(self, options, objective, tuple(family for family in families if family.is_row))
+
+    def _options(self, chosen: Mapping[str, Any]) -> Options:
+        known = Options.__dataclass_fields__
+        for key, value in chosen.items():
+            if key not in known:
+                raise FormulationError(f"there is no option {key!r}; the options are {', '.join(known)}")
+            if key not in self.settable and value != getattr(self.defaults, key):
+                raise FormulationError(
+                    f"{self.name} has no option {key}; it is always {getattr(self.defaults, key)}"
+                )
+        options = replace(self.defaults, **chosen)
+        if options.facet not in FACETS:
+            raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")
+        if options.stroke_norm not in NORMS or options.beta_norm not in NORMS:
+            raise FormulationError("a norm is 1 or 2")
+        return options
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """A declared formulation with its options chosen: terms of the objective and rows, in order.
+
+    lifted: how products were lifted, empty when they were not.
+    """
+
+    declaration: Declaration
+    options: Options
+    objective: tuple[Family, ...]
+    rows: tuple[Family, ...]
+    lifted: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name in the table."""
+        return self.declaration.name
+
+    @property
+    def paper(self) -> str:
+        """Its section of the paper."""
+        return self.declaration.paper
+
+    @property
+    def summary(self) -> str:
+        """One line on what distinguishes it."""
+        return self.declaration.summary
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """Variables that are data: p1 and p2 of `qp-fixed`."""
+        return self.declaration.fixed
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the blocks of columns, in the order of VARIABLES."""
+        used = {
+            SLOTS[family.over][symbol][0]
+            for family in (*self.objective, *self.rows)
+            for symbol in family.symbols
+        }
+        return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
+
+    @property
+    def equivalent(self) -> str:
+        """Another formulation of the very same problem, empty when there is none: relaxations have none."""
+        return "" if self.options.relax else self.declaration.equivalent
+
+    @property
+    def weakened(self) -> bool:
+        """Whether lifting made it a relaxation of itself: z between its facets is p1 beta_i at p1 = 0 and 1
+        alone, and here p1 may lie between.
+        """
+        return bool(self.lifted) and self.options.relax
+
+    @property
+    def convex(self) -> bool:
+        """Whether its continuous relaxation is known to be convex: linear rows,
+        and an objective that is a sum of squares as written.
+        """
+        return _is_convex(self.objective, self.rows, self.fixed)
+
+
+@cache
+def _is_convex(objective: tuple[Family, ...], rows: tuple[Family, ...], fixed: tuple[str, ...]) -> bool:
+    """The families are few, so each set of them is looked at once however many problems there are."""
+    return all(_degree(family.body, family.unknowns(fixed)) <= 1 for family in rows) and all(
+        _is_sum_of_squares(family.expression, family.unknowns(fixed)) for family in objective
+    )
+
+
+def _is_sum_of_squares(expression: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
+    """Whether every term is linear, or a square of a linear expression that is not taken away."""
+    return all(_is_square(summand, unknowns) for summand in sp.Add.make_args(expression))
+
+
+def _is_square(summand: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
+    if _degree(summand, unknowns) <= 1:
+        return True
+    number, rest = summand.as_coeff_Mul()
+    factors = [factor for factor in sp.Mul.make_args(rest) if factor.free_symbols & set(unknowns)]
+    if len(factors) != 1 or number < 0:
+        return False
+    return bool(factors[0].is_Pow and factors[0].exp == 2 and _degree(factors[0].base, unknowns) == 1)
+
+
+def _degree(expression: sp.Expr, unknowns: list[sp.Symbol]) -> float:
+    """Degree in the unknowns; infinite for what is no polynomial."""
+    if not unknowns:
+        return 0
+    if not expression.is_polynomial(*unknowns):
+        return float("inf")
+    return int(sp.Poly(expression, *unknowns).total_degree())
+
+
+_TABLE: Final[dict[str, Declaration]] = {}
+
+FORMULATIONS: Final[Mapping[str, Declaration]] = MappingProxyType(_TABLE)
+"""The table of formulations by name; command line, library, docs and tests are generated from it."""
+
+
+def formulation(
+    name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
+) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
+    """A decorator that enters a function which yields families into the table,
+    as the `Declaration` of that name.
+    """
+
+    def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
+        assert name not in _TABLE, f"there are two formulations {name}"
+        _TABLE[name] = Declaration(name, paper, kind, short, minimises, how, families, fixed)
+        return _TABLE[name]
+
+    return enter

@@ -1,0 +1,573 @@
+"""A problem: a formulation bound to an instance.
+
+Columns, rows and terms as arrays; values and violations at points.
+
+Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the
+declaration: SymPy splits an expression into monomials once per family, index arrays do the rest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from ..errors import FormulationError, InstanceError
+from ..field.field import CrossField
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import Instance, whole_numbers
+from .catalogue import declare
+from .declaration import FORMULATIONS, Family, Formulation
+from .lifting import lift_products
+from .monomials import beyond_noise, merged, monomials, ordered
+from .symbols import SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
+
+Coefficient = float | Floats
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of columns: offset of the first one, bounds (count,), and whether they are integer."""
+
+    name: str
+    over: IndexSet
+    offset: int
+    lower: Floats
+    upper: Floats
+    integer: bool
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.lower)
+
+    @property
+    def columns(self) -> slice:
+        """The columns as a slice of a point."""
+        return slice(self.offset, self.offset + self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A monomial of a family: its symbols, each as often as its power says,
+    and its coefficient (a number or one per element).
+    """
+
+    family: Bound
+    symbols: tuple[sp.Symbol, ...]
+    coefficient: Coefficient
+
+    @property
+    def factors(self) -> tuple[Ints, ...]:
+        """Columns of its symbols, one array (count,) each; made anew at every call,
+        so that none stays in memory.
+        """
+        return tuple(map(self.family.columns, self.symbols))
+
+    @property
+    def degree(self) -> int:
+        """Number of factors."""
+        return len(self.symbols)
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A family bound to an instance: where its elements are and which columns its symbols mean.
+
+    elements: indices into the family's index set, shape (count,). `terms` is None for what is no polynomial.
+    """
+
+    family: Family
+    problem: Problem
+    elements: Ints
+
+    @property
+    def count(self) -> int:
+        """Number of rows, or of summands of the objective."""
+        return len(self.elements)
+
+    @cached_property
+    def variables(self) -> tuple[sp.Symbol, ...]:
+        """Symbols that mean columns."""
+        slots = SLOTS[self.family.over]
+        return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
+
+    def columns(self, symbol: sp.Symbol) -> Ints:
+        """Column of the symbol at each element, shape (count,)."""
+        block, inside = self.block(symbol), self.inside(symbol)
+        own = np.arange(block.count, dtype=np.int32) if inside is None else inside
+        return own + np.int32(block.offset)
+
+    def block(self, symbol: sp.Symbol) -> Block:
+        """The block of columns that a symbol means."""
+        return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
+
+    def inside(self, symbol: sp.Symbol) -> Ints | None:
+        """Place in its block of the symbol at each element, shape (count,);
+        None where it is the element's own place.
+        """
+        index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
+        if isinstance(index, slice):
+            return None if self.everywhere else self.elements
+        return index if self.everywhere else index[self.elements]
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether its elements are the whole index set."""
+        return self.family.only is None
+
+    def _reach(self, values: Any, kind: Any) -> Any:
+        index = way(self.problem.instance, kind)
+        return values[self.elements] if isinstance(index, slice) else values[index[self.elements]]
+
+    def data(self, expression: sp.Expr) -> Coefficient:
+        """Value of an expression free of columns: a number, or an array (count,)."""
+        symbols = sorted(expression.free_symbols, key=_name)
+        if not symbols:
+            return float(expression)
+        value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
+        return value if np.ndim(value) else float(value)
+
+    def _datum(self, symbol: sp.Symbol) -> Any:
+        if symbol in SCALARS:
+            return getattr(self.problem.instance, SCALARS[symbol])
+        name, kind = SLOTS[self.family.over][symbol]
+        return self._reach(self.problem.data[name], kind)
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...] | None:
+        """Its monomials, the constant one included, or None when it is no polynomial."""
+        split = monomials(self.family, self.variables)
+        if split is None:
+            return None
+        return tuple(Term(self, symbols, self.data(c)) for symbols, c in split)
+
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomial; 99 for what is none."""
+        return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
+
+    def of_degree(self, degree: int) -> tuple[Term, ...]:
+        """Its monomials of that degree."""
+        return tuple(term for term in self.terms or () if term.degree == degree)
+
+    @cached_property
+    def scale(self) -> Floats:
+        """The largest coefficient of each element's monomials, shape (count,):
+        rounding errors are measured by it.
+        """
+        scale = np.zeros(self.count)
+        for term in self.terms or ():
+            scale = np.maximum(scale, np.abs(term.coefficient))
+        return scale
+
+    @cached_property
+    def limit(self) -> Floats:
+        """Right side of each row once its constant has moved there, shape (count,)."""
+        constant = sum((np.asarray(term.coefficient) for term in self.of_degree(0)), np.zeros(()))
+        return np.broadcast_to(0.0 - constant, (self.count,))
+
+    def values(self, point: Floats) -> Floats:
+        """The expression (of a row: left minus right side) at a point, one value per element,
+        shape (count,).
+        """
+        symbols = sorted(self.family.body.free_symbols, key=_name)
+        evaluate = numeric(symbols, self.family.body)
+        given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
+        return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
+
+
+@dataclass(frozen=True)
+class Violation:
+    """The worst violations of a point: of rows, of bounds, of integrality; zero when there is none."""
+
+    rows: float
+    bounds: float
+    integrality: float
+    worst_family: str
+
+    @property
+    def worst(self) -> float:
+        """The largest of the three."""
+        return max(self.rows, self.bounds, self.integrality)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A formulation bound to an instance.
+
+    jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns
+    are fixed (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are
+    not fixed; the angles and jumps of all others then are.
+    """
+
+    instance: Instance
+    formulation: Formulation
+    jumps: Ints | None = None
+    pinned: CrossField | None = None
+    free: Bools | None = None
+
+    def __post_init__(self) -> None:
+        """Check that jumps are there exactly where they are data,
+        and that what is fixed is of this instance.
+        """
+        if (self.jumps is None) == bool(self.formulation.fixed):
+            raise FormulationError(
+                f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
+                if self.formulation.fixed
+                else f"{self.formulation.name} has the jumps as variables; leave p out"
+            )
+        if self.jumps is not None:
+            jumps = np.array(self.jumps, dtype=np.int32)
+            if jumps.shape != (elements(self.instance, "pairs"),):
+                raise FormulationError(
+                    f"p has shape {jumps.shape}, but the grid has {elements(self.instance, 'pairs')} pairs"
+                )
+            object.__setattr__(self, "jumps", jumps)
+        if self.pinned is not None:
+            self._check_instance_of(self.pinned)
+        if self.free is not None and self.free.shape != (self.instance.grid.size,):
+            raise FormulationError(
+                f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
+            )
+
+    def _check_instance_of(self, field: CrossField) -> None:
+        if field.instance.sha256 != self.instance.sha256:
+            raise InstanceError(
+                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, "
+                "or under another gauge"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of its formulation."""
+        return self.formulation.name
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """Arrays that symbols may mean beside columns."""
+        data: dict[str, Any] = {
+            "theta": self.instance.target,
+            "w": self.instance.w,
+            "alpha_lo": self.instance.alpha_lower,
+            "alpha_up": self.instance.alpha_upper,
+            "p_min": self.instance.p_min,
+            "p_max": self.instance.p_max,
+        }
+        if self.jumps is not None:
+            data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
+        return data
+
+    @cached_property
+    def blocks(self) -> dict[str, Block]:
+        """Blocks of columns by name, in column order."""
+        blocks: dict[str, Block] = {}
+        offset = 0
+        for name in self.formulation.variables:
+            variable = VARIABLES[name]
+            shape = (elements(self.instance, variable.over),)
+            lower, upper = (
+                np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
+            )
+            integer = variable.integer and not self.formulation.options.relax
+            fixed = self._fixed(variable)
+            if self.pinned is not None and fixed is not None:
+                at = _at_field(self, name, _angles_and_jumps(self.pinned))
+                lower, upper = np.where(fixed, at, lower), np.where(fixed, at, upper)
+                integer = integer and not fixed.all()
+            blocks[name] = Block(name, variable.over, offset, lower, upper, integer)
+            offset += shape[0]
+        return blocks
+
+    def _value(self, bound: sp.Expr) -> Floats:
+        """Values of a bound: one for each element, or one for all."""
+        symbols = sorted(bound.free_symbols, key=_name)
+        return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
+
+    def _fixed(self, variable: Variable) -> Bools | None:
+        """True for the columns of a variable that are fixed at the pinned field, if there is one;
+        None when none of them can be.
+        """
+        count = elements(self.instance, variable.over)
+        if self.free is None:
+            return np.ones(count, bool) if variable.integer else None
+        if variable.integer:
+            grid = self.instance.grid
+            return ~(self.free[grid.first] | self.free[grid.second])
+        return ~self.free if variable.name in {"alpha", "beta"} else None
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return sum(block.count for block in self.blocks.values())
+
+    @cached_property
+    def lower(self) -> Floats:
+        """Lower bounds of all columns."""
+        return np.concatenate([block.lower for block in self.blocks.values()])
+
+    @cached_property
+    def upper(self) -> Floats:
+        """Upper bounds of all columns."""
+        return np.concatenate([block.upper for block in self.blocks.values()])
+
+    @cached_property
+    def integer(self) -> Bools:
+        """True for integer columns."""
+        return np.concatenate([np.full(block.count, block.integer) for block in self.blocks.values()])
+
+    @cached_property
+    def objective(self) -> tuple[Bound, ...]:
+        """Terms of the objective bound to the instance, empty ones left out."""
+        return self._bind(self.formulation.objective)
+
+    @cached_property
+    def rows(self) -> tuple[Bound, ...]:
+        """Families of rows bound to the instance, in row order, empty ones left out."""
+        return self._bind(self.formulation.rows)
+
+    def _bind(self, families: tuple[Family, ...]) -> tuple[Bound, ...]:
+        bound = (Bound(family, self, self._elements(family)) for family in families)
+        return tuple(family for family in bound if family.count)
+
+    def _elements(self, family: Family) -> Ints:
+        if family.only is None:
+            return np.arange(elements(self.instance, family.over), dtype=np.int32)
+        name, parity = family.only
+        return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows."""
+        return sum(family.count for family in self.rows)
+
+    @cached_property
+    def objective_degree(self) -> int:
+        """Degree of the objective; 99 when it is no polynomial."""
+        return max((family.degree for family in self.objective), default=0)
+
+    @cached_property
+    def row_degree(self) -> int:
+        """Greatest degree of a row; 99 when one is no polynomial, 0 without rows."""
+        return max((family.degree for family in self.rows), default=0)
+
+    @property
+    def problem_class(self) -> str:
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP,
+        by what is in it (any QP and MIQP may be non-convex: see `convex`).
+        """
+        integer = "MI" if self.integer.any() else ""
+        if max(self.objective_degree, self.row_degree) > 2:
+            return f"{integer}NLP"
+        if self.row_degree == 2:
+            return f"{integer}QCP"
+        if self.objective_degree == 2:
+            return f"{integer}QP"
+        return f"{integer}LP"
+
+    @property
+    def convex(self) -> bool:
+        """Whether its continuous relaxation is known to be convex."""
+        return self.formulation.convex
+
+    def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
+        """The monomials of that degree, each set of columns once, sorted:
+        columns (k, degree) and coefficients (k,).
+
+        Coefficients that cancel are left out. Shape (1, 0) for the constant.
+        """
+        terms = [(term, family) for family in self.objective for term in family.of_degree(degree)]
+        coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
+        if degree == 0:
+            total = sum(float(np.sum(values)) for values in coefficients)
+            return np.zeros((1, 0), np.int32), np.array([total])
+        if not terms:
+            return np.zeros((0, degree), np.int32), np.zeros(0)
+        if degree == 1:
+            return self._merged_costs([term for term, _ in terms])
+        index = np.concatenate([ordered(term.factors) for term, _ in terms])
+        scale = np.concatenate([family.scale for _, family in terms])
+        return merged(index, np.concatenate(coefficients), scale, self.columns)
+
+    def _merged_costs(self, terms: list[Term]) -> tuple[Ints, Floats]:
+        reached = [(term.family.block(term.symbols[0]), term) for term in terms]
+        costs = [
+            _costs([term for other, term in reached if other is block], block)
+            for block in self.blocks.values()
+        ]
+        index, cost = zip(*costs, strict=True)
+        return np.concatenate(index), np.concatenate(cost)
+
+    def objective_value(self, point: Floats) -> float:
+        """The objective at a point (columns,)."""
+        return float(sum(np.sum(family.values(point)) for family in self.objective))
+
+    def violation(self, point: Floats) -> Violation:
+        """The worst violations of rows, bounds and integrality at a point (columns,)."""
+        worst = {
+            family.family.tag: float(np.max(_excess(family.family.sense, family.values(point))))
+            for family in self.rows
+        }
+        tag = max(worst, key=lambda name: worst[name], default="")
+        bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
+        gaps = np.abs(point - np.round(point))[self.integer]
+        return Violation(
+            rows=max(worst.get(tag, 0.0), 0.0),
+            bounds=float(bounds.max(initial=0.0)),
+            integrality=float(gaps.max(initial=0.0)),
+            worst_family=tag,
+        )
+
+    def point(self, field: CrossField) -> Floats:
+        """The complete point of a field: angles, jumps, and every other column at the value it stands for.
+
+        Raises InstanceError when the field is on another instance.
+        """
+        self._check_instance_of(field)
+        given = _angles_and_jumps(field)
+        return np.concatenate([_at_field(self, name, given) for name in self.blocks])
+
+    def field(self, point: Floats) -> CrossField:
+        """The cross field of a point, jumps rounded to the nearest integer.
+
+        Raises InstanceError for jumps beyond 32 bits.
+        """
+        if self.jumps is not None:
+            jumps = self.jumps
+        elif "p" in self.blocks:
+            jumps = whole_numbers(np.round(point[self.blocks["p"].columns]), "p")
+        else:
+            halves = np.round(point[self.blocks["p2"].columns])
+            jumps = whole_numbers(np.round(point[self.blocks["p1"].columns] + 2 * halves), "p")
+        return CrossField(
+            self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps
+        )
+
+    @cached_property
+    def sha256(self) -> str:
+        """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
+        return self._digest(self.formulation.lifted)
+
+    @cached_property
+    def stamp(self) -> str:
+        """`sha256_` and the first 12 digits of the hash before products were lifted:
+        the one that a manifest has, short enough for names.
+        """
+        return f"sha256_{self._digest('')[:12]}"
+
+    def _digest(self, lifting: str) -> str:
+        text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {lifting}"
+        digest = hashlib.sha256(text.encode())
+        for jumps in (self.jumps, None if self.pinned is None else self.pinned.p):
+            digest.update(b"" if jumps is None else jumps.astype("<i4").tobytes())
+        if self.pinned is not None and self.free is not None:
+            for values in (self.pinned.alpha, self.pinned.beta):
+                digest.update(values.astype("<f8").tobytes())
+            digest.update(np.packbits(self.free).tobytes())
+        return digest.hexdigest()
+
+
+def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
+    p = field.p.astype(np.int64)
+    return {"alpha": field.alpha, "beta": field.beta, "p": p, "p1": p & 1, "p2": p >> 1}
+
+
+def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
+    """The block of columns `name` where angles and jumps have the given values,
+    from the variable's own definition.
+    """
+    if name in given:
+        return np.asarray(given[name], dtype=np.float64)
+    variable = VARIABLES[name]
+    sources = problem.data | given
+    symbols = sorted(variable.value.free_symbols, key=_name)
+    slots = (SLOTS[variable.over][symbol] for symbol in symbols)
+    arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
+    return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
+
+
+def _excess(sense: str, values: Floats) -> Floats:
+    if sense == "==":
+        return np.abs(values)
+    return values if sense == "<=" else -values
+
+
+def _costs(terms: list[Term], block: Block) -> tuple[Ints, Floats]:
+    """As `merged`, for the single columns of a block: one number each,
+    to which the terms are added in turn.
+    """
+    if not terms:
+        return np.zeros((0, 1), np.int32), np.zeros(0)
+    total, scale = np.zeros(block.count), np.zeros(block.count)
+    for term in terms:
+        inside = term.family.inside(term.symbols[0])
+        _add(total, inside, term.coefficient)
+        _add(scale, inside, term.family.scale)
+    kept = np.nonzero(beyond_noise(total, scale))[0]
+    return (block.offset + kept).astype(np.int32)[:, None], total[kept]
+
+
+def _add(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
+    if inside is None:
+        sums += values
+    else:
+        np.add.at(sums, inside, values)
+
+
+def _name(symbol: sp.Symbol) -> str:
+    return str(symbol.name)
+
+
+def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
+    """The problem of that formulation on the instance.
+
+    name: as `crossfield list` shows them. options, where the formulation has them: facet (`hull`, `printed`),
+    stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the jumps (m,), for
+    `qp-fixed` alone.
+    Raises FormulationError for an unknown name, option or value (docs/formulations.md has the formulas).
+    """
+    return Problem(instance, declare(name, **options), p)
+
+
+def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
+    """The same problem with its integer columns fixed at the jumps of a field: a continuous problem.
+
+    Fixed columns stay, with equal bounds: names and order are those of the problem. Raises InstanceError when
+    the field is on another instance.
+    """
+    return replace(problem, pinned=field)
+
+
+def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem:
+    """The same problem in which only the angles of some pixels and the jumps to and between them are free;
+    all else as in a field.
+
+    free: those pixels, shape (n,). Raises InstanceError when the field is on another instance,
+    FormulationError for another shape.
+    """
+    return replace(problem, pinned=field, free=free)
+
+
+def lifted(problem: Problem) -> Problem:
+    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic;
+    see `Formulation.weakened`.
+    """
+    return replace(problem, formulation=lift_products(problem.formulation))
+
+
+__all__ = [
+    "FORMULATIONS",
+    "Block",
+    "Bound",
+    "Problem",
+    "Term",
+    "Violation",
+    "formulate",
+    "lifted",
+    "with_integers_fixed",
+    "with_rest_fixed",
+]

@@ -1,0 +1,186 @@
+"""The symbols of the formulations: which quantity each one means, and where on the grid it lives.
+
+A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
+S_c or the neighbour pairs E. A *slot* is a symbol in an expression over such a set; it names a quantity and
+the way to it: over the pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a
+sketch changes the length of the index arrays, never an expression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, Final, Literal
+
+import numpy as np
+import sympy as sp
+
+from ..instance.grid import Ints
+from ..instance.instance import HALF, Instance
+
+IndexSet = Literal["pixels", "strokes", "pairs"]
+Way = Literal["itself", "first", "second", "stroke"]
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", "psi"))
+alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
+p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
+p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
+alpha_lo, alpha_up = (_symbol(name) for name in ("alpha_lo", "alpha_up"))
+w_strokes, w_beta = (_symbol(name) for name in ("w_strokes", "w_beta"))
+pi: Final = sp.pi
+
+A: Final = alpha_i - alpha_j + pi / 2 * (p1 + 2 * p2)
+"""Change of direction across a pair, (8)."""
+B: Final = (1 - 2 * p1) * beta_i - beta_j
+"""Change of skew across a pair, bilinear, (8)."""
+B_LIFTED: Final = beta_i - 2 * z - beta_j
+"""Change of skew with z standing for p1 beta_i, section 4."""
+R: Final = alpha + beta - theta
+"""Deviation of line u from its stroke, (5)."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A block of columns: one variable per element of an index set.
+
+    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format,
+    NumPy and the formulas of the docs read them; value: the variable at a given field, as an expression over
+    its index set; meaning: one line for the docs.
+    """
+
+    name: str
+    over: IndexSet
+    lower: sp.Expr
+    upper: sp.Expr
+    value: sp.Expr
+    meaning: str
+    integer: bool = field(default=False, kw_only=True)
+
+
+_FREE: Final = sp.oo
+_QUARTER: Final = pi / 4
+_ZERO: Final = sp.Integer(0)
+
+VARIABLES: Final = {
+    variable.name: variable
+    for variable in (
+        Variable("alpha", "pixels", alpha_lo, alpha_up, alpha, "direction of the cross"),
+        Variable("beta", "pixels", -_QUARTER, _QUARTER, beta, "skew of the cross"),
+        Variable("p", "pairs", p_min, p_max, p, "jump between the labels of two neighbours", integer=True),
+        Variable("p1", "pairs", _ZERO, sp.Integer(1), sp.Mod(p, 2), "1 when the jump is odd", integer=True),
+        Variable("p2", "pairs", sp.floor(p_min / 2), sp.floor(p_max / 2), sp.floor(p / 2),
+                 "half of the even part of the jump", integer=True),
+        Variable("s", "pairs", _ZERO, _FREE, sp.Abs(A), "absolute change of direction"),
+        Variable("t", "pairs", _ZERO, _FREE, sp.Abs(B), "absolute change of skew"),
+        Variable("z", "pairs", -_QUARTER, _QUARTER, p1 * beta_i,
+                 "the product of p1 and beta of the first pixel"),
+        Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
+        Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
+        Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
+        Variable("psi", "pixels", _ZERO, _FREE, sp.Abs(beta), "absolute skew"),
+    )
+}  # fmt: skip
+"""Every variable of every formulation, in the order of columns."""
+
+SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
+    "pixels": {symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up)},
+    "strokes": {
+        alpha: ("alpha", "stroke"),
+        beta: ("beta", "stroke"),
+        gamma: ("gamma", "itself"),
+        theta: ("theta", "itself"),
+        w: ("w", "itself"),
+    },
+    "pairs": {
+        alpha_i: ("alpha", "first"),
+        alpha_j: ("alpha", "second"),
+        beta_i: ("beta", "first"),
+        beta_j: ("beta", "second"),
+        **{symbol: (symbol.name, "itself") for symbol in (p, p1, p2, s, t, z, d, u, p_min, p_max)},
+    },
+}
+"""For each index set: symbol -> (quantity, way to it)."""
+
+SCALARS: Final = {w_strokes: "w_strokes", w_beta: "w_beta"}
+"""Symbols that are one number for the whole instance."""
+
+LATEX: Final = {
+    **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},
+    alpha: r"\alpha_i",
+    beta: r"\beta_i",
+    gamma: r"\gamma_i",
+    psi: r"\psi_i",
+    alpha_i: r"\alpha_i",
+    alpha_j: r"\alpha_j",
+    beta_i: r"\beta_i",
+    beta_j: r"\beta_j",
+    p1: r"p_{ij,1}",
+    p2: r"p_{ij,2}",
+    p_min: r"p^{\min}_{ij}",
+    p_max: r"p^{\max}_{ij}",
+    alpha_lo: r"\underline{\alpha}_i",
+    alpha_up: r"\overline{\alpha}_i",
+    theta: r"\theta_i",
+    w: r"w_i",
+    w_strokes: r"w_{\mathrm{strokes}}",
+    w_beta: r"w_{\beta}",
+}
+
+
+def elements(instance: Instance, over: IndexSet) -> int:
+    """Number of elements of an index set."""
+    sizes = {"pixels": instance.grid.size, "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
+    return sizes[over]
+
+
+def way(instance: Instance, kind: Way) -> Ints | slice:
+    """Index array that leads from the elements of a family to the elements of a quantity."""
+    if kind == "first":
+        return instance.grid.first
+    if kind == "second":
+        return instance.grid.second
+    return instance.stroke_index if kind == "stroke" else slice(None)
+
+
+def pixel_of(instance: Instance, over: IndexSet) -> Ints:
+    """Number of the pixel at which each element of an index set lies (of a pair: its first pixel)."""
+    if over == "pixels":
+        return np.arange(instance.grid.size, dtype=np.int32)
+    return instance.stroke_index if over == "strokes" else instance.grid.first
+
+
+def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
+    """A NumPy function of the symbols that evaluates the expression over whole arrays."""
+    return _compiled(tuple(arguments), expression)
+
+
+@cache
+def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
+    """The declarations are few and fixed, so each is compiled once however many
+    problems and points there are.
+    """
+    return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
+
+
+__all__ = [
+    "B_LIFTED",
+    "HALF",
+    "LATEX",
+    "SCALARS",
+    "SLOTS",
+    "VARIABLES",
+    "A",
+    "B",
+    "R",
+    "Variable",
+    "elements",
+    "numeric",
+    "pixel_of",
+    "way",
+]

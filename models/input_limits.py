@@ -1,0 +1,58 @@
+"""How much is read at most of files that come from elsewhere: the one table of all readers of inputs.
+
+A file beyond a limit is refused with a message that states it, before the work or the memory is spent. Each
+limit is far above what sketches, instances and fields of the largest grid need.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+MAX_BYTES: Final = 200_000_000
+"""Bytes of a file, but for archives of arrays (MAX_ARCHIVE)."""
+
+# SVG
+MAX_TAGS: Final = 1_000_000
+"""Tags and attributes of a drawing."""
+MAX_ELEMENTS: Final = 100_000
+"""Elements drawn, those repeated by `use` counted each time."""
+MAX_USES: Final = 10_000
+"""Copies made by `use`."""
+MAX_USE_DEPTH: Final = 100
+"""Copies inside of copies."""
+MAX_DATA: Final = 10_000_000
+"""Characters of path data, point lists, styles and transforms of elements."""
+MAX_CURVES: Final = 500_000
+"""Segments of all shapes, those repeated by `use` counted each time."""
+MAX_LENGTH: Final = 64
+"""Characters of a length or a colour."""
+MAX_TRANSFORM: Final = 1000
+"""Characters of a transform."""
+LEAST_LENGTH: Final = 1e-9
+"""Width and height of a page: below it the quotient of two lengths is no number any more."""
+MAX_STYLE: Final = 1_000_000
+"""Characters of style sheets."""
+MAX_RULE_CHECKS: Final = 1_000_000
+"""Comparisons of style rules with elements."""
+
+# Strokes on the grid
+MAX_SEGMENTS: Final = 5_000_000
+"""Straight segments that curves are cut into."""
+MAX_PIECES: Final = 40_000_000
+"""Pieces of segments between pixel edges."""
+MAX_LINES: Final = 500_000
+"""Lines of a .scap file, one for each sample of a pen stroke."""
+
+# Pictures
+MAX_SIDE: Final = 40_000
+MAX_PIXELS: Final = 80_000_000
+
+# Instances and fields
+MAX_GRID: Final = 9999
+"""Rows and columns of a grid."""
+MAX_ARCHIVE: Final = 1 << 31
+"""Bytes of an .npz, and of what is read of it unpacked: a field on a grid of 9999 x 9999 takes more,
+one that can be solved far less.
+"""
+MAX_HEAD: Final = 1 << 20
+"""Bytes of the text in an .npz."""

@@ -1,0 +1,276 @@
+"""Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large grids."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.resources import files
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+
+from ..array_archive import Expected, pack_arrays, unpack_arrays
+from ..errors import InstanceError, shortened
+from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
+from ..storage import read_bytes, write_bytes
+from .grid import Floats
+from .instance import Instance
+
+FORMAT: Final = "crossfield-instance"
+VERSION: Final = 1
+_SCALARS = ("name", "gauge", "source", "w_strokes", "w_beta", "pixel_size")
+_ARRAYS = ("mask", "stroke_pixels", "theta", "w")
+_MOST_ERRORS: Final = 100  # of a document, among which the outermost one is told
+_ARCHIVE: Final = {
+    "head": Expected(1, MAX_HEAD, "u"),
+    "origin": Expected(1, 2),
+    "mask": Expected(2, MAX_GRID, "b"),
+    "stroke_pixels": Expected(2, MAX_GRID**2, "iuf"),
+    "theta": Expected(1, MAX_GRID**2),
+    "w": Expected(1, MAX_GRID**2),
+}
+
+
+def write_instance(instance: Instance, path: str | Path) -> Path:
+    """The path of the file that now holds the instance: JSON, or NumPy's .npz when the name ends so.
+
+    Same instance, same bytes. Raises OutputError.
+    """
+    path = Path(path)
+    return write_bytes(path, _npz(instance) if path.suffix.lower() == ".npz" else to_json(instance).encode())
+
+
+def read_instance(path: str | Path) -> Instance:
+    """The instance that a .json or .npz file holds.
+
+    Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the
+    schema.
+    """
+    data = read_bytes(path, MAX_ARCHIVE)
+    try:
+        return unpacked(data) if data[:2] == b"PK" else of_json(decoded(data))
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+
+
+def to_json(instance: Instance) -> str:
+    """The instance as JSON text, one stroke pixel [row, column, theta, w] and one mask row a line."""
+    rows = ["".join("#" if inside else "." for inside in row) for row in instance.mask]
+    strokes = [
+        f"    [{r}, {c}, {theta!r}, {w!r}]"
+        for (r, c), theta, w in zip(
+            instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True
+        )
+    ]
+    head = (
+        {"format": FORMAT, "version": VERSION}
+        | {key: getattr(instance, key) for key in _SCALARS}
+        | {"origin": list(instance.origin)}
+    )
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
+    mask = ",\n".join(f'    "{row}"' for row in rows)
+    return (
+        "{\n"
+        + "\n".join(lines)
+        + f'\n  "mask": [\n{mask}\n  ],\n  "strokes": [\n'
+        + ",\n".join(strokes)
+        + "\n  ]\n}\n"
+    )
+
+
+def decoded(data: bytes) -> str:
+    """The text of a JSON file. Raises InstanceError when it is none or has more than MAX_BYTES bytes."""
+    if len(data) > MAX_BYTES:
+        raise InstanceError(f"has {len(data)} bytes of JSON; at most {MAX_BYTES} are read, write it as .npz")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InstanceError("is neither JSON nor .npz; expected a file written by crossfield") from error
+
+
+def of_json(text: str) -> Instance:
+    """The instance that JSON text describes. Raises InstanceError with the place in the document."""
+    return of_document(parse_json(text))
+
+
+def parse_json(text: str) -> object:
+    """The document that JSON text holds, behind a byte order mark or not.
+
+    Raises InstanceError with line and column.
+    """
+    try:
+        return cast("object", json.loads(text.removeprefix("\ufeff")))
+    except (ValueError, RecursionError) as error:
+        raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
+
+
+def of_document(document: object) -> Instance:
+    """The instance that a parsed JSON document describes.
+
+    Raises InstanceError with the place in the document.
+    """
+    check_version(document, FORMAT, VERSION)
+    document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
+    width = len(document["mask"][0])
+    for number, row in enumerate(document["mask"]):
+        if len(row) != width:
+            raise InstanceError(
+                f"mask row {number} has {len(row)} pixels, the first one {width}; make them equal"
+            )
+    letters = "".join(document["mask"]).encode()
+    mask = np.frombuffer(letters, dtype=np.uint8).reshape(-1, width) == ord("#")
+    strokes = document["strokes"]
+    check_counts(len(strokes), int(np.count_nonzero(mask)))
+    try:
+        return Instance(
+            mask=mask,
+            stroke_pixels=np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
+            theta=np.array([stroke[2] for stroke in strokes], dtype=float),
+            w=np.array([stroke[3] for stroke in strokes], dtype=float),
+            origin=tuple(document.get("origin", (0.0, 0.0))),
+            **{key: document[key] for key in _SCALARS if key in document},
+        )
+    except OverflowError as error:
+        raise InstanceError("holds a number beyond the range of doubles") from error
+
+
+def check_counts(strokes: int, pixels: int) -> None:
+    """Nothing, when there are no more stroke pixels than pixels; else raises InstanceError."""
+    if strokes > pixels:
+        raise InstanceError(
+            f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each stroke pixel once"
+        )
+
+
+def _are_strokes(rows: list[Any]) -> bool:
+    """Whether all rows obey the schema of a stroke."""
+    table = number_table(rows, 4)
+    if table is None:
+        return False
+    w = table[:, 3]
+    return are_places(table[:, :2]) and bool(((w > 0) & (w <= 1)).all())
+
+
+def are_places(numbers: Floats) -> bool:
+    """Whether all numbers are rows and columns of a grid."""
+    return bool(((numbers >= 0) & (numbers < MAX_GRID)).all() and (numbers % 1 == 0).all())
+
+
+def number_table(rows: list[Any], width: int) -> Floats | None:
+    """Rows of numbers as an array (k, width), None when one of them is something else."""
+    if not all(type(row) is list and len(row) == width for row in rows):
+        return None
+    if not {type(value) for row in rows for value in row} <= {int, float}:
+        return None
+    try:
+        return np.array(rows, dtype=np.float64).reshape(-1, width)
+    except OverflowError:
+        return None
+
+
+def check_schema(
+    document: object,
+    schema: str,
+    package: str,
+    rows: Mapping[str, Callable[[list[Any]], bool]] | None = None,
+) -> dict[str, Any]:
+    """The document, which obeys the `<schema>.schema.json` that ships with a package.
+
+    rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not
+    looked at one by one. Raises InstanceError with the place.
+    """
+    assert isinstance(document, dict)
+    quick = {
+        key: document[key][:1]
+        for key, are_good in (rows or {}).items()
+        if _is_list(document.get(key)) and are_good(document[key])
+    }
+    error = schema_error({**document, **quick}, schema, package)
+    if error is not None:
+        raise InstanceError(f"{error.json_path}: {shortened(error.message, 200)}")
+    return cast("dict[str, Any]", document)
+
+
+def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | None:
+    """The outermost jsonschema.ValidationError of a document, None when it obeys its schema.
+
+    A text of the format `line` has printable characters only.
+    """
+    import jsonschema
+
+    lines = jsonschema.FormatChecker(formats=())
+    lines.checks("line")(lambda text: not isinstance(text, str) or text.isprintable())
+    validator = jsonschema.Draft202012Validator(_schema(schema, package), format_checker=lines)
+    first = islice(validator.iter_errors(document), _MOST_ERRORS)
+    return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list)
+
+
+@cache
+def _schema(name: str, package: str) -> dict[str, Any]:
+    return cast(
+        "dict[str, Any]", json.loads(files(package).joinpath(f"{name}.schema.json").read_text("utf-8"))
+    )
+
+
+def check_version(document: object, form: str, version: int) -> None:
+    """Nothing, when the document says that it has this format and version; else raises InstanceError."""
+    if not isinstance(document, dict) or document.get("format") != form:
+        raise InstanceError(f'is not a file of this kind: "format" must be "{form}"')
+    found = document.get("version")
+    if found != version:
+        raise InstanceError(
+            f"has version {str(found)[:20]}, but this program reads version {version}; write it again"
+        )
+
+
+def _npz(instance: Instance) -> bytes:
+    """The .npz bytes; dates are fixed so that equal instances give equal bytes."""
+    return pack_arrays(arrays_of(instance))
+
+
+def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
+    """The instance as named arrays; `head` is JSON text with format, version and scalars."""
+    head = {"format": FORMAT, "version": VERSION} | {key: getattr(instance, key) for key in _SCALARS}
+    arrays = {
+        "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
+        "origin": np.array(instance.origin),
+    }
+    return arrays | {key: getattr(instance, key) for key in _ARRAYS}
+
+
+def unpacked(data: bytes, prefix: str = "") -> Instance:
+    """The instance in an .npz, the names of its arrays led by a prefix.
+
+    Raises InstanceError with the array's name.
+    """
+    return of_arrays(unpack_arrays(data, _ARCHIVE, prefix))
+
+
+def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
+    """The instance that `arrays_of` gave. Raises InstanceError with the array's name."""
+    head = head_of(arrays)
+    check_version(head, FORMAT, VERSION)
+    check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
+    try:
+        scalars = {key: head[key] for key in _SCALARS}
+        origin = (float(arrays["origin"][0]), float(arrays["origin"][1]))
+        entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
+        return Instance(origin=origin, **entries)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+        raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
+
+
+def head_of(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
+    """The parsed JSON text in the array `head`. Raises InstanceError."""
+    try:
+        head = json.loads(arrays["head"].tobytes())
+    except (ValueError, RecursionError) as error:
+        raise InstanceError("its array 'head' is not JSON text") from error
+    return cast("dict[str, Any]", head)

@@ -1,0 +1,62 @@
+"""When work has to end: made once from a limit and passed down, so that every part asks for what is left.
+
+Work that may be cut off asks whether it is over at every good place, and then gives what it has.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+Clock = Callable[[], float]
+
+Over = Callable[[], bool]
+"""Says whether work has to end now: it is asked at every good place, and the work then gives what it has."""
+
+
+def never() -> bool:
+    """False: the work goes on to its own end, and what it gives depends on its input alone."""
+    return False
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """A moment of a clock in seconds, `inf` for none;
+    that of `time.monotonic` is the same in all processes of a machine.
+
+    That holds on Linux and is promised nowhere. So a pickled deadline says how much is left when it is sent,
+    and counts from its arrival.
+    """
+
+    at: float = math.inf
+    clock: Clock = time.monotonic
+
+    @classmethod
+    def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
+        """The moment so many seconds from now."""
+        return cls(clock() + seconds, clock)
+
+    def __reduce__(self) -> tuple[Callable[[float], Deadline], tuple[float]]:
+        return Deadline.after, (self.left(),)
+
+    def left(self) -> float:
+        """Seconds until then; 0.0 once it has passed."""
+        return max(0.0, self.at - self.clock())
+
+    def passed(self) -> bool:
+        """Whether nothing is left."""
+        return self.left() == 0.0
+
+    def later(self, seconds: float) -> Deadline:
+        """The moment so many seconds after this one; before it where they are negative."""
+        return replace(self, at=self.at + seconds)
+
+    def share(self, part: float) -> Deadline:
+        """The moment at which that part of what is left will have gone by."""
+        return replace(self, at=self.clock() + part * self.left())
+
+    def within(self, seconds: float) -> Deadline:
+        """The sooner one of this moment and that so many seconds from now."""
+        return replace(self, at=min(self.at, self.clock() + seconds))

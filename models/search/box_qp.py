@@ -1,0 +1,94 @@
+"""The best angles for given jumps: the box-constrained quadratic program `qp-fixed`, without a solver.
+
+A projected Newton method (Bertsekas, SIAM J. Control Optim. 20, 1982). Variables near a bound that the slope
+pushes outwards make a plain gradient step. The others make a Newton step, which for a quadratic form leads to
+its minimum over them. Both are clipped, and halved until the energy falls enough. Once the right bounds are
+found, one step leads to the minimum.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..instance.grid import Floats
+from ..instance.instance import QUARTER
+from ..processes.deadline import Over, never
+from .energy import Quadratic, Solver, energy_at
+
+_SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
+_NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
+_NEWTON: Final = 1e-2  # relative residual of a Newton step: closer is wasted while bounds change
+_MOST_STEPS: Final = 500  # 5 to 50 are usual; contact along a curve recedes by some pixels a step
+_MOST_HALVINGS: Final = 40
+_DECREASE: Final = 0.1  # least share of the decrease that the slope promises
+
+
+def fitted(field: CrossField, over: Over = never) -> CrossField:
+    """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
+
+    This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not
+    say (parts without strokes), the angles stay near those given. The gradient's entries that no bound
+    balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. Where the time is over before,
+    the best angles so far.
+    """
+    instance = field.instance
+    quarter = np.full(instance.grid.size, QUARTER)
+    x = least_in_box(
+        energy_at(instance, field.p),
+        np.concatenate([field.alpha, field.beta]),
+        np.concatenate([instance.alpha_lower, -quarter]),
+        np.concatenate([instance.alpha_upper, quarter]),
+        over=over,
+    )
+    alpha, beta = np.split(x, 2)
+    return CrossField(instance, alpha, beta, field.p)
+
+
+def least_in_box(
+    energy: Quadratic,
+    x: Floats,
+    lower: Floats,
+    upper: Floats,
+    *,
+    solver: Solver | None = None,
+    tolerance: float = _SLOPE,
+    over: Over = never,
+) -> Floats:
+    """The point of least energy with lower <= x <= upper, searched from x; shapes (2n,),
+    bounds may be infinite.
+
+    Rounding, 500 steps, or time that is over end the search too: then the best point so far comes back.
+    tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
+    solver: one that has met a system like this one, which spares a factorisation.
+    """
+    solver = Solver() if solver is None else solver
+    enough = tolerance * (1 + np.abs(energy.vector).max())
+    stiffness = energy.stiffness
+    x = np.clip(x, lower, upper)
+    for _ in range(_MOST_STEPS):
+        if over():
+            break
+        slope = energy.slope(x)
+        plain = np.clip(x - slope / stiffness, lower, upper) - x
+        if np.abs(plain * stiffness).max() <= enough:
+            break
+        near = min(_NEAR, np.abs(plain).max())
+        held = np.where(slope > 0, x <= lower + near, x >= upper - near)
+        step = np.where(held, plain, solver.step(energy.matrix, -slope, _NEWTON, ~held))
+        ends = (np.clip(x + 0.5**k * step, lower, upper) for k in range(_MOST_HALVINGS))
+        end = next((end for end in ends if _falls(energy, slope, end - x)), None)
+        if end is None:
+            break
+        x = end
+    return x
+
+
+def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
+    """Whether a step lowers the energy by a fair share of what the slope promises;
+    a step of nothing does not.
+    """
+    promised = float(slope @ step)
+    return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised

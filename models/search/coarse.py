@@ -1,0 +1,93 @@
+"""The same sketch on a grid of half the resolution, and a field brought from there to the fine grid.
+
+The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a
+quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, are made four times
+as large, up to the greatest that an instance may have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..field.jumps import parity_sign, stepped
+from ..instance.grid import Floats, Ints
+from ..instance.instance import HALF, MOST_WEIGHT, Instance
+from ..processes.deadline import Over, never
+from .energy import Solver
+from .free_field import FreeField
+from .improvement import improved, settle
+
+_ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
+
+
+def halved(instance: Instance) -> Instance | None:
+    """The instance with each 2 x 2 pixels made one, or None when no stroke is left.
+
+    A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
+    strokes, by the double angle.
+    """
+    height, width = instance.mask.shape
+    even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
+    squares = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
+    mask = squares[:, 0, :, 0] | squares[:, 0, :, 1] | squares[:, 1, :, 0] | squares[:, 1, :, 1]
+    parent = (instance.stroke_pixels[:, 0] // 2) * mask.shape[1] + instance.stroke_pixels[:, 1] // 2
+    weight = np.bincount(parent, instance.w, mask.size)
+    turn = [np.bincount(parent, instance.w * f(2 * instance.theta), mask.size) for f in (np.cos, np.sin)]
+    kept = np.nonzero(np.hypot(*turn) > _ALIGNED * weight)[0]
+    if not len(kept):
+        return None
+    return replace(
+        instance,
+        mask=mask,
+        stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
+        theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
+        w=weight[kept] / 4,
+        w_strokes=min(4 * instance.w_strokes, MOST_WEIGHT),
+        w_beta=min(4 * instance.w_beta, MOST_WEIGHT),
+        pixel_size=2 * instance.pixel_size,
+    )
+
+
+def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
+    """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
+
+    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the
+    stroke. Then they are improved until the time is over.
+    """
+    grid = instance.grid
+    parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
+    state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
+    _face_strokes(state)
+    settle(state, Solver(), over)
+    return improved(state.bounded(over), over)
+
+
+def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
+    """The jump between the parents of each pair, shape (m,), 0 inside one."""
+    grid, above = instance.grid, coarse.instance.grid
+    first, second = parent[grid.first], parent[grid.second]
+    upper, right = above.pair_number
+    row, column = above.rows[first], above.columns[first]
+    pair = np.where(grid.upward, upper[row, column], right[row, column])
+    return np.where(first == second, 0, coarse.p[pair]).astype(np.int32)
+
+
+def _face_strokes(state: FreeField) -> None:
+    """Take the label at each stroke pixel in which u is nearest to the stroke."""
+    instance, at = state.instance, state.instance.stroke_index
+    steps = np.zeros(instance.grid.size, dtype=np.int32)
+    steps[at] = _nearest_label(instance.target, state.alpha[at], state.beta[at])
+    state.alpha, state.beta, state.p = stepped(instance.grid, state.alpha, state.beta, state.p, steps)
+
+
+def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:
+    """The step k for which alpha + k pi/2 + (-1)^k beta is nearest to the target."""
+    even = 2 * np.round((target - alpha - beta) / np.pi).astype(np.int32)
+    odd = 2 * np.round((target - alpha - HALF + beta) / np.pi).astype(np.int32) + 1
+    candidates = np.stack([even, odd])
+    off = np.abs(alpha + HALF * candidates + parity_sign(candidates) * beta - target)
+    chosen: Ints = candidates[np.argmin(np.round(off, 9), axis=0), np.arange(len(target))]
+    return chosen

@@ -1,0 +1,136 @@
+"""The energy at fixed jumps as a quadratic form, and solves of the sparse systems it leads to.
+
+With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant. H
+holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i,
+and w_beta.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg, splu
+
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import Instance
+
+Solve = Callable[[Floats], Floats]
+
+PULL: Final = 1e-9
+"""Pull towards the present angles: parts without strokes, or w_beta = 0, leave H singular."""
+CLOSE: Final = 1e-2
+"""Relative residual of a step that ranks jumps like the exact one."""
+
+_MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 40 are usual
+_MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """A quadratic x'Hx - 2 b'x: matrix H, sparse (2n, 2n), positive semidefinite, and vector b (2n,)."""
+
+    matrix: Any
+    vector: Floats
+
+    @property
+    def stiffness(self) -> Floats:
+        """The diagonal of H, shape (2n,), above zero everywhere."""
+        stiffness: Floats = self.matrix.diagonal() + PULL
+        return stiffness
+
+    def slope(self, x: Floats) -> Floats:
+        """Half the gradient, Hx - b, shape (2n,)."""
+        slope: Floats = self.matrix @ x - self.vector
+        return slope
+
+    def change(self, slope: Floats, step: Floats) -> float:
+        """By how much the value changes with a step from where the slope was taken."""
+        return float(step @ (2 * slope + self.matrix @ step))
+
+
+def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadratic:
+    """The 2-norm energy as a function of the angles,
+    summed over the pairs whose jump is known (None: all).
+    """
+    grid, n, at = instance.grid, instance.grid.size, instance.stroke_index
+    pairs = slice(None) if known is None else known
+    i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
+    degree = 2.0 * (np.bincount(i, minlength=n) + np.bincount(j, minlength=n))
+    weight, turn = stroke_weight(instance), np.pi * p
+    beside = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
+    diagonal = np.concatenate([degree + weight, degree + weight + instance.w_beta])
+    row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
+    matrix = _symmetric(row, column, beside, diagonal)
+    goal = weight.copy()
+    goal[at] *= instance.target
+    pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
+    return Quadratic(matrix, np.concatenate([pulled + goal, goal]))
+
+
+def _symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
+    """The sparse symmetric matrix with those entries on one side of the diagonal, each place once."""
+    every = np.arange(len(diagonal), dtype=np.int32)
+    values = np.concatenate([beside, beside, diagonal])
+    place = (np.concatenate([row, column, every]), np.concatenate([column, row, every]))
+    return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
+
+
+def stroke_weight(instance: Instance) -> Floats:
+    """Weight w_strokes w of each pixel, 0 without a stroke; shape (n,)."""
+    weight = np.zeros(instance.grid.size)
+    weight[instance.stroke_index] = instance.w_strokes * instance.w
+    return weight
+
+
+def factored(matrix: Any) -> Solve:
+    """The solver of a system that is positive semidefinite: of H + 1e-9, so that it is definite."""
+    pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
+    # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
+    solve: Solve = splu(
+        pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    ).solve
+    return solve
+
+
+def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
+    """The s with Hs = right to a relative residual, by conjugate gradients scaled by the diagonal.
+
+    Step k of the method reaches k pixels far: what is smooth over longer distances stays as it is.
+    """
+    scaled = sparse.diags_array(1 / energy.stiffness)
+    step: Floats = cg(energy.matrix, right, rtol=tolerance, maxiter=_MOST_LOCAL_STEPS, M=scaled)[0]
+    return step
+
+
+class Solver:
+    """Solves of systems that differ little: one factorisation serves the next ones as a preconditioner."""
+
+    def __init__(self) -> None:
+        self._inverse: Solve | None = None
+
+    def step(self, matrix: Any, right: Floats, tolerance: float, free: Bools | None = None) -> Floats:
+        """The s with Hs = right on the free unknowns and s = 0 on the others,
+        to a relative residual of `tolerance`.
+        """
+        if free is not None and not free.all():
+            only = sparse.diags_array(free.astype(np.float64))
+            right, matrix = only @ right, only @ matrix @ only + sparse.diags_array(1.0 - free)
+        if self._inverse is not None:
+            step, done = self.attempt(matrix, right, tolerance)
+            if done:
+                return step
+        self._inverse = factored(matrix)
+        return self.attempt(matrix, right, tolerance)[0]
+
+    def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:
+        """The step by few conjugate gradients with the present factorisation,
+        and whether they were enough.
+        """
+        inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
+        pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
+        step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
+        return step, not failed

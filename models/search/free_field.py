@@ -1,0 +1,63 @@
+"""A field in the making: angles that may be any real numbers, jumps in no range, both free to change.
+
+Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is
+searched for, they are in the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.field import CrossField, relabelled
+from ..instance.grid import Floats, Ints
+from ..instance.instance import QUARTER, Instance
+from ..processes.deadline import Over, never
+from .box_qp import fitted
+
+
+@dataclass(eq=False)
+class FreeField:
+    """Angles alpha, beta (n,) in radians and jumps p (m,) that change while a field is made."""
+
+    instance: Instance
+    alpha: Floats
+    beta: Floats
+    p: Ints
+
+    @classmethod
+    def of(cls, field: CrossField) -> FreeField:
+        """The same angles and jumps, free to change."""
+        return cls(field.instance, field.alpha, field.beta, field.p)
+
+    @property
+    def x(self) -> Floats:
+        """Both angles, (alpha, beta), shape (2n,)."""
+        return np.concatenate([self.alpha, self.beta])
+
+    @x.setter
+    def x(self, value: Floats) -> None:
+        self.alpha, self.beta = np.split(value, 2)
+
+    @property
+    def energy(self) -> float:
+        """The 2-norm energy."""
+        return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
+
+    def bounded(self, over: Over = never) -> CrossField:
+        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha,
+        beta and p.
+        """
+        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
+
+
+def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only,
+    for elsewhere every label will do.
+    """
+    size, at = instance.grid.size, instance.stroke_index
+    lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
+    upper = -lower
+    lower[at], upper[at] = instance.alpha_lower[at], instance.alpha_upper[at]
+    return lower, upper

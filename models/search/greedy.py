@@ -1,0 +1,81 @@
+"""The greedy strategy of BendFields: the baseline to compare with, and the start of solvers and searches.
+
+It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between
+cells, cheapest first, with the angles brought up to date after every batch (docs/mathematics.md, 10; the
+strategy is that of mixed-integer quadrangulation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..field.jumps import free_jumps
+from ..instance.grid import Bools, Ints
+from ..instance.instance import Instance
+from ..processes.deadline import Over, never
+from .energy import CLOSE, Solver, energy_at, local_step
+from .free_field import FreeField
+from .nearest_stroke import nearest_strokes
+
+JumpProgress = Callable[[int, int], object]
+"""Is told how many jumps are known, and how many there are."""
+
+_BATCH_COST: Final = 1.0  # energy that one batch of jumps may add
+_CLOSE_UP_TO: Final = (
+    8192  # pixels: beyond, solves take most of the time, and local updates rank jumps as well
+)
+_LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the smooth part of the error
+
+
+def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
+    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha,
+    beta and p.
+
+    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
+    all angles are solved for again (docs/mathematics.md, 10). The windows are kept by the last solve alone,
+    as BendFields knows none. Deterministic.
+    progress: called as progress(jumps known, jumps in all) after every batch. over: says whether the time is
+    over; then all jumps that are left are decided at once.
+    """
+    nearest = nearest_strokes(instance)
+    angle = np.append(instance.target, 0.0)[nearest]
+    state = FreeField(
+        instance, angle, np.zeros(len(angle)), np.zeros(len(instance.grid.first), dtype=np.int32)
+    )
+    _stitch(state, nearest, progress, over)
+    return state.bounded(over)
+
+
+def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over: Over) -> None:
+    """Decide the jumps between cells, cheapest first, in batches that cost at most `_BATCH_COST`."""
+    grid, solver = state.instance.grid, Solver()
+    known = nearest[grid.first] == nearest[grid.second]
+    _settle(state, known, solver)
+    while not known.all():
+        open_ = np.nonzero(~known)[0]
+        jumps, cost = free_jumps(grid, state.alpha, state.beta)
+        # Rounding must not decide the order of equal costs: it would differ between machines.
+        order = np.argsort(np.round(cost[open_], 9), kind="stable")
+        many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), _BATCH_COST, side="right")))
+        chosen = open_ if over() else open_[order[:many]]
+        state.p[chosen] = jumps[chosen]
+        known[chosen] = True
+        _settle(state, known, solver if grid.size <= _CLOSE_UP_TO else None)
+        if progress is not None:
+            progress(int(known.sum()), len(known))
+
+
+def _settle(state: FreeField, known: Bools, solver: Solver | None) -> None:
+    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver,
+    locally.
+    """
+    energy = energy_at(state.instance, state.p, known)
+    right = -energy.slope(state.x)
+    if solver is None:
+        state.x = state.x + local_step(energy, right, _LOCAL)
+    else:
+        state.x = state.x + solver.step(energy.matrix, right, CLOSE)

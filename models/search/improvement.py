@@ -1,0 +1,161 @@
+"""Local improvement of a field: angles and jumps in turn,
+and whole curves that change to the other family of lines.
+
+A stroke is carried by line u. Which of two crossing curves is u where they meet is a choice of the jumps
+between them, and where curves cross at less than 45 degrees the cheapest jump takes both for one family. So
+turning a curve is tried for every curve.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from ..field.field import CrossField
+from ..field.jumps import free_jumps, parity_sign, stepped
+from ..instance.angles import line_difference
+from ..instance.grid import Ints
+from ..instance.instance import HALF, QUARTER, Instance
+from ..processes.deadline import Over, never
+from .box_qp import least_in_box
+from .energy import CLOSE, Solver, energy_at
+from .free_field import FreeField, free_bounds
+from .greedy import greedy
+from .nearest_stroke import chamfer, nearest_strokes
+
+_SETTLED: Final = 1e-4  # slope left while jumps still change
+_ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
+_MOST_CURVES: Final = 40  # that may change their family, those first that miss their strokes most
+_SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
+
+
+def first_field(instance: Instance, over: Over = never) -> CrossField:
+    """The greedy field, improved as far as time allows: what solvers and searches start from,
+    and whose jumps `qp-fixed` has by default.
+
+    Deterministic where time does not cut it off.
+    """
+    return improved(greedy(instance, over=over), over)
+
+
+def improved(field: CrossField, over: Over = never) -> CrossField:
+    """A field of no more 2-norm energy, from which neither best jumps, nor best angles,
+    nor the turn of a curve lead further down.
+
+    Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
+    turning seldom pays.
+    At most 40 curves are tried, the worst first. over: says whether the time is over; then the best field so
+    far comes back.
+    The energy is that of docs/mathematics.md, 5; deterministic.
+    """
+    state, solver = FreeField.of(field), Solver()
+    settle(state, solver, over)
+    if field.instance.gauge == "strokes":
+        _exchange_families(state, solver, over)
+    found = state.bounded(over)
+    return found if found.energy().total < field.energy().total else field
+
+
+def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
+    """Solve within the bounds and choose jumps again, in turn,
+    as long as the energy falls and until the time is over.
+    """
+    bounds = free_bounds(state.instance)
+    kept, least = (state.x, state.p), np.inf
+    for _ in range(_ROUNDS):
+        if over():
+            break
+        energy = energy_at(state.instance, state.p)
+        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
+        reached = state.energy
+        if least - reached < 1e-9 * (1 + reached):
+            break
+        kept, least = (state.x, state.p), reached
+        _swap_lines(state)
+        state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
+    state.x, state.p = kept
+
+
+def _swap_lines(state: FreeField) -> None:
+    """Exchange u and v where a stroke pixel's alpha has run against its window of the gauge `strokes`.
+
+    There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the
+    other fits better.
+    """
+    instance, at = state.instance, state.instance.stroke_index
+    if instance.gauge != "strokes":
+        return
+    off = state.alpha[at] - instance.target
+    swapped = np.abs(off) >= QUARTER - 1e-9
+    alpha, beta = state.alpha.copy(), state.beta.copy()
+    alpha[at] -= np.where(swapped, HALF * np.sign(off), 0.0)
+    beta[at] *= np.where(swapped, -1.0, 1.0)
+    state.alpha, state.beta = alpha, beta
+
+
+def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
+    """Let curves change to the other family of lines where that lowers the energy,
+    those first that miss most.
+    """
+    instance, grid = state.instance, state.instance.grid
+    curve = stroke_curves(instance)
+    miss = CrossField(instance, state.alpha, state.beta, state.p).residual_r ** 2 * instance.w
+    worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
+    of_pixel = np.append(curve, -1)[nearest_strokes(instance)]
+    for number in worst:
+        if over():
+            return
+        own = (of_pixel == number).astype(np.int32)
+        if (own[grid.first] != own[grid.second]).any():
+            _turn_if_better(state, own, solver, over)
+
+
+def _turn_if_better(state: FreeField, own: Ints, solver: Solver, over: Over) -> None:
+    """Turn the crosses round a curve (own = 1) by a quarter either way and keep what lowers the energy most.
+
+    Without the bounds the energy of a trial is a lower bound, and usually the answer.
+    """
+    enough = state.energy * (1 - 1e-6) - 1e-9
+    trials = [_turned(state, quarters, solver) for quarters in (own, -own)]
+    best = min(trials, key=lambda trial: round(trial.energy, 9))
+    if best.energy < enough:
+        settle(best, solver, over)
+        if best.energy < enough:
+            state.x, state.p = best.x, best.p
+
+
+def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
+    """The state after turning each pixel's labels back by `quarters`, solved: what v was before is now u.
+
+    The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other
+    line.
+    """
+    grid, sign = state.instance.grid, parity_sign(quarters)
+    trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
+    energy = energy_at(trial.instance, trial.p)
+    # In the old labels the system has changed at these strokes only, so that the factorisation at hand is
+    # close.
+    old = np.concatenate([np.ones(grid.size), sign])
+    matrix = sparse.diags_array(old) @ energy.matrix @ sparse.diags_array(old)
+    trial.x = trial.x + old * solver.step(matrix, -old * energy.slope(trial.x), CLOSE)
+    return trial
+
+
+def stroke_curves(instance: Instance) -> Ints:
+    """The number of the curve of each stroke pixel:
+    neighbours of nearly the same direction belong together. Shape (s,).
+    """
+    count = len(instance.theta)
+    number = np.full(instance.grid.size, -1)
+    number[instance.stroke_index] = np.arange(count)
+    first, second = (number[end] for end in chamfer(instance.grid).tocoo().coords)
+    joined = (first >= 0) & (second >= 0)
+    joined[joined] = (
+        line_difference(instance.theta[first[joined]], instance.theta[second[joined]]) < _SAME_CURVE
+    )
+    links = sparse.csr_array((np.ones(joined.sum()), (first[joined], second[joined])), shape=(count, count))
+    curves: Ints = connected_components(links, directed=False)[1]
+    return curves

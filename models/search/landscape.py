@@ -1,0 +1,322 @@
+"""The least energy as a function of the jumps: what every single jump would change, at once,
+and any change of jumps in no time.
+
+For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
+(models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
+pair (i, j) that changes by d
+
+- moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 q r;
+- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p,
+  which by the formula of Woodbury changes G by a matrix of rank 2.
+
+So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change
+that is made costs one update of G. Angles outside the patch stay as they are; the energy is that of the
+whole field.
+
+Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of
+beta, (alpha + c, beta -+ c) costs w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends
+this state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is taken
+from its definition (models/search/patch_energy.py), and where the updates say another one, G is computed
+anew. Gains that no energy can have are not believed either.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.linalg.blas import dgemm
+
+from ..field.jumps import parity_sign
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import HALF, Instance
+from .energy import PULL, energy_at
+from .free_field import free_bounds
+from .patch_energy import PatchEnergy
+
+STEPS: Final = np.array([1, -1], dtype=np.int32)
+"""Changes of one jump that `gains` tells of."""
+
+_HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
+_OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
+_SOFTEST: Final = 1e-6  # price of beta below which G grows so large that updates lose their digits
+_MOST_HOLDS: Final = 60
+_DRIFT: Final = (
+    1e-8  # by which updates may miss the energy, relative to 1 + energy, before all is solved anew
+)
+
+
+class Point(NamedTuple):
+    """Angles (alpha, beta) of the whole field, shape (2n,), jumps (m,),
+    and the 2-norm energy that they have by definition.
+    """
+
+    energy: float
+    x: Floats
+    p: Ints
+
+
+class _State(NamedTuple):
+    inverse: Floats
+    x: Floats
+    p: Ints
+    energy: float
+    held: dict[int, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Pixels whose angles are free and the pairs inside, by local numbers.
+
+    pixels: (k,) numbers of pixels; pairs: (e,) numbers of the pairs with both ends inside; first, second:
+    (e,) local numbers of these ends.
+    """
+
+    instance: Instance
+    pixels: Ints
+    pairs: Ints
+    first: Ints
+    second: Ints
+
+    @classmethod
+    def of(cls, instance: Instance, free: Bools) -> Patch:
+        """The patch of the pixels that are free; free has shape (n,)."""
+        grid = instance.grid
+        pixels = np.nonzero(free)[0].astype(np.int32)
+        number = np.full(grid.size, -1, dtype=np.int32)
+        number[pixels] = np.arange(len(pixels), dtype=np.int32)
+        pairs = np.nonzero(free[grid.first] & free[grid.second])[0].astype(np.int32)
+        return cls(instance, pixels, pairs, number[grid.first[pairs]], number[grid.second[pairs]])
+
+    @property
+    def unknowns(self) -> Ints:
+        """Places of the patch's angles in (alpha, beta), shape (2k,)."""
+        return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
+
+
+class Landscape:
+    """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
+
+    energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite.
+    Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact
+    to about 1e-4 where bounds matter. Without them (`gains` does not look ahead to bounds that a change would
+    meet) walks lead to points that look low and are not, so they are kept at every step.
+
+    Raises LinAlgError, at the start and in a change, where the jumps leave a system that double precision
+    cannot solve.
+    """
+
+    def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
+        """Start at the angles x (2n,), of which those in the patch are solved for, and jumps p (m,)."""
+        self.patch = patch
+        self.p = p.copy()
+        self._around = x
+        self._defined = PatchEnergy(patch, x, p)
+        soft = max(PULL, _SOFTEST - patch.instance.w_beta)
+        self._soft = np.repeat([PULL, soft], len(patch.pixels))
+        self._lower, self._upper = _bounds(patch)
+        self._held: dict[int, float] = {}
+        self._solve()
+        self._settle()
+
+    @property
+    def angles(self) -> Floats:
+        """The angles (alpha, beta) of the whole field, shape (2n,)."""
+        x = self._around.copy()
+        x[self.patch.unknowns] = self._x
+        return x
+
+    @property
+    def point(self) -> Point:
+        """The field within its bounds, with its energy by definition."""
+        inside = np.clip(self._x, self._lower, self._upper)
+        x = self._around.copy()
+        x[self.patch.unknowns] = inside
+        return Point(self._defined(inside, self.p), x, self.p.copy())
+
+    def saved(self) -> _State:
+        """What `restore` takes back later."""
+        return _State(
+            self._inverse.copy(order="F"), self._x.copy(), self.p.copy(), self.energy, dict(self._held)
+        )
+
+    def restore(self, state: _State) -> None:
+        """Go back to a state that was saved."""
+        self._inverse, self._x, self.p = state.inverse.copy(order="F"), state.x.copy(), state.p.copy()
+        self.energy, self._held, self._fresh = state.energy, dict(state.held), False
+
+    def gains(self) -> Floats:
+        """By how much each jump's change by +1 and by -1 alters the energy; shape (2, e), rows as in STEPS.
+
+        Infinite where rounding hides the gain even from an inverse that is fresh.
+        """
+        gains = self._gains()
+        if np.isinf(gains).any() and not self._fresh:
+            self._solve()
+            gains = self._gains()
+        return gains
+
+    def _gains(self) -> Floats:
+        """The gains by the present inverse, infinite where they cannot be true."""
+        g, x, i, j = self._inverse, self._x, self.patch.first, self.patch.second
+        k = len(self.patch.pixels)
+        p = self.p[self.patch.pairs]
+        a = x[i] - x[j] + HALF * p
+        give = g[i, i] + g[j, j] - 2 * g[i, j]
+        at_i, at_j = i + k, j + k
+        to_i, to_j = g[at_i, i] - g[at_i, j], g[at_j, i] - g[at_j, j]
+        ii, jj, ij = g[at_i, at_i], g[at_j, at_j], g[at_i, at_j] + parity_sign(p) / 4
+        q = HALF * STEPS[:, None]
+        y_i, y_j = x[at_i] - 2 * q * to_i, x[at_j] - 2 * q * to_j
+        # 16 (ij^2 - ii jj) is det(H + C) / det(H), of two definite matrices.
+        ratio = ij**2 - ii * jj
+        with np.errstate(all="ignore"):
+            turned = (2 * ij * y_i * y_j - jj * y_i**2 - ii * y_j**2) / ratio
+            gains: Floats = 2 * q * q * (1 - 2 * give) + 4 * q * a + turned
+            believed = np.isfinite(gains) & (ratio > 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
+        gains[~believed] = np.inf
+        return gains
+
+    def change(self, pairs: Ints, steps: Ints) -> None:
+        """Add steps, shape (c,), to the jumps of the patch's pairs with those local numbers,
+        each at most once.
+        """
+        try:
+            self._follow(pairs, steps)
+        except np.linalg.LinAlgError:
+            self.energy = np.nan  # which is no energy, so that all is solved anew
+        self.p[self.patch.pairs[pairs]] += steps
+        self._settle()
+
+    def _follow(self, pairs: Ints, steps: Ints) -> None:
+        """Bring energy, angles and inverse up to date with a change of jumps."""
+        self._fresh = False
+        push, gain = self._pushed(pairs, steps)
+        touched = np.nonzero(push)[0]
+        moved = self._inverse[:, touched] @ push[touched]
+        self.energy += gain - float(push[touched] @ moved[touched])
+        self._x += moved
+        places, added = self._couplings(pairs, steps)
+        if len(places):
+            small = self._small(places, added)
+            columns = self._inverse[:, places]
+            here = self._x[places]
+            self.energy += float(here @ small @ here)
+            self._x -= columns @ (small @ here)
+            self._update(-1.0, columns @ small, columns)
+
+    def _solve(self) -> None:
+        """Compute inverse, angles and energy from the jumps and from the angles that are held."""
+        places = self.patch.unknowns
+        energy = energy_at(self.patch.instance, self.p)
+        rows = energy.matrix[places]
+        outside = self._around.copy()
+        outside[places] = 0.0
+        right = energy.vector[places] - rows @ outside
+        held = list(self._held)
+        right[held] += _HOLD * np.array(list(self._held.values()))
+        system = rows[:, places].toarray()
+        system[np.diag_indices(len(places))] += self._soft
+        system[held, held] += _HOLD
+        inverse = np.linalg.inv(system)
+        self._inverse = np.asfortranarray((inverse + inverse.T) / 2)
+        self._x = self._inverse @ right
+        self._x += self._inverse @ (right - system @ self._x)
+        if not np.isfinite(self._x).all():
+            raise np.linalg.LinAlgError("the angles of a patch are not finite")
+        self.energy = self._defined_energy()
+        self._fresh = True
+
+    def _settle(self) -> None:
+        """Keep the bounds, and solve anew where the updates have lost the energy;
+        then bounds are kept once more.
+        """
+        for _ in range(2):
+            with suppress(np.linalg.LinAlgError):
+                self._keep_bounds()
+                if self._as_defined():
+                    return
+            self._solve()
+
+    def _as_defined(self) -> bool:
+        """Whether the updates say the energy that the angles have; from now on the energy is that."""
+        followed, self.energy = self.energy, self._defined_energy()
+        return bool(abs(followed - self.energy) <= _DRIFT * (1 + self.energy))
+
+    def _defined_energy(self) -> float:
+        """The energy of the present angles with all pulls."""
+        held = self._x[list(self._held)] - list(self._held.values())
+        pulls = float(self._soft @ (self._x * self._x)) + _HOLD * float(held @ held)
+        return self._defined(self._x, self.p) + pulls
+
+    def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
+        """The change of b, shape (2k,), and what c - 2 x'b gains."""
+        i, j = self.patch.first[pairs], self.patch.second[pairs]
+        q = HALF * steps
+        a = self._x[i] - self._x[j] + HALF * self.p[self.patch.pairs[pairs]]
+        push = np.zeros(len(self._x))
+        np.subtract.at(push, i, 2 * q)
+        np.add.at(push, j, 2 * q)
+        # c changes by the sum of 2 q^2 + 4 q (pi/2 p).
+        return push, float(np.sum(2 * q * q + 4 * q * a))
+
+    def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
+        """The unknowns beta whose couplings turn, shape (c,), and what is added to H there, shape (c, c)."""
+        odd = pairs[(steps & 1) == 1]
+        ends = np.concatenate([self.patch.first[odd], self.patch.second[odd]])
+        places, where = np.unique(ends, return_inverse=True)
+        first, second = where[: len(odd)], where[len(odd) :]
+        added = np.zeros((len(places), len(places)))
+        added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.patch.pairs[odd]])
+        return places + len(self.patch.pixels), added
+
+    def _small(self, places: Ints, added: Floats) -> Floats:
+        """C (1 + G C)^-1 for couplings C that are added at these places:
+        H + C has the inverse G - G (...) G.
+        """
+        inside = self._inverse[np.ix_(places, places)]
+        small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
+        return small
+
+    def _update(self, factor: float, left: Floats, right: Floats) -> None:
+        self._inverse = dgemm(factor, left, right, beta=1.0, c=self._inverse, trans_b=1, overwrite_c=1)
+
+    def _keep_bounds(self) -> None:
+        """Hold angles that pass their bounds, the worst first, and let go of those that lean inwards."""
+        for _ in range(_MOST_HOLDS):
+            past = np.maximum(self._x - self._upper, self._lower - self._x)
+            past[list(self._held)] = 0.0
+            worst = int(np.argmax(past))
+            if past[worst] > _OUTSIDE:
+                upper = self._x[worst] > self._upper[worst]
+                self._held[worst] = float((self._upper if upper else self._lower)[worst])
+                self._pull(worst, self._held[worst], _HOLD)
+                continue
+            leaving = next((k for k, bound in self._held.items() if self._leans_in(k, bound)), None)
+            if leaving is None:
+                return
+            self._pull(leaving, self._held.pop(leaving), -_HOLD)
+
+    def _leans_in(self, place: int, bound: float) -> bool:
+        inwards = -1.0 if bound == self._upper[place] else 1.0
+        return bool(inwards * (self._x[place] - bound) > 0)
+
+    def _pull(self, place: int, goal: float, weight: float) -> None:
+        """Add weight (x - goal)^2 to the energy."""
+        column = self._inverse[:, [place]]
+        stiffer = 1 + weight * column[place, 0]
+        if not stiffer > 0:
+            raise np.linalg.LinAlgError("rounding has made the inverse of a patch indefinite")
+        share = weight / stiffer
+        off = goal - self._x[place]
+        self.energy += share * off * off
+        self._x += column[:, 0] * (share * off)
+        self._update(-share, column, column)
+
+
+def _bounds(patch: Patch) -> tuple[Floats, Floats]:
+    """Least and greatest angles of the patch, shapes (2k,)."""
+    lower, upper = free_bounds(patch.instance)
+    return lower[patch.unknowns], upper[patch.unknowns]

@@ -1,0 +1,45 @@
+"""Which stroke is nearest to a pixel, inside the mask."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
+
+from ..instance.grid import Grid, Ints
+from ..instance.instance import Instance
+
+
+def nearest_strokes(instance: Instance) -> Ints:
+    """For each pixel the number of its nearest stroke pixel, or -1 in a part without strokes; shape (n,).
+
+    Nearest by the 3-4 chamfer distance along paths inside the mask.
+    """
+    grid = instance.grid
+    _, _, source = dijkstra(
+        chamfer(grid), directed=False, indices=instance.stroke_index, min_only=True, return_predecessors=True
+    )
+    number = np.full(grid.size + 1, -1, dtype=np.int32)
+    number[instance.stroke_index] = np.arange(len(instance.stroke_index))
+    nearest: Ints = number[np.where(source >= 0, source, grid.size)]
+    return nearest
+
+
+def chamfer(grid: Grid) -> Any:
+    """Distances between neighbours: 3 along the grid,
+    4 across a corner that lies beside a pixel of the mask.
+    """
+    number = grid.number
+    beside = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
+    beside.append((beside[0][2], beside[0][3], beside[0][0], beside[0][1]))
+    first, second = [grid.first], [grid.second]
+    for start, end, one, other in beside:
+        passable = (start >= 0) & (end >= 0) & ((one >= 0) | (other >= 0))
+        first.append(start[passable])
+        second.append(end[passable])
+    length = np.full(sum(map(len, first)), 4.0)
+    length[: len(grid.first)] = 3.0
+    place = (np.concatenate(first), np.concatenate(second))
+    return sparse.csr_array((length, place), shape=(grid.size, grid.size))

@@ -1,0 +1,65 @@
+"""The energy of a field as a function of the angles in a patch, by its definition: squares of residuals,
+which no update can spoil.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..field.jumps import parity_sign
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import HALF
+
+if TYPE_CHECKING:
+    from .landscape import Patch
+
+
+class PatchEnergy:
+    """The 2-norm energy of the whole field where only the angles in a patch and the
+    jumps between its pixels change.
+    """
+
+    def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
+        """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the patch stay."""
+        instance, grid, free = patch.instance, patch.instance.grid, np.zeros(len(x) // 2, dtype=bool)
+        free[patch.pixels] = True
+        self._instance = instance
+        self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
+        ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
+        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        beside = np.setdiff1d(ends, patch.pixels)
+        number = np.zeros(grid.size, dtype=np.int32)
+        number[np.concatenate([patch.pixels, beside])] = np.arange(len(patch.pixels) + len(beside))
+        self._first, self._second = np.split(number[ends], 2)
+        alpha, beta = np.split(x, 2)
+        self._alpha, self._beta = alpha[beside], beta[beside]
+        self._strokes = np.nonzero(free[instance.stroke_index])[0].astype(np.int32)
+        self._at = number[instance.stroke_index[self._strokes]]
+        self._rest = _rest(CrossField(instance, alpha, beta, p), free, self._pairs, self._strokes)
+
+    def __call__(self, x: Floats, p: Ints) -> float:
+        """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
+        inside = np.split(x, 2)
+        alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
+        jumps, instance = p[self._pairs], self._instance
+        a = alpha[self._first] - alpha[self._second] + HALF * jumps
+        b = parity_sign(jumps) * beta[self._first] - beta[self._second]
+        r = alpha[self._at] + beta[self._at] - instance.target[self._strokes]
+        strokes = instance.w_strokes * float(instance.w[self._strokes] @ (r * r))
+        return (
+            self._rest + 2 * float(a @ a + b @ b) + strokes + instance.w_beta * float(inside[1] @ inside[1])
+        )
+
+
+def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
+    """The part of the energy that is none of the patch's: of other pixels,
+    and without these pairs and strokes.
+    """
+    instance = field.instance
+    pair = field.residual_a**2 + field.residual_b**2
+    stroke, skew = instance.w * field.residual_r**2, field.beta[~free] ** 2
+    pair[pairs], stroke[strokes] = 0.0, 0.0
+    return float(2 * pair.sum() + instance.w_strokes * stroke.sum() + instance.w_beta * skew.sum())

@@ -1,0 +1,34 @@
+"""The power field: crosses by smoothing exp(4 i theta), which needs no jumps.
+
+The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles
+everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..field.field import CrossField, relabelled
+from ..field.jumps import free_jumps
+from ..instance.instance import Instance
+from .energy import energy_at, factored, stroke_weight
+
+
+def power_field(instance: Instance) -> CrossField:
+    """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
+
+    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and
+    beta = 0.
+    Parts without a stroke get alpha = 0. Labels are then moved into the windows of the instance
+    (docs/mathematics.md, 10).
+    """
+    grid = instance.grid
+    weight = stroke_weight(instance)
+    goal = np.zeros((grid.size, 2))
+    goal[instance.stroke_index] = np.stack([np.cos(4 * instance.theta), np.sin(4 * instance.theta)], axis=-1)
+    # Without jumps the part of alpha in H is the very matrix of this energy.
+    alike = energy_at(instance, np.zeros(len(grid.first), dtype=np.int32)).matrix[: grid.size, : grid.size]
+    z = factored(alike)(weight[:, None] * goal)
+    alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
+    start = relabelled(instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
+    return start.with_best_jumps()

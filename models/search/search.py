@@ -1,0 +1,290 @@
+"""A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
+
+Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
+is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
+one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
+processes, unless seconds are given and run out: then the clock decides where the start, the grids of lower
+resolution and the last round are cut off. What a round that was cut off has found is taken over if it is
+lower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..field.field import CrossField
+from ..instance.grid import Bools
+from ..instance.instance import Instance
+from ..processes.deadline import Deadline, Over, never
+from ..processes.interruption import interruptible
+from ..processes.side_by_side import checked, side_by_side
+from .coarse import halved, prolonged
+from .energy import Solver
+from .free_field import FreeField, free_bounds
+from .improvement import first_field, improved, settle, stroke_curves
+from .landscape import Point
+from .nearest_stroke import nearest_strokes
+from .power_field import power_field
+from .walk import LOWER, Explored, Task, explore
+
+RoundProgress = Callable[[int, float], object]
+"""Is told how many rounds are done, and the least energy so far."""
+
+Explorers = Callable[[list[Task]], list[Explored]]
+"""Explores patches side by side and gives what was found in the order of the tasks."""
+
+_PATCH: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
+_PATCHES: Final = 4  # a round
+_FINE: Final = 0.6  # share of the seconds that is kept for the grid of higher resolution
+_COARSE: Final = 60  # rounds on a grid of lower resolution
+_LATEST: Final = 4  # fields that are brought from there
+_KICKS: Final = 40  # a patch
+_SETTLE: Final = 8  # rounds between two improvements of the whole grid
+_IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a patch
+_PATIENCE: Final = 200  # kicks a pixel without success that end a search
+_ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
+_HURRY: Final = 5.0  # seconds; with less, starting processes would take a good part of them
+_CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last solve after the deadline
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found: the field, the whole rounds it took, (round, energy) of every improvement,
+    and how it ended.
+
+    ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
+    """
+
+    field: CrossField
+    rounds: int
+    energies: tuple[tuple[int, float], ...]
+    ended: str
+
+
+def search(
+    instance: Instance,
+    *,
+    seconds: float | None = None,
+    rounds: int | None = None,
+    seed: int = 0,
+    jobs: int = 2,
+    start: CrossField | None = None,
+    progress: RoundProgress = lambda *_: None,
+) -> Search:
+    """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off,
+    the improved greedy field.
+
+    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
+    success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
+    100 a second), and the last solve, with 5 % and half a second more.
+    Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
+    jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy and
+    power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so far. Raises
+    InputError for a limit that is not positive, and for too many jobs.
+    """
+    if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
+        raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
+    checked(jobs)
+    with interruptible() as interrupted:
+        limits = _Limits(
+            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
+        )
+        hunt = _Hunt(instance, seed, _start(instance, start, limits))
+        alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
+        try:
+            with side_by_side(explore, 1 if alone else jobs) as explorers:
+                if hunt.large:
+                    for field in _from_coarse(instance, seed, limits, explorers):
+                        hunt.offer(field)
+                ended = hunt.run(explorers, limits, progress)
+        except KeyboardInterrupt:
+            ended = "interrupted"
+        return Search(hunt.best(_closing(seconds)), hunt.round, tuple(hunt.energies), ended)
+
+
+def _closing(seconds: float | None) -> Over:
+    """When the last solve has to end."""
+    share, more = _CLOSING
+    return never if seconds is None else Deadline.after(share * seconds + more).passed
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """When to end: a deadline, a number of rounds, and whether the user asks for it."""
+
+    deadline: Deadline
+    rounds: int | None
+    interrupted: Callable[[], bool]
+
+    def met(self, rounds: int) -> str:
+        """Which limit is met after so many rounds; empty when none is."""
+        if self.interrupted():
+            return "interrupted"
+        if rounds == self.rounds:
+            return "rounds"
+        return "time" if self.deadline.passed() else ""
+
+    def over(self) -> bool:
+        """Whether work has to end now, in the midst of a round too."""
+        return self.interrupted() or self.deadline.passed()
+
+    def coarse(self) -> _Limits:
+        """The limits of the search on the grid of half the resolution."""
+        many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
+        return _Limits(self.deadline.share(1 - _FINE), many, self.interrupted)
+
+
+def _from_coarse(
+    instance: Instance, seed: int, limits: _Limits, explorers: Explorers
+) -> Iterator[CrossField]:
+    """Fields that were found on the grid of half the resolution, brought to this one,
+    the best of there first.
+    """
+    coarse = halved(instance)
+    if coarse is None:
+        return
+    sooner = limits.coarse()
+    hunt = _Hunt(coarse, seed, _start(coarse, None, sooner))
+    if hunt.large:
+        for field in _from_coarse(coarse, seed, sooner, explorers):
+            hunt.offer(field)
+    hunt.run(explorers, sooner, lambda *_: None)
+    for field in hunt.latest(limits.over):
+        if limits.over():
+            return
+        yield prolonged(field, instance, limits.over)
+
+
+def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
+    """The best of the greedy field, of what the user gives, and, if there is time, of the power field,
+    all improved while there is.
+    """
+    fields = [first_field(instance, limits.over)]
+    if given is not None:
+        fields.append(improved(given, limits.over))
+    if not limits.over():
+        fields.append(improved(power_field(instance), limits.over))
+    return min(fields, key=_energy)
+
+
+def _energy(field: CrossField) -> float:
+    return round(field.energy().total, 9)
+
+
+class _Hunt:
+    """The field that a search has reached, and what it tries next."""
+
+    def __init__(self, instance: Instance, seed: int, start: CrossField) -> None:
+        self.round = 0
+        self.fruitless = 0
+        self.energies = [(0, start.energy().total)]
+        self._instance = instance
+        self._seed = seed
+        self._start = start
+        self._state = FreeField.of(start)
+        self._bounds = free_bounds(instance)
+        self._solver = Solver()
+        self._latest = [start]
+        self._unsettled = False
+        # Parts without a stroke are constant and cost nothing.
+        self._reached = nearest_strokes(instance) >= 0
+        self._curve = np.full(instance.grid.size, -1)
+        self._curve[instance.stroke_index] = stroke_curves(instance)
+
+    def best(self, over: Over) -> CrossField:
+        """The field of least energy so far."""
+        self._settle(over)
+        return min(self._state.bounded(over), self._start, key=_energy)
+
+    @property
+    def large(self) -> bool:
+        """Whether the grid is more than one patch."""
+        return self._instance.grid.size > _PATCH * 5 // 4
+
+    def latest(self, over: Over) -> list[CrossField]:
+        """The last fields that were the best for a round or more, the best first."""
+        return [self.best(over), *self._latest[-_LATEST:-1][::-1]]
+
+    def offer(self, field: CrossField) -> None:
+        """Go on from this field if it is lower."""
+        if field.energy().total < self._state.energy - LOWER:
+            self._start, self._state, self._unsettled = field, FreeField.of(field), False
+            self.energies.append((self.round, field.energy().total))
+
+    def run(self, explorers: Explorers, limits: _Limits, progress: RoundProgress) -> str:
+        """Go on until a limit is met; which one."""
+        while not (ended := limits.met(self.round)):
+            if self.fruitless > _PATIENCE * self._instance.grid.size:
+                return "patience"
+            tasks = self.tasks(limits.deadline)
+            found = explorers(tasks)
+            self._take(tasks, [each.better for each in found], limits.over)
+            if all(each.whole for each in found) and not limits.over():
+                self.round += 1
+            progress(self.round, self.energies[-1][1])
+        return ended
+
+    def tasks(self, deadline: Deadline) -> list[Task]:
+        """What to explore in this round, until when."""
+        rng = np.random.default_rng((self._seed, self.round))
+        x, p = self._state.x, self._state.p
+        return [
+            Task(self._instance, x, p, free, self._curve, _KICKS, (self._seed, self.round, number), deadline)
+            for number, free in enumerate(self._patches(rng))
+        ]
+
+    def _patches(self, rng: np.random.Generator) -> Iterator[Bools]:
+        """The patches of a round, round pixels of high energy and others in turn."""
+        grid = self._instance.grid
+        if not self.large:
+            yield from [self._reached] * _PATCHES
+            return
+        field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
+        high = field.pixel_energy + 1e-12
+        for number in range(_PATCHES):
+            centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
+            away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
+            yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
+
+    def _take(self, tasks: list[Task], found: list[Point | None], over: Over) -> None:
+        """Take over what is lower, the lowest first, and bring the whole grid up to date now and then."""
+        self.fruitless += _KICKS * len(tasks)
+        lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
+        for task, better in sorted(lower, key=lambda pair: pair[1].energy):
+            self._adopt(task, better, over)
+        if any(found) and self._unsettled:
+            self._latest.append(
+                CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
+            )
+        if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
+            self._settle(over)
+        if self.large and (self.round + 1) % _IMPROVE == 0:
+            self.offer(improved(self.best(over), over))
+
+    def _adopt(self, task: Task, better: Point, over: Over) -> None:
+        """Take over a patch's angles and jumps if that lowers the energy beside what else was taken over."""
+        state = self._state
+        trial = FreeField(
+            self._instance, state.alpha, state.beta, np.where(better.p != task.p, better.p, state.p)
+        )
+        inside = np.concatenate([task.free, task.free])
+        trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
+        if not self.large and trial.energy >= state.energy - LOWER:
+            # Others were taken over in the same patch: the angles for all of the new jumps are neither's.
+            trial.x = state.x
+            settle(trial, self._solver, over)
+        if trial.energy < state.energy - LOWER:
+            self._state, self._unsettled, self.fruitless = trial, True, 0
+            self.energies.append((self.round, trial.energy))
+
+    def _settle(self, over: Over) -> None:
+        """Bring angles and jumps of the whole grid up to date."""
+        if self._unsettled:
+            settle(self._state, self._solver, over)
+            self._unsettled = False
+            self.energies.append((self.round, self._state.energy))

@@ -1,0 +1,131 @@
+"""A walk over the jumps of one patch of the grid: kick, follow the valley down,
+keep what is lower (iterated local search).
+
+After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump
+at every step, uphill too, but none of a jump that has just changed, unless that is the lowest point so far.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..field.field import CrossField
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import Instance
+from ..processes.deadline import Deadline, Over
+from .kicks import Change, Kicks
+from .landscape import STEPS, Landscape, Patch, Point
+
+LOWER: Final = 1e-7
+"""Energy by which a field has to be lower to count as better: less may be rounding."""
+
+_FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
+_MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual
+_REST: Final = (4, 12)  # changes for which a jump stays as it is once it has changed
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A patch to explore, from a field on.
+
+    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the patch,
+    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to
+    try; seed: of their choice; deadline: when to end.
+    """
+
+    instance: Instance
+    x: Floats
+    p: Ints
+    free: Bools
+    curve: Ints
+    kicks: int
+    seed: tuple[int, ...]
+    deadline: Deadline
+
+
+class Explored(NamedTuple):
+    """The point of least energy, outside the patch that of the task,
+    or None when none was lower by more than 1e-7.
+
+    whole: whether all kicks were tried; if not, the clock has had a say in the point.
+    """
+
+    better: Point | None
+    whole: bool
+
+
+def explore(task: Task) -> Explored:
+    """What was found in a patch; energies are those of the definition, within all bounds of the angles.
+
+    The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several
+    threads end in other digits.
+    """
+    with threadpool_limits(1, user_api="blas"), suppress(np.linalg.LinAlgError):
+        return _explore(task, task.deadline.passed)
+    return Explored(None, whole=True)
+
+
+def _explore(task: Task, over: Over) -> Explored:
+    rng = np.random.default_rng(task.seed)
+    patch = Patch.of(task.instance, task.free)
+    land = Landscape(patch, task.x, task.p)
+    home, kicks = land.saved(), Kicks(patch, task.curve)
+    alpha, beta = np.split(task.x, 2)
+    given = CrossField(task.instance, alpha, beta, task.p).energy().total
+    # Solved in the patch alone the angles may be lower already; jumps have to do better than that.
+    least = min(given, land.point.energy)
+    best: Point | None = None
+    for _ in range(task.kicks if len(patch.pairs) else 0):
+        lower = _kicked(land, kicks.draw(rng, land.p), rng, home.energy - LOWER, over)
+        if lower is not None and lower.point.energy < least - LOWER:
+            land, home, best = lower, lower.saved(), lower.point
+            least = best.energy
+        elif over():
+            break
+        else:
+            land.restore(home)
+    return Explored(best, whole=not over())
+
+
+def _kicked(
+    land: Landscape, kick: Change, rng: np.random.Generator, goal: float, over: Over
+) -> Landscape | None:
+    """The landscape at the lowest point below `goal` of the walk after a kick, anew:
+    rounding of many updates must not add up.
+
+    None when there is no such point, or none that can be computed.
+    """
+    with suppress(np.linalg.LinAlgError):
+        land.change(*kick)
+        jumps = _walk(land, rng, goal, over)
+        return None if jumps is None else Landscape(land.patch, land.angles, jumps)
+    return None
+
+
+def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) -> Ints | None:
+    """The jumps (m,) of the lowest point below `goal` of a walk from where the landscape stands."""
+    resting = np.zeros(len(land.patch.pairs), dtype=np.int64)
+    low, found = land.energy, None
+    fruitless = 0
+    for now in range(1, _MOST_STEPS + 1):
+        gains = land.gains()
+        barred = (resting >= now) & (land.energy + gains >= low - LOWER)
+        gains[barred] = np.inf
+        row, pair = np.unravel_index(np.argmin(gains), gains.shape)
+        if np.isinf(gains[row, pair]) or over():
+            break
+        land.change(np.array([pair]), STEPS[[row]])
+        resting[pair] = now + rng.integers(*_REST)
+        fruitless += 1
+        if land.energy < low - LOWER:
+            low, fruitless = land.energy, 0
+        if land.energy < goal:
+            goal, found = land.energy - LOWER, land.p.copy()
+        if fruitless == _FRUITLESS:
+            break
+    return found

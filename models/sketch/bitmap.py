@@ -1,0 +1,303 @@
+"""Reading bitmaps: ink on paper, and stroke directions by a structure tensor.
+
+Any paper that is lighter than the strokes will do: its level is taken from the picture. Directions are found
+at the picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness
+and coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, shortened
+from ..input_limits import MAX_PIXELS, MAX_SIDE
+from ..instance.grid import Bools, Floats
+from .colour import REDDISH, ink_of, redness
+from .cover import Cover, Frame, block_means
+
+Ink = NDArray[np.float32]
+
+FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
+"""What is read: formats that Pillow decodes by itself, without starting other programs."""
+_ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are averaged down by whole factors first
+_WORKING_SIDE: Final = 2048
+_DARKEST_PAPER: Final = 64.0  # of 255
+_FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
+_NOISE, _FULL = (
+    0.15,
+    0.85,
+)  # of the strokes' ink: below it paper and compression noise, above it full darkness
+_BAND: Final = 1 << 22  # pixels of a picture that are looked at together
+_SILENCE: Final = threading.Lock()
+_BLUR: Final = 1.0  # pixels, of the gradient
+_SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
+_COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are told apart
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A bitmap sketch, ready for any frame.
+
+    ink: float32 [h, w] in [0, 1], 0 = paper, 1 = as dark as the strokes of the picture.
+    red: float32 [h, w] in [0, 1], the part of the ink that is red.
+    reduced: how many pixels of the file make one of these arrays in each direction.
+    width, height: size of the file in pixels.
+    """
+
+    ink: Ink
+    red: Ink
+    reduced: int
+    width: int
+    height: int
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """Left, top, right, bottom of the ink in pixels of the file."""
+        rows, columns = (np.nonzero((self.ink > 0.3).any(axis=axis))[0] for axis in (1, 0))
+        left, top, right, bottom = (
+            self.reduced * float(edge) for edge in (columns[0], rows[0], columns[-1] + 1, rows[-1] + 1)
+        )
+        return left, top, right, bottom
+
+    @cached_property
+    def stroke_width(self) -> float:
+        """Typical width of a stroke in pixels of the arrays, at least 1:
+        twice its area over the length of its two edges.
+        """
+        down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
+        # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is
+        # turned.
+        edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
+        return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
+
+    def covers(self, frame: Frame) -> tuple[Cover, Cover]:
+        """The cover by curvature lines and by other strokes;
+        everything is a curvature line unless red and other both occur.
+        """
+        share = float((self.ink * self.red).sum() / self.ink.sum())
+        if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
+            return self._cover(self.ink, frame), _no_cover(frame)
+        return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
+
+    def _cover(self, ink: Ink, frame: Frame) -> Cover:
+        rows, columns = (edges / self.reduced for edges in frame.edges)
+        tangent = stroke_directions(ink, self.stroke_width)
+        dark = block_means(ink, rows, columns)
+        direction = (
+            block_means(ink[..., None] * tangent, rows, columns) / np.where(dark > 0, dark, 1)[..., None]
+        )
+        # A stroke straight across a grid pixel darkens a part width / pixel of it.
+        return Cover(dark / min(1.0, self.stroke_width * self.reduced / frame.pixel), direction)
+
+
+def _no_cover(frame: Frame) -> Cover:
+    return Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
+
+
+def stroke_directions(ink: Ink, width: float) -> Ink:
+    """Double-angle vectors (y up) of the strokes, as long as the structure tensor is coherent (0..1);
+    shape [h, w, 2].
+    """
+    from scipy import ndimage
+
+    # Derivatives of a Gaussian favour no direction, unlike differences of neighbours.
+    down, right = (
+        ndimage.gaussian_filter(ink, _BLUR, order=order, mode="constant") for order in ((1, 0), (0, 1))
+    )
+    # The double angle of the tangent is opposite to that of the gradient; 2 gx gy changes its sign once more
+    # as y turns up.
+    tensor = np.stack([down**2 - right**2, 2 * right * down, right**2 + down**2])
+    scale = max(1.5, 0.6 * width)
+    cosine, sine, energy = (
+        ndimage.gaussian_filter(part, scale, mode="constant", truncate=3.0) for part in tensor
+    )
+    direction: Ink = np.stack([cosine, sine], axis=-1) / np.maximum(energy, 1e-8)[..., None]
+    return direction
+
+
+def read_picture(data: bytes, size: int) -> Picture:
+    """The ink of a bitmap, fine enough for a grid of `size` pixels.
+
+    Raises InputError when the bytes are no picture, are cut off, declare absurd dimensions, or show only
+    paper.
+    """
+    image = _opened(data)
+    width, height = image.size
+    reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
+    rgb = _on_paper(image, reduced)
+    raw = ink_of(rgb)
+    strongest = float(raw.max())
+    if strongest < _FAINTEST:
+        raise InputError("shows no stroke: it is paper all over; expected dark strokes on lighter paper")
+    level = float(np.median(raw[raw > strongest / 2]))
+    ink = np.clip((raw / level - _NOISE) / (_FULL - _NOISE), 0, 1).astype(np.float32)
+    ink[_specks(ink)] = 0
+    if not (ink > 0.3).any():
+        raise InputError("shows no stroke but a few specks; expected dark strokes on lighter paper")
+    return Picture(ink, _red_part(rgb, raw), reduced, width, height)
+
+
+def read_white(data: bytes) -> Bools:
+    """The white part of a mask picture, bool [h, w]. Raises InputError as read_picture."""
+    image = _opened(data)
+    return np.concatenate([pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)])
+
+
+def _opened(data: bytes) -> Any:
+    """The decoded picture, upright. Its size is looked at before its pixels."""
+    from PIL import Image, ImageOps
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            with _silenced():
+                image = Image.open(io.BytesIO(data), formats=FORMATS)
+                _check_size(*image.size)
+                image.load()
+            ImageOps.exif_transpose(image, in_place=True)
+        except InputError:
+            raise
+        except Image.DecompressionBombError as error:
+            raise InputError("declares absurdly many pixels; scale it down") from error
+        except Exception as error:  # damaged pictures make decoders raise nearly anything
+            raise InputError(
+                f"is not a whole picture ({_short(error)}); expected {', '.join(FORMATS)}"
+            ) from error
+    return image
+
+
+def _check_size(width: int, height: int) -> None:
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise InputError(
+            f"declares {width} x {height} pixels; "
+            f"at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
+        )
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself,
+    Pillow by its log.
+    """
+    with _SILENCE:
+        try:
+            kept = os.dup(2)
+        except OSError:  # there is none
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            os.close(nowhere)
+
+
+def _short(error: Exception) -> str:
+    text = str(error)
+    return "unknown format" if "cannot identify" in text else shortened(text) or type(error).__name__
+
+
+def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
+    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows:
+    colours of all pixels at once would take many times the memory of the picture.
+    """
+    width, height = image.size
+    rows = max(1, _BAND // (width * multiple)) * multiple
+    bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
+    white = _white(image, bands)
+    return (_eight_bit(image.crop(band), white) for band in bands)
+
+
+def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
+    """The value of white in pictures of 16 bit and floating point greys, None in others.
+
+    Raises InputError for values that are not finite.
+    """
+    if image.mode.startswith("I;16") or image.mode == "I":
+        return 65535.0
+    if image.mode != "F":
+        return None
+    most = [float(np.asarray(image.crop(band)).max()) for band in bands]
+    least = [float(np.asarray(image.crop(band)).min()) for band in bands]
+    if not np.isfinite(most + least).all():
+        raise InputError("holds pixels that are no finite numbers; save it with 8 or 16 bits")
+    return next((top for top in (1.0, 255.0) if max(most) <= top), 65535.0)
+
+
+def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
+    """The picture composited on white as uint8 [h, w, 1 or 3];
+    greys of which `white` is the lightest are scaled down.
+    """
+    from PIL import Image
+
+    if white is not None:
+        values = np.asarray(image).astype(np.float32)
+        scaled: NDArray[np.uint8] = (255 * np.clip(values / white, 0, 1)).astype(np.uint8)
+        return scaled[..., None]
+    if "A" in image.getbands() or "transparency" in image.info:
+        image = image.convert("RGBA")
+        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image)
+    image = image.convert("L" if image.mode in ("1", "L") else "RGB")
+    pixels: NDArray[np.uint8] = np.asarray(image)
+    return pixels[..., None] if pixels.ndim == 2 else pixels
+
+
+def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """The means over blocks of so many rows and columns."""
+    from PIL import Image
+
+    if factor == 1:
+        return pixels
+    channels = pixels.shape[-1]
+    small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(factor)
+    return np.asarray(small).reshape(small.height, small.width, channels)
+
+
+def _on_paper(image: Any, reduced: int) -> Floats:
+    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1], averaged down by a whole factor."""
+    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
+    channels = pixels.shape[-1]
+    colours = pixels.astype(np.float32)
+    # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
+    paper = np.percentile(colours.reshape(-1, channels), 75, axis=0).astype(np.float32)
+    if paper.max() < _DARKEST_PAPER:
+        raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
+    clipped: Floats = np.minimum(colours / np.maximum(paper, 1), 1)
+    return clipped
+
+
+def _specks(ink: Ink) -> Bools:
+    """The marks that hold less ink than a small dot: dust and noise."""
+    from scipy import ndimage
+
+    label, count = ndimage.label(ink > 0, structure=np.ones((3, 3)))
+    weight = np.bincount(label.ravel(), ink.ravel(), count + 1)
+    specks: Bools = weight[label] < _SPECK
+    return specks
+
+
+def _red_part(rgb: Floats, ink: Floats) -> Ink:
+    """1 where the ink around is red, else 0: colour is coarser than brightness in JPEG,
+    so it is looked at blurred.
+    """
+    from scipy import ndimage
+
+    if rgb.shape[-1] == 1:
+        return np.zeros(ink.shape, dtype=np.float32)
+    red, all_ink = (ndimage.gaussian_filter(part, 1.5) for part in (redness(rgb), ink))
+    part: Ink = (red > REDDISH * all_ink).astype(np.float32)
+    return part

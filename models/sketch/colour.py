@@ -1,0 +1,47 @@
+"""Which colours are strokes, and which strokes are red, on white paper.
+
+Designers mark curvature lines in red and draw silhouettes and creases in black (docs/mathematics.md, 1).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ..instance.grid import Bools, Floats
+
+PAPER: Final = 0.1
+"""Ink below this is paper."""
+REDDISH: Final = 0.4
+"""Least share of a stroke's ink that must be missing from green and blue alone."""
+
+
+def ink_of(rgb: Floats) -> Floats:
+    """How much ink a colour is, 1 - min(red, green, blue), in [0, 1]; 1 for black and for pure red.
+
+    Shape (...,).
+    """
+    ink: Floats = 1 - rgb.min(axis=-1)
+    return ink
+
+
+def redness(rgb: Floats) -> Floats:
+    """How much red ink a colour holds: red - max(green, blue), less what orange and purple differ;
+    shape (...,).
+    """
+    red, green, blue = np.moveaxis(rgb, -1, 0)
+    excess: Floats = np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0)
+    return excess
+
+
+def is_paper(rgb: Floats) -> Bools:
+    """True where a colour is as good as white; shape (...,)."""
+    paper: Bools = ink_of(rgb) < PAPER
+    return paper
+
+
+def is_red(rgb: Floats) -> Bools:
+    """True where a colour is a saturated red; shape (...,)."""
+    red: Bools = redness(rgb) > REDDISH * ink_of(rgb)
+    return red

@@ -1,0 +1,192 @@
+"""Strokes on the pixel grid: how much of each pixel they cover and in which direction.
+
+Sketches have y down, instances have y up; this is where the one becomes the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..input_limits import MAX_PIECES
+from ..instance.elementary import length as vector_length
+from ..instance.grid import Floats
+
+Indices = NDArray[np.intp]
+Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
+
+MARGIN: Final = 0.04
+"""Empty border round a drawing, in parts of its longer side; at least one pixel."""
+LEAST_R: Final = 0.5
+"""Least R of a pixel with a direction.
+
+Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither of them; a single line
+that bends by as much as a right angle inside the pixel still has R = 0.64.
+"""
+_NUDGE: Final = 1e-9  # of a pixel: what runs exactly along a pixel edge is shared by both sides
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the grid lies on the sketch: top left corner (x, y), side of a pixel,
+    rows and columns; y down.
+    """
+
+    x: float
+    y: float
+    pixel: float
+    height: int
+    width: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows, columns."""
+        return self.height, self.width
+
+    @property
+    def edges(self) -> tuple[Floats, Floats]:
+        """Where the rows begin and end in y, shape (height + 1,), and the columns in x,
+        shape (width + 1,).
+        """
+        rows: Floats = self.y + np.arange(self.height + 1.0) * self.pixel
+        columns: Floats = self.x + np.arange(self.width + 1.0) * self.pixel
+        return rows, columns
+
+
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """What one kind of stroke does on each pixel.
+
+    amount: float [height, width], length of stroke in pixel sides; 1 = one stroke straight across.
+    direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1
+    for one direction and near 0 at crossings and corners.
+    """
+
+    amount: Floats
+    direction: Floats
+
+    @property
+    def weight(self) -> Floats:
+        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height,
+        width] (docs/mathematics.md, 1).
+        """
+        single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
+        weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
+        return weight
+
+
+def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
+    """The frame of `size` pixels on its longer side round a box (left, top, right, bottom),
+    which sits in its middle.
+    """
+    left, top, right, bottom = box
+    longer = max(right - left, bottom - top)
+    border = MARGIN if margin else 0.0
+    pixel = longer * (1 + 2 * border) / size
+    if margin and size > 4:
+        pixel = max(pixel, longer / (size - 2))
+    border = max(border * longer, pixel if margin and size > 4 else 0.0)
+    width, height = (
+        min(size, max(1, int(np.ceil((side + 2 * border) / pixel - 1e-6))))
+        for side in (right - left, bottom - top)
+    )
+    return Frame(
+        (left + right - width * pixel) / 2, (top + bottom - height * pixel) / 2, pixel, height, width
+    )
+
+
+def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
+    """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges.
+
+    Raises InputError when they would fall into more than MAX_PIECES pieces.
+    """
+    segments = _clipped((segments - (frame.x, frame.y)) / frame.pixel, frame)
+    step = segments[:, 1] - segments[:, 0]
+    length = vector_length(*step.T)
+    segments, step, length = segments[length > 0], step[length > 0], length[length > 0]
+    owner, start, end = _pieces(segments, step)
+    middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]
+    covered = (end - start) * length[owner]
+    unit = step / length[:, None]
+    double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
+    amount, cosine, sine = np.zeros((3, *frame.shape))
+    for nudge in product((-_NUDGE, _NUDGE), repeat=2):
+        quarter = _binned(middle + nudge, covered / 4 * double[:, owner], frame)
+        amount, cosine, sine = amount + quarter[0], cosine + quarter[1], sine + quarter[2]
+    return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
+
+
+def _clipped(segments: Floats, frame: Frame) -> Floats:
+    """The parts of segments (in pixels) that lie on the grid; the others are left out."""
+    start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
+    limit = np.array([frame.width, frame.height], dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        walls = np.stack([-start / step, (limit - start) / step])
+    inside = np.where((start >= 0) & (start <= limit), -np.inf, np.inf)  # for a segment along the walls
+    low = np.where(step == 0, inside, walls.min(axis=0)).max(axis=1).clip(0, None)
+    high = np.where(step == 0, -inside, walls.max(axis=0)).min(axis=1).clip(None, 1)
+    kept = low < high
+    start, step, low, high = start[kept], step[kept], low[kept, None], high[kept, None]
+    return np.stack([start + low * step, start + high * step], axis=1)
+
+
+def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
+    """Segment number and the parameters of both ends of each piece between pixel edges."""
+    count = len(segments)
+    low, high = segments.min(axis=1), segments.max(axis=1)
+    first = np.floor(low) + 1
+    crossings = np.maximum(np.ceil(high) - first, 0).astype(np.int64)
+    if count + crossings.sum() > MAX_PIECES:
+        raise InputError(
+            f"its strokes fall into more than {MAX_PIECES} pieces on this grid; "
+            "simplify the drawing or choose a smaller size"
+        )
+    owners, cuts = [np.arange(count)], [np.zeros(count)]
+    for axis in (0, 1):
+        many = crossings[:, axis]
+        owner = np.repeat(np.arange(count), many)
+        line = first[owner, axis] + np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)
+        owners.append(owner)
+        cuts.append((line - segments[owner, 0, axis]) / step[owner, axis])
+    all_owners, all_cuts = np.concatenate(owners), np.concatenate(cuts).clip(0, 1)
+    order = np.lexsort((all_cuts, all_owners))
+    number, start = all_owners[order], all_cuts[order]
+    end = np.ones(len(start))
+    end[:-1] = np.where(number[1:] == number[:-1], start[1:], 1.0)
+    return number, start, end
+
+
+def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
+    """Sums [c, height, width] of values (c, m) at points (m, 2) given in pixels;
+    what falls off the grid is left out.
+    """
+    column, row = np.floor(points).astype(np.int64).T
+    kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
+    cell = row[kept] * frame.width + column[kept]
+    size = frame.height * frame.width
+    sums = [np.bincount(cell, value[kept], size) for value in values]
+    return np.array(sums, dtype=np.float64).reshape(-1, *frame.shape)
+
+
+def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:
+    """Exact area means of a picture [h, w, ...] over the cells between fractional row and column edges.
+
+    Cells reach over whole and parts of pixels alike; beyond the picture there is 0.
+    """
+    means = _strip_means(np.moveaxis(_strip_means(image, rows), 1, 0), columns)
+    return np.moveaxis(means, 1, 0)
+
+
+def _strip_means(image: Pixels, edges: Floats) -> Floats:
+    sums = np.concatenate([np.zeros((1, *image.shape[1:])), np.cumsum(image, axis=0, dtype=np.float64)])
+    place = np.clip(edges, 0, len(image))
+    below = np.minimum(place.astype(np.int64), len(image) - 1)
+    part = (place - below).reshape(-1, *[1] * (image.ndim - 1))
+    at = sums[below] * (1 - part) + sums[below + 1] * part
+    means: Floats = np.diff(at, axis=0) / np.diff(edges).reshape(-1, *[1] * (image.ndim - 1))
+    return means

@@ -1,0 +1,76 @@
+"""Curves of a vector sketch: cubic Beziers, and their flattening into straight segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..input_limits import MAX_SEGMENTS
+from ..instance.grid import Bools, Floats
+
+_BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The strokes of a vector sketch in its own units, x to the right and y **down**.
+
+    points: float (k, 4, 2), control points of cubic Beziers; straight lines have theirs at the thirds.
+    red: bool (k,), True where a stroke is drawn in red.
+    canvas: x, y, width and height of the page, or None when the file does not say.
+    """
+
+    points: Floats
+    red: Bools
+    canvas: tuple[float, float, float, float] | None
+
+
+def lines_as_cubics(start: Floats, end: Floats) -> Floats:
+    """Control points (k, 4, 2) of the straight lines from start (k, 2) to end (k, 2)."""
+    thirds = np.arange(4.0).reshape(1, 4, 1) / 3
+    cubics: Floats = start[:, None] * (1 - thirds) + end[:, None] * thirds
+    return cubics
+
+
+def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:
+    """Straight segments (m, 2, 2) that stay within `tolerance` of the curves (k, 4, 2),
+    and the curve (m,) of each.
+
+    A cubic cut into n equal steps is off by at most 3/4 M / n^2, with M the longer second difference of its
+    control points, because |B''| <= 6 M. Raises InputError when that needs more than MAX_SEGMENTS.
+    """
+    bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
+    steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)
+    if steps.sum() > MAX_SEGMENTS:
+        raise InputError(
+            f"has more than {MAX_SEGMENTS} segments at this size; "
+            "simplify the drawing or choose a smaller size"
+        )
+    owner = np.repeat(np.arange(len(points)), steps)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
+    ends = [_at(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
+    return np.stack(ends, axis=1), owner
+
+
+def bounding_box(points: Floats) -> tuple[float, float, float, float]:
+    """Least x, least y, greatest x, greatest y of the curves themselves (their
+    control points may lie outside).
+    """
+    span = float(np.ptp(points.reshape(-1, 2), axis=0).max())
+    corners = flatten(points, _BOX_TOLERANCE * span)[0].reshape(-1, 2) if span > 0 else points.reshape(-1, 2)
+    (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return left, top, right, bottom
+
+
+def _at(points: Floats, t: Floats) -> Floats:
+    t = t[:, None]
+    back = 1 - t
+    start, first, second, end = points.swapaxes(0, 1)
+    at: Floats = (
+        back * back * back * start + 3 * back * back * t * first + 3 * back * t * t * second + t * t * t * end
+    )
+    return at

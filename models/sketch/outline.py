@@ -1,0 +1,86 @@
+"""The region that a drawing encloses, for sketches that come without a mask."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ..instance.grid import Bools, Floats
+
+GAPS: Final = (0.03, 0.06, 0.12)
+"""Widths of gaps in an outline that still count as closed, in parts of the grid's longer side,
+tried in turn.
+"""
+ENCLOSED: Final = 0.25
+"""Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
+CRUMB: Final = 0.01
+"""Least share of a region for a part of its own;
+smaller ones are left over where a stroke grazes the outline.
+"""
+HELD: Final = 2.0
+"""Least length of stroke, in pixel sides, for a part of its own;
+less is a stroke that ends a little beyond an outline.
+"""
+
+
+def inside_outline(strokes: Bools) -> Bools:
+    """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
+
+    The narrowest of GAPS for which the drawing encloses something decides; an open drawing, which encloses
+    next to nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
+    """
+    hull = _hull_area(strokes)
+    for gap in GAPS:
+        region = _enclosed(strokes, max(1.0, gap * max(strokes.shape) / 2))
+        if _solid(region) >= ENCLOSED * hull:
+            return region
+    return np.ones_like(strokes)
+
+
+def parts_with(region: Bools, weight: Floats) -> Bools:
+    """The 4-connected parts of a region that curvature lines run through: nothing is known of the others.
+
+    weight: float [height, width], w of the stroke pixels and 0 elsewhere. A part needs strokes of HELD in
+    all, and must be no crumb: at least CRUMB of the region and four pixels. The part with most strokes is
+    always kept.
+    """
+    from scipy import ndimage
+
+    label, count = ndimage.label(region)
+    size = np.bincount(label.ravel(), minlength=count + 1)
+    held = np.bincount(label.ravel(), np.where(region, weight, 0.0).ravel(), minlength=count + 1)
+    kept = (held >= HELD) & (size >= max(4, CRUMB * region.sum()))
+    kept[np.argmax(held)] = held.max() > 0
+    kept[0] = False
+    parts: Bools = kept[label]
+    return parts
+
+
+def _enclosed(strokes: Bools, radius: float) -> Bools:
+    """What a disc of this radius cannot reach when it rolls in from outside and never touches a stroke."""
+    from scipy import ndimage
+
+    pad = int(np.ceil(radius)) + 2
+    walls = np.pad(strokes, pad)
+    free = ndimage.distance_transform_edt(~walls) > radius
+    label, _ = ndimage.label(free)
+    outside = ndimage.distance_transform_edt(label != label[0, 0]) <= radius
+    region: Bools = (~outside | walls)[pad:-pad, pad:-pad]
+    return region
+
+
+def _solid(region: Bools) -> int:
+    """Number of pixels that are left when lines one or two pixels wide are taken away."""
+    from scipy import ndimage
+
+    return int(ndimage.binary_opening(region, np.ones((3, 3), dtype=bool)).sum())
+
+
+def _hull_area(strokes: Bools) -> float:
+    """Area in pixels of the convex hull of the stroke pixels' corners."""
+    from scipy.spatial import ConvexHull
+
+    row, column = np.nonzero(strokes)
+    corners = np.concatenate([np.stack([row + a, column + b], axis=1) for a in (0, 1) for b in (0, 1)])
+    return float(ConvexHull(corners).volume)

@@ -1,0 +1,251 @@
+"""The outlines of SVG shapes: path data, point lists and basic shapes as straight lines and cubic Beziers.
+
+svgelements knows the grammar of path data, the arcs and the basic shapes. Its own paths look back to the last
+move at each close, which takes time that grows with the square of their length; so its lexer draws on an
+outline here, in one pass.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import MAX_CURVES, MAX_LENGTH
+from ..instance.grid import Floats
+from .curves import lines_as_cubics
+
+PPI: Final = 96.0  # CSS pixels per inch
+EM: Final = 16.0  # CSS pixels of a letter, where the drawing does not choose another font
+_BASIC: Final = {
+    "line": ("SimpleLine", ("x1", "y1", "x2", "y2")),
+    "circle": ("Circle", ("cx", "cy", "r")),
+    "ellipse": ("Ellipse", ("cx", "cy", "rx", "ry")),
+    "rect": ("Rect", ("x", "y", "width", "height", "rx", "ry")),
+}
+SHAPES: Final = frozenset({"path", "polyline", "polygon", *_BASIC})
+_NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+Coordinates = tuple[float, float] | str
+"""A point, or the letter that closes the subpath in place of its last point."""
+
+
+def outline(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
+    """Control points (k, 4, 2) of a shape in its own units. page: width and height that percentages are of.
+
+    Raises InputError, which does not name the shape, for damaged numbers and for more than MAX_CURVES
+    segments.
+    """
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told where it is placed
+            return _points(tag, attributes, page)
+    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
+        raise InputError("its numbers cannot be read; export the drawing again") from error
+
+
+def _points(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
+    if tag in ("polyline", "polygon"):
+        return _polygon(attributes.get("points", ""), closed=tag == "polygon")
+    drawn = _Outline()
+    if tag == "path":
+        _trace(attributes.get("d", ""), drawn)
+    else:
+        _draw_basic(tag, attributes, page, drawn)
+    return drawn.points()
+
+
+def pixels(text: str) -> float | None:
+    """A length in CSS pixels, None for a percentage and what cannot be read."""
+    from svgelements import Length
+
+    if not text or text.endswith("%") or len(text) > MAX_LENGTH:
+        return None
+    try:
+        value = Length(text).value(ppi=PPI, font_size=EM, font_height=EM)
+    except (ValueError, TypeError, AttributeError):
+        return None
+    return value if isinstance(value, float) and np.isfinite(value) else None
+
+
+def _trace(data: str, drawn: _Outline) -> None:
+    from svgelements import SVGLexicalParser
+
+    data = data.strip()
+    if data and data != "none" and data[0] not in "Mm":
+        raise InputError(
+            f"its path data begins with {data[:10]!r}, not with a move (M); export the drawing again"
+        )
+    SVGLexicalParser().parse(drawn, data)
+
+
+def _polygon(text: str, *, closed: bool) -> Floats:
+    numbers = np.array(_NUMBER.findall(text), dtype=float)
+    points = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
+    if len(points) > MAX_CURVES:
+        raise too_many_curves()
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    return lines_as_cubics(points[:-1], points[1:])
+
+
+def _draw_basic(tag: str, attributes: Mapping[str, str], page: tuple[float, float], drawn: _Outline) -> None:
+    import svgelements
+
+    kind, keys = _BASIC[tag]
+    shape = getattr(svgelements, kind)(
+        {key: _readable(attributes[key]) for key in keys if attributes.get(key)}
+    )
+    shape.render(ppi=PPI, width=page[0], height=page[1])
+    for segment in shape.segments():
+        drawn.add(segment)
+
+
+def _readable(length: str) -> str | float:
+    """A length in pixels, or the percentage."""
+    if length.endswith("%"):
+        return f"{float(length[:-1])}%"
+    found = pixels(length)
+    if found is None:
+        raise InputError(f"its length {length[:20]!r} cannot be read; give pixels, mm, in or %")
+    return found
+
+
+def too_many_curves() -> InputError:
+    """The refusal of a drawing with more than MAX_CURVES segments."""
+    return InputError(
+        f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; "
+        "simplify the drawing"
+    )
+
+
+@dataclass(frozen=True)
+class _Point:
+    """What svgelements' lexer asks of a point."""
+
+    x: float
+    y: float
+
+
+@dataclass(eq=False)
+class _Outline:
+    """What svgelements' lexer draws on: straight lines and cubics as points of the complex plane.
+
+    The lexer gives absolute points and says beside them what they were; only `horizontal` and `vertical` are
+    left to do.
+
+    smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
+    """
+
+    lines: list[tuple[complex, complex]] = field(default_factory=list)
+    cubics: list[tuple[complex, complex, complex, complex]] = field(default_factory=list)
+    here: complex = 0j
+    begin: complex = 0j
+    smooth: tuple[int, complex] = (0, 0j)
+
+    @property
+    def current_point(self) -> _Point:
+        return _Point(self.here.real, self.here.imag)
+
+    def points(self) -> Floats:
+        """Control points (k, 4, 2)."""
+        straight, curved = _as_points(self.lines, 2), _as_points(self.cubics, 4)
+        return np.concatenate([lines_as_cubics(straight[:, 0], straight[:, 1]), curved])
+
+    def start(self) -> None:
+        pass
+
+    def end(self) -> None:
+        pass
+
+    def move(self, point: Coordinates, **_: bool) -> None:
+        self.here = self.begin = self._at(point)
+        self.smooth = (0, 0j)
+
+    def line(self, point: Coordinates, **_: bool) -> None:
+        end = self._at(point)
+        self._room()
+        self.lines.append((self.here, end))
+        self.here, self.smooth = end, (0, 0j)
+
+    def horizontal(self, x: float, *, relative: bool) -> None:
+        self.line((x + self.here.real * relative, self.here.imag))
+
+    def vertical(self, y: float, *, relative: bool) -> None:
+        self.line((self.here.real, y + self.here.imag * relative))
+
+    def closed(self, **_: bool) -> None:
+        self.line("z")
+
+    def cubic(self, first: Coordinates, second: Coordinates, point: Coordinates, **_: bool) -> None:
+        control, end = self._at(second), self._at(point)
+        self._curve(self._at(first), control, end)
+        self.smooth = (3, control)
+
+    def smooth_cubic(self, second: Coordinates, point: Coordinates, **_: bool) -> None:
+        first = self._reflected(3)
+        self.cubic((first.real, first.imag), second, point)
+
+    def quad(self, middle: Coordinates, point: Coordinates, **_: bool) -> None:
+        control, end = self._at(middle), self._at(point)
+        self._curve((self.here + 2 * control) / 3, (end + 2 * control) / 3, end)
+        self.smooth = (2, control)
+
+    def smooth_quad(self, point: Coordinates, **_: bool) -> None:
+        control = self._reflected(2)
+        self.quad((control.real, control.imag), point)
+
+    def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
+        """others: rotation, large, sweep, point."""
+        from svgelements import Arc
+
+        rotation, large, sweep, point = others
+        end = self._at(point)
+        if rx == 0 or ry == 0:  # as SVG has it
+            self.line((end.real, end.imag))
+        elif end != self.here:
+            self.add(Arc(self.here, abs(rx), abs(ry), rotation, large, sweep, end))
+        self.here, self.smooth = end, (0, 0j)
+
+    def add(self, segment: Any) -> None:
+        """Add a segment of svgelements that has its own start."""
+        import svgelements
+
+        if isinstance(segment, svgelements.Arc):
+            for curve in segment.as_cubic_curves():
+                self.add(curve)
+        elif isinstance(segment, svgelements.CubicBezier):
+            start, first, second, end = map(
+                complex, (segment.start, segment.control1, segment.control2, segment.end)
+            )
+            self.here = start
+            self._curve(first, second, end)
+        elif isinstance(segment, svgelements.Linear):
+            self._room()
+            self.lines.append((complex(segment.start), complex(segment.end)))
+
+    def _curve(self, first: complex, second: complex, end: complex) -> None:
+        self._room()
+        self.cubics.append((self.here, first, second, end))
+        self.here = end
+
+    def _room(self) -> None:
+        if len(self.lines) + len(self.cubics) >= MAX_CURVES:
+            raise too_many_curves()
+
+    def _reflected(self, kind: int) -> complex:
+        """The first control point of a smooth curve: the last one reflected,
+        after a curve of the same kind.
+        """
+        return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
+
+    def _at(self, point: Coordinates) -> complex:
+        return self.begin if isinstance(point, str) else complex(*point)
+
+
+def _as_points(rows: list[Any], width: int) -> Floats:
+    values = np.array(rows, dtype=complex).reshape(-1, width)
+    return np.stack([values.real, values.imag], axis=-1)

@@ -1,0 +1,275 @@
+"""From a sketch to an instance: SVG, bitmap or .scap, with or without a mask.
+
+Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
+field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import MAX_BYTES
+from ..instance.angles import line_of
+from ..instance.grid import Bools
+from ..instance.instance import Gauge, Instance
+from ..storage import read_bytes
+from .bitmap import Picture, read_picture, read_white
+from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
+from .curves import Curves, bounding_box, flatten
+from .outline import inside_outline, parts_with
+from .scap import read_scap
+from .svg import read_svg
+
+DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
+MAX_SIZE: Final = 4096
+BYTES_PER_PIXEL: Final = 5000
+"""Memory for one pixel of the grid while its problem is written."""
+LEAST_WEIGHT: Final = 0.1
+"""Stroke pixels with a smaller w carry no direction worth a constraint: a corner that is barely touched,
+a crossing.
+"""
+CUT: Final = 0.5 - 1e-9
+"""Length in pixel sides from which another stroke (silhouette, crease) takes a pixel out of the mask.
+
+A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at
+most: so one half is the greatest threshold that never leaves a gap between 4-neighbours.
+"""
+_PICTURE: Final = re.compile(rb"\x89PNG|\xff\xd8\xff|RIFF|II\*\0|MM\0\*|BM|GIF8|P[1-6]\s", re.DOTALL)
+_FLATNESS: Final = 0.02  # of a pixel
+
+
+@dataclass(frozen=True, eq=False)
+class _Sketch:
+    """What every kind of sketch knows of itself, in its own units with y down.
+
+    box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
+    covers: the cover of a frame by curvature lines and by other strokes.
+    """
+
+    box: tuple[float, float, float, float]
+    page: tuple[float, float, float, float] | None
+    covers: Callable[[Frame], tuple[Cover, Cover]]
+
+
+def read_sketch(
+    path: str | Path,
+    *,
+    size: int = DEFAULT_SIZE,
+    mask: str | Path | None = None,
+    gauge: Gauge = "strokes",
+    name: str | None = None,
+) -> Instance:
+    """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
+
+    size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
+    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
+    in the parts that curvature lines run through; an open drawing gets the whole rectangle.
+    mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
+    (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
+    from half its area on.
+    gauge: as in Instance. name: the instance's name; by default made from the file name.
+
+    Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
+    length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
+    none. Raises InputError, with the file, for anything that cannot be used.
+    """
+    path = Path(path)
+    check_size(size)
+    with_mask = None if mask is None else Path(mask)
+    data = _bytes_of(path)
+    try:
+        return instance_of(
+            data, size=size, mask=with_mask, gauge=gauge, name=name or name_from(path.stem), source=path.name
+        )
+    except InputError as error:
+        raise error if error.file is not None else InputError(str(error), file=path) from error
+    except MemoryError as error:
+        raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
+
+
+def instance_of(
+    data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
+) -> Instance:
+    """The instance of a sketch that is given as the bytes of a file; otherwise as read_sketch.
+
+    Raises InputError.
+    """
+    sketch = _sketch(data, size, Path(source).suffix.lower())
+    if mask is None:
+        frame, given = _framed(sketch.box, size, margin=True), None
+    else:
+        frame, given = _masked(mask, sketch.page, size)
+    lines, others = sketch.covers(frame)
+    solve = _solve_mask(lines, others, given)
+    weight = np.where(solve, lines.weight, 0.0)
+    stroke = weight >= LEAST_WEIGHT
+    if not stroke.any():
+        raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
+    return Instance(
+        name=name,
+        mask=solve,
+        stroke_pixels=np.argwhere(stroke).astype(np.int32),
+        theta=line_of(lines.direction[stroke]),
+        w=np.minimum(weight[stroke], 1.0),
+        gauge=gauge,
+        source=" ".join(source.split()),
+        pixel_size=frame.pixel,
+        origin=(frame.x, frame.y),
+    )
+
+
+def name_from(text: str) -> str:
+    """An instance name made from any text: lower case, runs of other characters as `_`, a letter first,
+    at most 32 long.
+    """
+    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+    return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
+
+
+def check_memory(pixels: int, available: int | None) -> None:
+    """Nothing, or InputError when a grid of so many pixels needs more bytes than
+    are available (None: not known).
+    """
+    needed = pixels * BYTES_PER_PIXEL
+    if available is not None and needed > available:
+        raise InputError(
+            f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
+            f"but {available / 1e9:.1f} GB are free; choose a smaller size"
+        )
+
+
+def available_memory() -> int | None:
+    """Bytes of memory that can be had without swapping, or None where the system does not say."""
+    try:
+        text = Path("/proc/meminfo").read_text("ascii")
+        return 1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0])
+    except (OSError, ValueError, IndexError):
+        pass
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def check_size(size: int) -> None:
+    """Nothing, or InputError when a grid cannot have so many pixels on its longer side."""
+    if not 1 <= size <= MAX_SIZE:
+        raise InputError(f"size is {size}; choose 1 to {MAX_SIZE} pixels for the longer side")
+
+
+def _bytes_of(path: Path) -> bytes:
+    """The content of a regular file of bearable length, at least one byte."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot be read: {reason.lower()}; check the path", file=path) from error
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
+    if status.st_size == 0:
+        raise InputError("is empty; save the sketch again", file=path)
+    if status.st_size > MAX_BYTES:
+        raise InputError(
+            f"has {status.st_size} bytes; at most {MAX_BYTES} are read, simplify the sketch", file=path
+        )
+    return read_bytes(path)
+
+
+def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
+    """The sketch that bytes hold, by content first and suffix second."""
+    start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if data[:2] == b"\x1f\x8b":
+        raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
+    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return _of_curves(read_svg(data))
+    picture = _PICTURE.match(data) is not None
+    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and not picture):
+        return _of_curves(read_scap(data))
+    if suffix == ".svg" and not picture:
+        return _of_curves(read_svg(data))
+    return _of_picture(read_picture(data, size))
+
+
+def _of_curves(curves: Curves) -> _Sketch:
+    def covers(frame: Frame) -> tuple[Cover, Cover]:
+        segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
+        mixed = curves.red.any() and not curves.red.all()
+        line = curves.red[owner] if mixed else np.ones(len(owner), dtype=bool)
+        return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
+
+    return _Sketch(bounding_box(curves.points), curves.canvas, covers)
+
+
+def _of_picture(picture: Picture) -> _Sketch:
+    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
+
+
+def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
+    if max(box[2] - box[0], box[3] - box[1]) <= 0:
+        raise InputError("draws no stroke: everything is one point")
+    frame = fit_frame(box, size, margin=margin)
+    check_memory(frame.height * frame.width, available_memory())
+    return frame
+
+
+def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
+    """The frame round the white part of a mask file, and the mask on it.
+
+    Raises InputError about the mask's file.
+    """
+    try:
+        white = read_white(_bytes_of(path))
+        return _mask_on_grid(white, page, size)
+    except InputError as error:
+        raise error if error.file is not None else InputError(str(error), file=path) from error
+
+
+def _mask_on_grid(
+    white: Bools, page: tuple[float, float, float, float] | None, size: int
+) -> tuple[Frame, Bools]:
+    if page is None:
+        raise InputError("cannot be placed: the sketch has neither a viewBox nor a width and height; add one")
+    x, y, width, height = page
+    wanted = (round(width), round(height))
+    if white.shape[::-1] != wanted:
+        raise InputError(
+            f"the mask has {white.shape[1]} x {white.shape[0]} pixels, "
+            f"but the sketch {wanted[0]} x {wanted[1]}; make them equal"
+        )
+    if not white.any():
+        raise InputError("the mask is black all over; paint white what shall be solved")
+    across, down = width / wanted[0], height / wanted[1]
+    high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
+    left, right = x + across * wide[0], x + across * (wide[-1] + 1)
+    top, bottom = y + down * high[0], y + down * (high[-1] + 1)
+    frame = _framed((left, top, right, bottom), size, margin=False)
+    rows, columns = frame.edges
+    share = block_means(white.astype(np.float32), (rows - y) / down, (columns - x) / across)
+    return frame, share >= 0.5 - 1e-6
+
+
+def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
+    """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
+    cut = others.amount >= CUT
+    if given is not None:
+        return given & ~cut
+    walls = (lines.amount >= LEAST_WEIGHT) | cut
+    if not walls.any():
+        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
+    solve = parts_with(
+        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
+    )
+    if not solve.any():
+        raise InputError(
+            "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
+        )
+    return solve

@@ -1,0 +1,92 @@
+"""The built-in sketches and surfaces, ready to play with: drawn for crossfield, or exact by computation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Final, Literal
+
+from ..errors import InputError
+from ..instance.instance import Gauge, Instance
+from .read import DEFAULT_SIZE, check_size, instance_of
+from .surfaces import analytic
+
+Kind = Literal["sketch", "analytic"]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A built-in sample: its name, whether it is a drawing (`sketch`) or a computed surface (`analytic`),
+    one line about it.
+    """
+
+    name: str
+    kind: Kind
+    description: str
+
+
+SAMPLES: Final[dict[str, Sample]] = {
+    sample.name: sample
+    for sample in (
+        Sample("cylinder_bend", "sketch", "a pipe with a bend; red curvature lines, black silhouette"),
+        Sample("mouse", "sketch", "a computer mouse with cross-section lines, all in one colour"),
+        Sample(
+            "bottle", "sketch", "a bottle, a surface of revolution; red curvature lines, black silhouette"
+        ),
+        Sample("saddle", "sketch", "a saddle bounded and crossed by its curvature lines, all in one colour"),
+        Sample(
+            "skew",
+            "sketch",
+            "a tilted flat sheet; two straight families that cross at 65 degrees, constant answer",
+        ),
+        Sample(
+            "singular",
+            "sketch",
+            "a rounded cube seen on its corner; red lines turn round a singularity of index +1/4",
+        ),
+        Sample("ring", "sketch", "a torus with its hole; red curvature lines, black silhouette"),
+        Sample(
+            "tilted_cylinder",
+            "analytic",
+            "half a cylinder, tilted; exact answer, strokes on a third of the pixels",
+        ),
+        Sample(
+            "torus_patch", "analytic", "a quarter of a torus; exact answer, strokes on a fifth of the pixels"
+        ),
+        Sample("wave_sheet", "analytic", "a wavy sheet; exact answer, strokes on a fifth of the pixels"),
+    )
+}
+
+
+def samples() -> list[Sample]:
+    """Name, kind and description of every built-in sample, in the order of the table."""
+    return list(SAMPLES.values())
+
+
+def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Instance:
+    """The instance of a built-in sample on a grid whose longer side has `size` pixels.
+
+    name: of one in `samples()`; size: 1..4096; gauge: as in Instance. For the exact answer of an analytic one
+    see `analytic`. Raises InputError for an unknown name or size.
+    """
+    check_size(size)
+    if _known(name).kind == "analytic":
+        return analytic(name, size, gauge).instance
+    return instance_of(sample_svg(name).encode(), size=size, name=name, source=f"{name}.svg", gauge=gauge)
+
+
+def sample_svg(name: str) -> str:
+    """The SVG text of a built-in sketch.
+
+    Raises InputError for an unknown name or one that is not a drawing.
+    """
+    if _known(name).kind == "analytic":
+        drawings = ", ".join(sample.name for sample in samples() if sample.kind == "sketch")
+        raise InputError(f"sample {name!r} is computed, not drawn; choose one of {drawings}")
+    return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
+
+
+def _known(name: str) -> Sample:
+    if name not in SAMPLES:
+        raise InputError(f"there is no sample {name!r}; choose one of {', '.join(SAMPLES)}")
+    return SAMPLES[name]

@@ -1,0 +1,88 @@
+"""Reading .scap, the text format of StrokeStrip and StripMaker for over-sketched pen strokes.
+
+Line 1 `#width height`, then optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally
+`@thickness`, one sample `x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards.
+The declared size need not bound the samples. Strokes of one cluster are meant as one curve; here each counts
+on its own.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import LEAST_LENGTH, MAX_LINES
+from ..instance.grid import Floats
+from .curves import Curves, lines_as_cubics
+
+_GREATEST: Final = 1e9
+
+
+def read_scap(data: bytes) -> Curves:
+    """The strokes of a .scap file. Raises InputError with the number of the line that breaks the layout."""
+    if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
+        raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
+    text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
+    lines = re.split(r"\r\n?|\n", text)
+    canvas = _canvas(lines[0] if lines else "")
+    strokes: list[list[tuple[float, float]]] = []
+    samples: list[tuple[float, float]] = []
+    opened = 0
+    for number, line in enumerate(map(str.strip, lines[1:]), start=2):
+        if line == "{":
+            if opened:
+                raise InputError(
+                    f"line {number}: a stroke starts inside the stroke of line {opened}; "
+                    "close that one with }"
+                )
+            samples, opened = [], number
+        elif line == "}":
+            if not opened:
+                raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
+            strokes.append(samples)
+            opened = 0
+        elif line and line[0] not in "#@":
+            if not opened:
+                raise InputError(
+                    f"line {number}: a sample stands outside of any stroke; put it between {{ and }}"
+                )
+            samples.append(_sample(line, number))
+    if opened:
+        raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
+    return _curves(strokes, canvas)
+
+
+def _curves(strokes: list[list[tuple[float, float]]], canvas: tuple[float, float, float, float]) -> Curves:
+    paths: list[Floats] = [np.array(stroke) for stroke in strokes if len(stroke) > 1]
+    if not paths:
+        raise InputError("holds no stroke of two or more samples")
+    points = np.concatenate([lines_as_cubics(path[:-1], path[1:]) for path in paths])
+    return Curves(points, np.zeros(len(points), dtype=bool), canvas)
+
+
+def _canvas(line: str) -> tuple[float, float, float, float]:
+    fields = line.strip().removeprefix("#").split(maxsplit=3)
+    try:
+        width, height = (float(field) for field in fields)
+    except ValueError as error:
+        raise InputError(f"line 1: expected '#width height', found {line.strip()[:30]!r}") from error
+    if not (min(width, height) >= LEAST_LENGTH and max(width, height) <= _GREATEST):
+        raise InputError(
+            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to "
+            f"{_GREATEST:g}"
+        )
+    return 0.0, 0.0, width, height
+
+
+def _sample(line: str, number: int) -> tuple[float, float]:
+    fields = line.split(maxsplit=2)
+    try:
+        x, y = (float(field) for field in fields[:2])
+    except ValueError as error:
+        raise InputError(f"line {number}: expected 'x y pressure', found {line[:30]!r}") from error
+    if not (abs(x) <= _GREATEST and abs(y) <= _GREATEST):
+        raise InputError(f"line {number}: a coordinate is not a finite number below {_GREATEST:g}")
+    return x, y

@@ -1,0 +1,191 @@
+"""Style sheets of SVG drawings: which properties they give to an element.
+
+tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and what
+these make together. Selectors that look at other elements are left out, because matching them takes time that
+grows without bound in the depth of a drawing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+from ..errors import InputError
+from ..input_limits import MAX_RULE_CHECKS, MAX_STYLE
+
+KNOWN: Final = frozenset(
+    {
+        "stroke",
+        "fill",
+        "visibility",
+        "color",
+        "stroke-width",
+        "stroke-opacity",
+        "fill-opacity",
+        "display",
+        "opacity",
+        "transform",
+    }
+)
+"""The properties that decide which strokes there are."""
+
+
+class _Selector(NamedTuple):
+    """A simple selector: tag (or empty), id (or empty), classes."""
+
+    tag: str
+    id: str
+    classes: frozenset[str]
+
+    @property
+    def rank(self) -> tuple[bool, int, bool]:
+        return bool(self.id), len(self.classes), bool(self.tag)
+
+    @property
+    def key(self) -> str:
+        """Where it is looked up: every element that it fits has this key."""
+        if self.id:
+            return f"#{self.id}"
+        return f".{min(self.classes)}" if self.classes else self.tag
+
+
+@dataclass(eq=False)
+class StyleSheet:
+    """The rules of a drawing: for each simple selector its properties, with the place where they stand."""
+
+    rules: dict[str, dict[_Selector, dict[str, tuple[int, str]]]] = field(default_factory=dict)
+    checks: int = 0
+    _known: dict[tuple[str, str, str], Mapping[str, str]] = field(default_factory=dict)
+
+    def properties(self, tag: str, identifier: str, classes: str) -> Mapping[str, str]:
+        """The properties of an element: the most specific rule decides, and of equal ones the last.
+
+        Raises InputError when rules and elements are so many that looking takes more than MAX_RULE_CHECKS
+        comparisons.
+        """
+        asked = (tag, identifier if f"#{identifier}" in self.rules else "", classes)
+        if asked not in self._known:
+            self._known[asked] = self._found(*asked)
+        return self._known[asked]
+
+    def _found(self, tag: str, identifier: str, classes: str) -> dict[str, str]:
+        names = frozenset(classes.split())
+        found: dict[str, tuple[tuple[Any, ...], str]] = {}
+        for key in ("", tag, f"#{identifier}", *(f".{name}" for name in sorted(names))):
+            rules = self.rules.get(key, {})
+            self.count(1 + len(rules))
+            for selector, properties in rules.items():
+                if selector.tag in ("", tag) and selector.classes <= names:
+                    for name, (place, value) in properties.items():
+                        candidate = ((selector.rank, place), value)
+                        found[name] = max(found.get(name, candidate), candidate)
+        return {name: value for name, (_, value) in found.items()}
+
+    def count(self, more: int) -> None:
+        """Note comparisons. Raises InputError beyond MAX_RULE_CHECKS."""
+        self.checks += more
+        if self.checks > MAX_RULE_CHECKS:
+            raise InputError(
+                f"its style sheets take more than {MAX_RULE_CHECKS} comparisons of rules with elements; "
+                "export it without style sheets"
+            )
+
+    def add(self, selector: _Selector, properties: Mapping[str, str], place: int) -> None:
+        """Add a rule; place: its number in the order of the rules."""
+        held = self.rules.setdefault(selector.key, {}).setdefault(selector, {})
+        held.update((name, (place, value)) for name, value in properties.items())
+
+
+def style_sheet(texts: Iterable[str]) -> StyleSheet:
+    """The style sheet of all these texts, in order. Raises InputError beyond MAX_STYLE characters."""
+    import tinycss2
+
+    sheet, length = StyleSheet(), 0
+    for text in texts:
+        length += len(text)
+        if length > MAX_STYLE:
+            raise InputError(
+                f"its style sheets have more than {MAX_STYLE} characters; export it without them"
+            )
+        try:
+            rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
+        except ValueError:  # a whole number of thousands of digits
+            continue
+        for rule in rules:
+            if rule.type == "qualified-rule":
+                properties = _declared(rule.content)
+                for selector in _selectors(rule.prelude) if properties else ():
+                    sheet.count(1)
+                    sheet.add(selector, properties, sheet.checks)
+    return sheet
+
+
+@lru_cache(maxsize=1024)
+def style_properties(text: str) -> Mapping[str, str]:
+    """The properties that a `style` attribute gives."""
+    try:
+        return _declared(text)
+    except ValueError:  # a whole number of thousands of digits
+        return {}
+
+
+def _declared(content: Any) -> dict[str, str]:
+    """The known properties in a text or in the tokens of a rule; the last one counts."""
+    import tinycss2
+
+    found = tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True)
+    return {
+        each.lower_name: _text(each.value)
+        for each in found
+        if each.type == "declaration" and each.lower_name in KNOWN
+    }
+
+
+def _text(tokens: list[Any]) -> str:
+    """The value as text; empty when it is nested beyond all sense."""
+    import tinycss2
+
+    try:
+        return str(tinycss2.serialize(tokens)).strip()
+    except RecursionError:
+        return ""
+
+
+def _selectors(prelude: list[Any]) -> Iterator[_Selector]:
+    """The simple selectors of a rule."""
+    part: list[Any] = []
+    for each in (*prelude, None):
+        if each is None or each == ",":
+            found = _selector(part)
+            part = []
+            if found is not None:
+                yield found
+        elif each.type != "comment":
+            part.append(each)
+
+
+def _selector(part: list[Any]) -> _Selector | None:
+    """The selector that tokens make, None when it is not a simple one."""
+    tag, ids, classes = "", set[str](), set[str]()
+    left = deque(part)
+    while left and left[0].type == "whitespace":
+        left.popleft()
+    while left and left[-1].type == "whitespace":
+        left.pop()
+    if not left:
+        return None
+    if left[0].type == "ident" or left[0] == "*":
+        first = left.popleft()
+        tag = first.value.replace("*", "")
+    while left:
+        each = left.popleft()
+        if each.type == "hash":
+            ids.add(each.value)
+        elif each == "." and left and left[0].type == "ident":
+            classes.add(left.popleft().value)
+        else:
+            return None
+    return _Selector(tag, min(ids, default=""), frozenset(classes)) if len(ids) <= 1 else None

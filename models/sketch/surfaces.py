@@ -1,0 +1,280 @@
+"""Instances with a known answer: curved surfaces under orthographic projection,
+and their exact curvature lines.
+
+Each surface is parametrised by its lines of curvature: position(s, t), turned in space and looked at along
+-z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
+right, y up, z towards the viewer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..instance.angles import wrap
+from ..instance.elementary import arctangent, cosine, length, sine, turned
+from ..instance.grid import Bools, Floats
+from ..instance.instance import Gauge, Instance
+from .cover import Cover, Frame, cover_by_segments, fit_frame
+from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
+
+_NEWTON: Final = 12
+_SEEDS: Final = 120  # lattice of starting points a side
+_SAMPLES: Final = 600  # points along a drawn line
+_BISECTIONS: Final = 12
+
+Chart = Callable[[Floats, Floats], Floats]
+"""From s, t of any common shape to points or vectors (..., 3)."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A patch of a surface, parametrised by its curvature lines and turned towards the viewer.
+
+    position, along_s, along_t: the point and its derivatives by s and t, before turning, shape (..., 3).
+    s_range, t_range: ends of the parameters. turn: rotation matrix (3, 3) applied to all of them.
+    share: part of the pixels that shall carry strokes.
+    """
+
+    position: Chart
+    along_s: Chart
+    along_t: Chart
+    s_range: tuple[float, float]
+    t_range: tuple[float, float]
+    turn: Floats
+    share: float
+
+    def point(self, s: Floats, t: Floats) -> Floats:
+        """Points of the turned surface, shape (..., 3)."""
+        return turned(self.position(s, t), self.turn)
+
+    def tangents(self, s: Floats, t: Floats) -> tuple[Floats, Floats]:
+        """Derivatives of the turned surface by s and by t, shape (..., 3) each."""
+        return turned(self.along_s(s, t), self.turn), turned(self.along_t(s, t), self.turn)
+
+
+@dataclass(frozen=True, eq=False)
+class AnalyticInstance:
+    """An instance with the exact line angles of both projected curvature lines.
+
+    u_angle, v_angle: float (n,) in [0, pi) radians, counter-clockwise with y up, at the centre of each pixel
+    of the grid.
+    """
+
+    instance: Instance
+    u_angle: Floats
+    v_angle: Floats
+
+
+def _turn(tilt: float, spin: float) -> Floats:
+    """The rotation that tips the top away from the viewer by `tilt` about x and then spins the
+    picture by `spin` about z (degrees).
+    """
+    a, b = np.radians([-tilt, spin])
+    about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
+    about_z = np.array([[cosine(b), -sine(b), 0], [sine(b), cosine(b), 0], [0, 0, 1]])
+    return turned(about_x.T, about_z).T
+
+
+def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+
+_TUBE: Final = 0.45  # radius of the torus's tube; its centre line has radius 1
+_WAVE: Final = 0.6  # height of the wave
+
+SURFACES: Final[dict[str, Surface]] = {
+    "tilted_cylinder": Surface(
+        position=lambda s, t: _vectors(cosine(s), t, sine(s)),
+        along_s=lambda s, t: _vectors(-sine(s), 0 * t, cosine(s)),
+        along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
+        s_range=(0.45, np.pi - 0.45),
+        t_range=(-1.3, 1.3),
+        turn=_turn(35, 20),
+        share=1 / 3,
+    ),
+    "torus_patch": Surface(
+        position=lambda s, t: _vectors(
+            (1 + _TUBE * cosine(t)) * cosine(s), (1 + _TUBE * cosine(t)) * sine(s), _TUBE * sine(t)
+        ),
+        along_s=lambda s, t: _vectors(
+            -(1 + _TUBE * cosine(t)) * sine(s), (1 + _TUBE * cosine(t)) * cosine(s), 0 * s
+        ),
+        along_t=lambda s, t: _vectors(
+            -_TUBE * sine(t) * cosine(s), -_TUBE * sine(t) * sine(s), _TUBE * cosine(t)
+        ),
+        s_range=(0.5, np.pi - 0.4),
+        t_range=(0.7, np.pi - 0.3),
+        turn=_turn(30, -10),
+        share=0.2,
+    ),
+    "wave_sheet": Surface(
+        position=lambda s, t: _vectors(s, t, _WAVE * sine(s)),
+        along_s=lambda s, t: _vectors(1 + 0 * s, 0 * t, _WAVE * cosine(s)),
+        along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
+        s_range=(-1.5 * np.pi, 1.5 * np.pi),
+        t_range=(-4.0, 4.0),
+        turn=_turn(50, 25),
+        share=0.2,
+    ),
+}
+"""The surfaces by name: two developable ones and one that is not."""
+
+
+def analytic(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> AnalyticInstance:
+    """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
+
+    A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are
+    evenly parametrised curvature lines of both families, so many that the share of stroke pixels comes as
+    close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
+    drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance.
+    Raises InputError for an unknown name or size.
+    """
+    if name not in SURFACES:
+        raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
+    check_size(size)
+    surface = SURFACES[name]
+    frame = _frame(surface, size)
+    s, t, mask = _parameters(surface, frame)
+    u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in surface.tangents(s, t))
+    weight, on_u = _strokes(surface, frame, mask)
+    stroke = weight >= LEAST_WEIGHT
+    instance = Instance(
+        name=name,
+        mask=mask,
+        stroke_pixels=np.argwhere(stroke).astype(np.int32),
+        theta=np.where(on_u, u_angle, v_angle)[stroke[mask]],
+        w=np.minimum(weight[stroke], 1.0),
+        gauge=gauge,
+        source=f"curvature lines of {name}, orthographic",
+        pixel_size=frame.pixel,
+        origin=(frame.x, frame.y),
+    )
+    return AnalyticInstance(instance, u_angle, v_angle)
+
+
+def _frame(surface: Surface, size: int) -> Frame:
+    s, t = np.meshgrid(np.linspace(*surface.s_range, 400), np.linspace(*surface.t_range, 400))
+    x, y, _ = np.moveaxis(surface.point(s, t), -1, 0)
+    return fit_frame((float(x.min()), float(-y.max()), float(x.max()), float(-y.min())), size, margin=False)
+
+
+def _parameters(surface: Surface, frame: Frame) -> tuple[Floats, Floats, Bools]:
+    """Parameters s, t (n,) of the pixels whose centre is on the patch, and the mask of these pixels."""
+    row, column = np.indices(frame.shape).reshape(2, -1)
+    wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
+    s, t = _invert(surface, wanted)
+    miss = length(*(surface.point(s, t)[:, :2] - wanted).T)
+    on_patch = (miss < 1e-9) & _within(s, surface.s_range) & _within(t, surface.t_range)
+    if not on_patch.any():
+        raise InputError("no pixel centre lies on the surface; choose a larger size")
+    mask = _largest_part(on_patch.reshape(frame.shape))
+    return s[mask.ravel()], t[mask.ravel()], mask
+
+
+def _largest_part(mask: Bools) -> Bools:
+    """The 4-connected part with most pixels: tips of a patch may touch the rest at corners only."""
+    from scipy import ndimage
+
+    label, _ = ndimage.label(mask)
+    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel())[1:])
+    return part
+
+
+def _within(value: Floats, ends: tuple[float, float]) -> Bools:
+    return (value >= ends[0] - 1e-9) & (value <= ends[1] + 1e-9)
+
+
+def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
+    """Parameters whose projection is `wanted` (n, 2),
+    by Newton's method from the nearest point of a lattice.
+    """
+    from scipy.spatial import cKDTree
+
+    lattice = np.meshgrid(np.linspace(*surface.s_range, _SEEDS), np.linspace(*surface.t_range, _SEEDS))
+    s0, t0 = (axis.ravel() for axis in lattice)
+    nearest = cKDTree(surface.point(s0, t0)[:, :2]).query(wanted)[1]
+    s, t = s0[nearest], t0[nearest]
+    for _ in range(_NEWTON):
+        error = wanted - surface.point(s, t)[:, :2]
+        (ax, ay), (bx, by) = (d[:, :2].T for d in surface.tangents(s, t))
+        area = ax * by - ay * bx
+        # Away from the patch the projection may fold; such pixels only have to stay finite.
+        area = np.where(np.abs(area) < 1e-3, np.copysign(1e-3, area), area)
+        s = np.clip(
+            s + (by * error[:, 0] - bx * error[:, 1]) / area,
+            surface.s_range[0] - 0.5,
+            surface.s_range[1] + 0.5,
+        )
+        t = np.clip(
+            t + (ax * error[:, 1] - ay * error[:, 0]) / area,
+            surface.t_range[0] - 0.5,
+            surface.t_range[1] + 0.5,
+        )
+    return s, t
+
+
+def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
+    """Weight [height, width] of the drawn lines, 0 outside the mask,
+    and which pixels (n,) carry a line of family u.
+
+    The spacing of the lines is bisected by ratio; the best share seen wins.
+    """
+    near, far = 1.0, float(max(frame.shape))
+    best: tuple[float, Floats, Bools] | None = None
+    for _ in range(_BISECTIONS):
+        middle = float(np.sqrt(near * far))
+        weight, on_u = _drawn(surface, frame, mask, spacing=middle)
+        share = float((weight >= LEAST_WEIGHT).sum() / mask.sum())
+        near, far = (middle, far) if share > surface.share else (near, middle)
+        if best is None or abs(share - surface.share) < best[0]:
+            best = abs(share - surface.share), weight, on_u
+    assert best is not None
+    return best[1], best[2]
+
+
+def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
+    """Weight and family, as in _strokes, of lines about `spacing` pixels apart,
+    at least one of each family.
+    """
+    u_lines, v_lines = _lines(surface, frame, spacing)
+    of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
+    both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
+    return np.where(mask, both.weight, 0.0), _dominates(of_u, of_v)[mask]
+
+
+def _dominates(first: Cover, second: Cover) -> Bools:
+    dominates: Bools = first.amount >= second.amount
+    return dominates
+
+
+def _lines(surface: Surface, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
+    """Segments (m, 2, 2), y down, of lines t = const (family u) and s = const (family v)."""
+    middle_s, middle_t = np.mean(surface.s_range), np.mean(surface.t_range)
+    along_s, along_t = np.linspace(*surface.s_range, _SAMPLES), np.linspace(*surface.t_range, _SAMPLES)
+    wide = _length(surface, along_s, np.full(_SAMPLES, middle_t)) / frame.pixel
+    high = _length(surface, np.full(_SAMPLES, middle_s), along_t) / frame.pixel
+    at_t, at_s = _spread(surface.t_range, high / spacing), _spread(surface.s_range, wide / spacing)
+    u = _polylines(surface, *np.broadcast_arrays(along_s[None], at_t[:, None]))
+    v = _polylines(surface, *np.broadcast_arrays(at_s[:, None], along_t[None]))
+    return u, v
+
+
+def _spread(ends: tuple[float, float], count: float) -> Floats:
+    """Middles of about `count` equal parts of an interval."""
+    number = max(1, round(count))
+    middles: Floats = ends[0] + (np.arange(number) + 0.5) * (ends[1] - ends[0]) / number
+    return middles
+
+
+def _length(surface: Surface, s: Floats, t: Floats) -> float:
+    return float(length(*np.diff(surface.point(s, t)[:, :2], axis=0).T).sum())
+
+
+def _polylines(surface: Surface, s: Floats, t: Floats) -> Floats:
+    points = surface.point(s, t)[..., :2] * (1, -1)
+    return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 2)

@@ -1,0 +1,359 @@
+"""Reading SVG drawings: the outlines of everything that is painted, as cubic Beziers.
+
+svgelements knows the grammars of path data, transforms, lengths and colours, tinycss2 that of style sheets.
+The document itself is walked here: what it leaves to a browser (style sheets at any place, `use` of symbols,
+invisible parts) decides which strokes there are. Each element is parsed once, however often it is used, and
+the work is bounded by the limits of `input_limits`. The bytes first pass defusedxml, which refuses entities;
+nothing outside the file is ever loaded: pictures and `use` of other files are left out. Clip paths, masks,
+dashes and text are not looked at.
+
+What counts as a stroke: the path of every shape with a visible `stroke`; and the outline of a shape that is
+only filled, since drawing programs export strokes as filled outlines. White (paper) counts as invisible.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Final
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import (
+    LEAST_LENGTH,
+    MAX_CURVES,
+    MAX_DATA,
+    MAX_ELEMENTS,
+    MAX_LENGTH,
+    MAX_TAGS,
+    MAX_TRANSFORM,
+    MAX_USE_DEPTH,
+    MAX_USES,
+)
+from ..instance.elementary import turned
+from ..instance.grid import Floats
+from .colour import is_paper, is_red
+from .curves import Curves
+from .path_data import SHAPES, outline, pixels, too_many_curves
+from .style_sheet import KNOWN, StyleSheet, style_properties, style_sheet
+
+_GREATEST: Final = 1e9
+_SVG: Final = "http://www.w3.org/2000/svg"
+_HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
+_CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
+_INHERITED: Final = (
+    "stroke",
+    "fill",
+    "visibility",
+    "color",
+    "stroke-width",
+    "stroke-opacity",
+    "fill-opacity",
+)
+_START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An element to visit: its inherited style, its transform, and how deep in `use` it is."""
+
+    element: Element
+    style: Mapping[str, str]
+    matrix: Any
+    uses: tuple[str, ...]
+
+
+def read_svg(data: bytes) -> Curves:
+    """The strokes of an SVG drawing in the units of its viewBox.
+
+    Raises InputError for malformed or unsafe XML, damaged path data, too many elements, and when nothing is
+    drawn.
+    """
+    root = _parsed(data)
+    if _tag(root) != "svg":
+        raise InputError(
+            f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
+        )
+    canvas = _canvas(root)
+    walk = _Walk(style_sheet(_style_texts(root)), canvas)
+    shapes = list(walk.shapes(root))
+    if not sum(len(points) for _, points in shapes):
+        raise InputError(
+            "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
+        )
+    red = is_red(np.array([_paint(style) for style, _ in shapes]))
+    return Curves(
+        np.concatenate([points for _, points in shapes]),
+        np.repeat(red, [len(points) for _, points in shapes]),
+        canvas,
+    )
+
+
+def _parsed(data: bytes) -> Element:
+    from defusedxml.common import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    if data.count(b"<") + data.count(b"=") > MAX_TAGS:
+        raise InputError(f"has more than {MAX_TAGS} tags and attributes; simplify the drawing")
+    try:
+        root: Element = fromstring(data, forbid_dtd=False, forbid_entities=True, forbid_external=True)
+    except DefusedXmlException as error:
+        raise InputError(
+            "declares XML entities, which are not read for safety; save it as plain SVG"
+        ) from error
+    except (ParseError, ValueError, LookupError, RecursionError) as error:
+        raise InputError(f"is not well-formed XML: {error}; save the drawing again") from error
+    return root
+
+
+def _style_texts(root: Element) -> Iterator[str]:
+    return ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
+
+
+@dataclass(eq=False)
+class _Walk:
+    """A walk through a drawing. What depends on an element alone is found once and kept for all its uses."""
+
+    sheet: StyleSheet
+    canvas: tuple[float, float, float, float] | None
+    own: dict[Element, tuple[Mapping[str, str], Any]] = field(default_factory=dict)
+    outlines: dict[Element, Floats] = field(default_factory=dict)
+    visited: int = 0
+    used: int = 0
+    characters: int = 0
+    curves: int = 0
+
+    def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
+        """The style of every visible shape and its control points in the units of the root,
+        in drawing order.
+        """
+        from svgelements import Matrix
+
+        named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
+        stack = [_Place(root, _START, Matrix(), ())]
+        while stack:
+            place = self._styled(stack.pop())
+            tag, element = _tag(place.element), place.element
+            self._count()
+            if _hidden(place.style):
+                continue
+            if tag in SHAPES and _painted(place.style):
+                yield place.style, self._placed(place)
+            elif tag in _CONTAINERS:
+                inner = _view(place, element) if element is not root else place.matrix
+                stack += [_Place(child, place.style, inner, place.uses) for child in reversed(element)]
+            elif tag == "use":
+                stack += self._used(place, named)
+
+    def _count(self) -> None:
+        self.visited += 1
+        if self.visited > MAX_ELEMENTS:
+            raise InputError(f"draws more than {MAX_ELEMENTS} elements; simplify the drawing")
+
+    def _styled(self, place: _Place) -> _Place:
+        """The place with the element's own style and transform applied."""
+        if place.element not in self.own:
+            self._read(place.element)
+            style = _own_style(place.element, self.sheet)
+            self.own[place.element] = style, _transform(place.element, style)
+        own, transform = self.own[place.element]
+        inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
+        style = inherited | {key: value for key, value in own.items() if value != "inherit"}
+        matrix = place.matrix if transform is None else transform * place.matrix
+        return _Place(place.element, style, matrix, place.uses)
+
+    def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
+        """What a `use` element stands for; nothing when it points into another file or at itself."""
+        from svgelements import Matrix
+
+        self.used += 1
+        if self.used > MAX_USES:
+            raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
+        element = place.element
+        link = next((element.get(key, "") for key in _HREFS if key in element.attrib), "")
+        target = named.get(link[1:]) if link.startswith("#") else None
+        if target is None or link in place.uses:
+            return []
+        if len(place.uses) == MAX_USE_DEPTH:
+            raise InputError(
+                f"has <use> elements nested more than {MAX_USE_DEPTH} deep; "
+                "expand them in the drawing program"
+            )
+        moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
+        uses = (*place.uses, link)
+        if _tag(target) != "symbol":
+            return [_Place(target, place.style, moved, uses)]
+        inner = _view(_Place(element, place.style, moved, uses), target)
+        return [_Place(child, place.style, inner, uses) for child in reversed(target)]
+
+    def _placed(self, place: _Place) -> Floats:
+        """Control points (k, 4, 2) of a shape in the units of the root."""
+        if place.element not in self.outlines:
+            self.outlines[place.element] = self._outline(place.element)
+        points, m = self.outlines[place.element], place.matrix
+        self.curves += len(points)
+        if self.curves > MAX_CURVES:
+            raise too_many_curves()
+        with np.errstate(over="ignore", invalid="ignore"):
+            turn, shift = np.array([[m.a, m.c], [m.b, m.d]], dtype=float), np.array([m.e, m.f], dtype=float)
+            placed: Floats = turned(points, turn) + shift
+        if not (np.abs(placed) <= _GREATEST).all():
+            raise InputError(
+                f"{_named(place.element)}: a coordinate is not a finite number below {_GREATEST:g}"
+            )
+        drawn: Floats = placed[(placed != placed[:, :1]).any(axis=(1, 2))]
+        return drawn
+
+    def _read(self, element: Element) -> None:
+        self.characters += sum(len(element.get(key, "")) for key in ("d", "points", "style", "transform"))
+        if self.characters > MAX_DATA:
+            raise InputError(
+                f"has more than {MAX_DATA} characters of paths, styles and transforms; simplify the drawing"
+            )
+
+    def _outline(self, element: Element) -> Floats:
+        _, _, width, height = self.canvas or (0.0, 0.0, 100.0, 100.0)
+        try:
+            return outline(_tag(element), element.attrib, (width, height))
+        except InputError as error:
+            raise InputError(f"{_named(element)}: {error}") from error
+
+
+def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
+    """What an element says of itself: by attributes, style sheets and its `style`, the last ones stronger."""
+    attributes = element.attrib
+    own = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
+    given = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
+    return {**own, **given, **style_properties(attributes.get("style", ""))}
+
+
+def _transform(element: Element, style: Mapping[str, str]) -> Any:
+    """The matrix of an element's own transform, None without one. Raises InputError."""
+    from svgelements import Matrix
+
+    text = style.get("transform", "")
+    if not text:
+        return None
+    if len(text) > MAX_TRANSFORM:
+        raise InputError(
+            f"{_named(element)}: its transform has more than {MAX_TRANSFORM} characters; "
+            "export the drawing again"
+        )
+    try:
+        return Matrix(text)
+    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
+        raise InputError(f"{_named(element)}: its transform {text[:40]!r} cannot be read") from error
+
+
+def _view(place: _Place, element: Element) -> Any:
+    """The transform inside an inner svg or a symbol: its viewBox fitted into its width and height,
+    centred.
+    """
+    from svgelements import Matrix
+
+    if _tag(element) not in ("svg", "symbol"):
+        return place.matrix
+    corner = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
+    box = _view_box(element)
+    if box is None:
+        return corner
+    x, y, width, height = box
+    wide, high = _length(place.element, "width", width), _length(place.element, "height", height)
+    scale = min(wide / width, high / height)
+    centre = Matrix.translate((wide - scale * width) / 2, (high - scale * height) / 2)
+    return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
+
+
+def _hidden(style: Mapping[str, str]) -> bool:
+    return style.get("display") == "none" or _number(style.get("opacity")) == 0
+
+
+def _painted(style: Mapping[str, str]) -> bool:
+    """True when a shape shows: a stroke or a fill that is neither none, transparent, nor white like paper."""
+    return style["visibility"] not in ("hidden", "collapse") and not bool(
+        is_paper(np.array([_paint(style)]))[0]
+    )
+
+
+def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
+    """Red, green, blue in [0, 1] of the stroke, or of the fill when there is no stroke;
+    white when there is neither.
+    """
+    for kind in ("stroke", "fill"):
+        colour = style[kind]
+        colour = style["color"] if colour.lower() == "currentcolor" else colour
+        seen = _number(style.get(f"{kind}-opacity")) != 0 and not (
+            kind == "stroke" and _number(style.get("stroke-width")) == 0
+        )
+        if seen and colour.lower() not in ("none", "transparent"):
+            return _rgb(colour)
+    return 1.0, 1.0, 1.0
+
+
+@lru_cache(maxsize=1024)
+def _rgb(colour: str) -> tuple[float, float, float]:
+    """The colour on white paper; black for gradients and for what cannot be read."""
+    from svgelements import Color
+
+    if len(colour) > MAX_LENGTH:
+        return 0.0, 0.0, 0.0
+    try:
+        parsed = Color(colour)
+        alpha = parsed.alpha / 255
+        red, green, blue = (
+            1 - alpha * (1 - channel / 255) for channel in (parsed.red, parsed.green, parsed.blue)
+        )
+    except (ValueError, TypeError):
+        return 0.0, 0.0, 0.0
+    return red, green, blue
+
+
+def _canvas(root: Element) -> tuple[float, float, float, float] | None:
+    """The viewBox, or else width and height from (0, 0), or None."""
+    box = _view_box(root)
+    if box is not None:
+        return box
+    width, height = _length(root, "width", 0.0), _length(root, "height", 0.0)
+    return (0.0, 0.0, width, height) if min(width, height) >= LEAST_LENGTH else None
+
+
+def _view_box(element: Element) -> tuple[float, float, float, float] | None:
+    fields = re.split(r"[\s,]+", element.get("viewBox", "").strip())
+    if fields == [""]:
+        return None
+    try:
+        x, y, width, height = (float(field) for field in fields)
+    except ValueError as error:
+        raise InputError(
+            f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
+        ) from error
+    if not (np.abs([x, y, width, height]) <= _GREATEST).all() or min(width, height) < LEAST_LENGTH:
+        raise InputError(f"{_named(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
+    return x, y, width, height
+
+
+def _length(element: Element, key: str, default: float) -> float:
+    """A length in CSS pixels; `default` when it is missing, a percentage or unreadable."""
+    found = pixels(element.get(key, ""))
+    return default if found is None else found
+
+
+def _number(text: str | None) -> float:
+    """The number that a style value starts with; 1 when there is none."""
+    match = re.match(r"[+-]?(?:\d+\.?\d*|\.\d+)", text or "")
+    return float(match[0]) if match else 1.0
+
+
+def _tag(element: Element) -> str:
+    """The tag of an SVG element without its namespace; empty for elements of other languages."""
+    space, _, tag = element.tag.rpartition("}")
+    return tag if space in ("", "{" + _SVG) else ""
+
+
+def _named(element: Element) -> str:
+    name = element.get("id")
+    return f"<{_tag(element)}" + (f' id="{name[:40]}">' if name else ">")

@@ -1,0 +1,336 @@
+"""Sets of files and their manifests: round trip, determinism, and what is refused."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import make_field, make_instance, make_problem
+from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
+from crossfield.export.formats.registry import DEFAULTS, format_of, write
+from crossfield.models.errors import (
+    FormulationError,
+    InputError,
+    InstanceError,
+    OutputError,
+    UnsupportedByFormatError,
+)
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
+from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.instance.instance import Instance
+from loops import for_each
+
+OPTIONS = [
+    ("milp-mccormick", {"facet": "printed", "stroke_norm": 2, "relax": True}),
+    ("miqcp-bilinear", {"beta_norm": 1}),
+    *((name, {}) for name in FORMULATIONS),
+]
+
+
+@for_each("name, options", OPTIONS)
+@for_each("gauge", ["strokes", "box"])
+def test_round_trip(name, options, gauge, tmp_path):
+    problem = make_problem(name, make_instance(gauge=gauge), **options)
+    manifest = write_problem(problem, tmp_path)
+    assert manifest.path == tmp_path / f"tiny.{name}.manifest.json"
+    again = read_manifest(manifest.path)
+    assert again.document == manifest.document
+    assert (again.formulation, again.folder) == (name, tmp_path)
+    found = again.problem()
+    assert found.sha256 == problem.sha256
+    assert found.instance.sha256 == problem.instance.sha256
+    np.testing.assert_array_equal(found.lower, problem.lower)
+    if name == "qp-fixed":
+        np.testing.assert_array_equal(found.jumps, problem.jumps)
+
+
+def test_contents(tmp_path):
+    problem = make_problem("milp-mccormick", make_instance())
+    document = write_problem(problem, tmp_path, start=make_field(problem.instance)).document
+    grid = problem.instance.grid
+    pairs, strokes = len(grid.first), len(problem.instance.theta)
+    assert document["counts"] == {
+        "columns": problem.columns, "binary": pairs, "integer": pairs, "rows": problem.row_count,
+        "pixels": grid.size, "pairs": pairs, "stroke_pixels": strokes,
+    }  # fmt: skip
+    assert (document["class"], document["convex"], document["jumps"], document["refused"]) == (
+        "MILP",
+        True,
+        None,
+        {},
+    )
+    assert sum(block["count"] for block in document["columns"]) == problem.columns
+    assert [block["first"] for block in document["columns"]] == [
+        block.offset for block in problem.blocks.values()
+    ]
+    assert sum(family["count"] for family in document["rows"]) == problem.row_count
+    names = [entry["name"] for entry in document["files"]]
+    assert names == [f"tiny.milp-mccormick.{suffix}" for suffix in ("nl", "row", "col", "gms", "lp", "mps")]
+    for entry in document["files"]:
+        data = (tmp_path / entry["name"]).read_bytes()
+        assert (entry["bytes"], entry["sha256"]) == (len(data), hashlib.sha256(data).hexdigest())
+    expected = {*names, "tiny.instance.json", "tiny.milp-mccormick.manifest.json"}
+    assert {path.name for path in tmp_path.iterdir()} == expected
+
+
+def test_refused_and_lifted_formats_are_listed(tmp_path):
+    instance = make_instance()
+    parity, quartic = write_all(instance, tmp_path, ["minlp-parity", "minlp-quartic"])
+    assert set(parity.document["refused"]) == {"lp", "mps"}
+    assert all("minlp-quartic" in reason for reason in parity.document["refused"].values())
+    assert {entry["format"] for entry in parity.document["files"]} == {"nl", "gms"}
+    assert not (tmp_path / "tiny.minlp-parity.lp").exists()
+    by_format = {entry["format"]: entry["lifted"] for entry in quartic.document["files"]}
+    assert by_format["nl"] == by_format["gms"] == ""
+    assert by_format["lp"] == by_format["mps"] == "z = p1 beta_i with the hull facets (26)-(29), exact"
+
+
+def test_compressed_files_hold_the_same_bytes(tmp_path):
+    problem = make_problem("miqp-exact", make_instance())
+    write_problem(problem, tmp_path / "plain")
+    manifest = write_problem(problem, tmp_path / "small", compress=True)
+    packed = [entry["name"] for entry in manifest.document["files"] if entry["name"].endswith(".gz")]
+    assert [Path(name).suffixes[-2:] for name in packed] == [[f".{name}", ".gz"] for name in DEFAULTS]
+    for name in packed:
+        plain = (tmp_path / "plain" / name.removesuffix(".gz")).read_bytes()
+        assert gzip.decompress((tmp_path / "small" / name).read_bytes()) == plain
+    assert read_manifest(manifest.path).problem().sha256 == problem.sha256
+
+
+def test_jumps_come_from_the_start_or_the_baseline(tmp_path):
+    instance = make_instance("full")
+    field = make_field(instance)
+    (given,) = write_all(instance, tmp_path, ["qp-fixed"], ["mps"], start=field)
+    np.testing.assert_array_equal(given.problem().jumps, field.p)
+    listed = dict(given.document["jumps"])
+    assert listed == {pair: jump for pair, jump in enumerate(field.p.tolist()) if jump}
+    (baseline,) = write_all(instance, tmp_path, ["qp-fixed"], ["mps"])
+    assert baseline.problem().jumps.shape == field.p.shape
+
+
+def test_options_apply_where_a_formulation_has_them(tmp_path):
+    seen = []
+    manifests = write_all(
+        make_instance(),
+        tmp_path,
+        formats=["nl"],
+        options={"facet": "printed", "relax": True},
+        progress=seen.append,
+    )
+    assert seen == list(FORMULATIONS)
+    options = {manifest.formulation: manifest.document["options"] for manifest in manifests}
+    assert options["milp-mccormick"]["facet"] == "printed"
+    assert options["miqp-exact"] == {"facet": "hull", "stroke_norm": 2, "beta_norm": 2, "relax": True}
+    assert options["qp-fixed"]["relax"] is False
+
+
+def test_the_instance_is_written_once_and_replaced_when_it_is_another(tmp_path):
+    write_all(make_instance(), tmp_path, ["qp-fixed"], ["lp"])
+    path = tmp_path / "tiny.instance.json"
+    before = path.stat().st_mtime_ns, path.stat().st_ino
+    write_all(make_instance(), tmp_path, ["milp-mccormick"], ["lp"])
+    assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
+    write_all(make_instance(seed=8), tmp_path, ["milp-mccormick"], ["lp"])
+    assert read_instance(path).sha256 == make_instance(seed=8).sha256
+    path.write_text("rubbish")
+    write_all(make_instance(), tmp_path, ["milp-mccormick"], ["lp"])
+    assert read_instance(path).sha256 == make_instance().sha256
+
+
+def test_large_instances_are_written_as_arrays(tmp_path):
+    instance = Instance("large", np.ones((257, 256), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1))
+    problem = formulate(instance, "qp-fixed", p=np.zeros(len(instance.grid.first)))
+    manifest = write_problem(problem, tmp_path, ["mps"])
+    assert manifest.document["instance"]["file"] == "large.instance.npz"
+    assert read_manifest(manifest.path).problem().sha256 == problem.sha256
+
+
+# determinism
+
+SCRIPT = """
+import sys
+from crossfield.export.bundle.manifest import write_all
+from crossfield.models.instance.file import read_instance
+instance = read_instance(sys.argv[1])
+write_all(instance, sys.argv[2])
+write_all(instance, sys.argv[2] + "/packed", compress=True, dialects={"nl": "binary", "gms": "scalar"})
+"""
+
+
+def test_the_whole_set_is_the_same_under_another_hash_seed(tmp_path):
+    write_instance(make_instance("full"), tmp_path / "full.json")
+    found = []
+    for seed in ("1", "4711"):
+        folder = tmp_path / seed
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT, str(tmp_path / "full.json"), str(folder)],
+            check=True,
+            env=os.environ | {"PYTHONHASHSEED": seed},
+        )
+        found.append(
+            {
+                path.relative_to(folder): path.read_bytes()
+                for path in sorted(folder.rglob("*"))
+                if path.is_file()
+            }
+        )
+    assert found[0] == found[1]
+    # Per formulation nl, row, col, gms and manifest, and lp and mps but for minlp-parity; one instance.
+    assert len(found[0]) == 2 * (9 * 7 - 2 + 1)
+
+
+# what is refused
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Path:
+    """A manifest of qp-fixed with its instance beside it."""
+    return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, ["nl"]).path
+
+
+def changed(path: Path, *keys: str, value: object) -> Path:
+    document = json.loads(path.read_text())
+    place = document
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_another_instance_beside_it(written):
+    write_instance(make_instance(seed=9), written.parent / "tiny.instance.json")
+    with pytest.raises(InstanceError, match=r"tiny\.instance\.json: is another instance"):
+        read_manifest(written).problem()
+    (written.parent / "tiny.instance.json").unlink()
+    with pytest.raises(InputError, match=r"tiny\.instance\.json: cannot be read"):
+        read_manifest(written).problem()
+
+
+@for_each(
+    "text",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b'"crossfield-manifest"',
+        b"\xff\xfe",
+        b'{"format": "crossfield-instance", "version": 1}',
+        b"[" * 100000,
+    ],
+)
+def test_damaged_manifests(text, written):
+    written.write_bytes(text)
+    with pytest.raises(InstanceError, match=r"tiny\.qp-fixed\.manifest\.json: ") as error:
+        read_manifest(written)
+    assert "\n" not in str(error.value)
+
+
+def test_every_truncation_is_a_named_error(written):
+    whole = written.read_bytes()
+    for end in range(0, len(whole) - 2, 37):
+        written.write_bytes(whole[:end])
+        with pytest.raises(InstanceError, match=r"manifest\.json: "):
+            read_manifest(written)
+
+
+@pytest.mark.parametrize(
+    "keys, value, message",
+    [
+        (["version"], 2, "has version 2, but this program reads version 1"),
+        (["version"], True, "version"),
+        (["unknown"], 1, "unknown"),
+        (["options", "colour"], 1, "colour"),
+        (["instance", "file"], "../tiny.instance.json", "instance.file"),
+        (["instance", "file"], "a/b.json", "instance.file"),
+        (["instance", "file"], "a\\b.json", "instance.file"),
+        (["instance", "file"], "", "instance.file"),
+        (["instance", "file"], ".hidden", "instance.file"),
+        (["instance", "sha256"], "0", "instance.sha256"),
+        (["formulation"], "../x", "formulation"),
+        (["options", "stroke_norm"], 3, "stroke_norm"),
+        (["jumps"], [[0]], "jumps"),
+        (["jumps"], [[-1, 1]], "jumps"),
+        (["jumps"], [[10**30, 1]], "jumps"),
+        (["jumps"], [[0, 1e9]], "jumps"),
+        (["jumps"], "none", "jumps"),
+        (["files"], [{"name": "/etc/passwd", "format": "nl", "sha256": "0" * 64, "bytes": 1}], "files"),
+        (["class"], "SDP", "class"),
+    ],
+)
+def test_documents_that_break_the_schema(keys, value, message, written):
+    with pytest.raises(InstanceError, match=rf"manifest\.json: .*{message}"):
+        read_manifest(changed(written, *keys, value=value))
+
+
+@pytest.mark.parametrize(
+    "key", ["format", "version", "instance", "formulation", "options", "jumps", "sha256", "files"]
+)
+def test_missing_keys(key, written):
+    document = json.loads(written.read_text())
+    del document[key]
+    written.write_text(json.dumps(document))
+    with pytest.raises(InstanceError, match=key):
+        read_manifest(written)
+
+
+@pytest.mark.parametrize(
+    "keys, value, error, message",
+    [
+        (["formulation"], "milp", FormulationError, "no formulation 'milp'"),
+        (["formulation"], "milp-mccormick", FormulationError, "leave p out"),
+        (["options", "relax"], True, FormulationError, "qp-fixed has no option relax"),
+        (["jumps"], None, FormulationError, "takes the jumps of all pairs"),
+        (["jumps"], [[8, 1]], InstanceError, "lists a jump of a pair that the instance does not have"),
+        (["jumps"], [], InstanceError, "does not fit its own instance"),
+        (["jumps"], [[0, 64]], InstanceError, "does not fit its own instance"),
+        (["sha256"], "0" * 64, InstanceError, "does not fit its own instance"),
+    ],
+)
+def test_documents_that_contradict_themselves(keys, value, error, message, written):
+    renamed = written.rename(written.with_name("renamed.json"))
+    manifest = read_manifest(changed(renamed, *keys, value=value))
+    with pytest.raises(error, match=rf"renamed\.json: .*{message}"):
+        manifest.problem()
+
+
+def test_problems_that_no_manifest_records(tmp_path):
+    problem = make_problem("minlp-cubic", make_instance())
+    for other in (lifted(problem), with_integers_fixed(problem, make_field(problem.instance))):
+        with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
+            write_problem(other, tmp_path / "set")
+    assert list(tmp_path.iterdir()) == []
+    write(lifted(problem), tmp_path / "single.lp")
+    fixed = with_integers_fixed(problem, make_field(problem.instance))
+    with pytest.raises(UnsupportedByFormatError, match="write the scalar layout"):
+        write(fixed, tmp_path / "fixed.gms")
+    assert [path.name for path in tmp_path.iterdir()] == ["single.lp"]
+    write(fixed, tmp_path / "fixed.gms", dialect="scalar")
+
+
+def test_unknown_formats_dialects_and_folders(tmp_path):
+    problem = make_problem("qp-fixed", make_instance())
+    with pytest.raises(InputError, match="no format 'ps'; choose one of nl, gms, lp, mps"):
+        write_problem(problem, tmp_path, ["ps"])
+    with pytest.raises(InputError, match=r"model\.ps: no format has the suffix 'ps'"):
+        write(problem, tmp_path / "model.ps")
+    with pytest.raises(InputError, match="nl has no dialect 'indexed'; choose one of text, binary"):
+        write(problem, tmp_path / "model.nl", dialect="indexed")
+    with pytest.raises(InputError, match="lp has no dialect 'text'; choose one of none"):
+        write(problem, tmp_path / "model.lp", dialect="text")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write(problem, tmp_path / "absent" / "model.lp")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be made"):
+        write_problem(problem, tmp_path / "file", ["lp"])
+    assert format_of("a.b.mps.gz").name == "mps"

@@ -1,0 +1,519 @@
+"""The command line as a user finds it: verbs, exit codes, progress, tables, JSON, and the same bytes twice."""
+
+import json
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+from pathlib import Path
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.solvers_table import DRIVEN
+from crossfield.export.solving.methods import METHODS
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.sketch.samples import SAMPLES
+from loops import for_each
+from PIL import Image, ImageDraw
+
+
+@pytest.fixture
+def crossfield(capsys):
+    """Runs a command line that must succeed, and gives its output; nothing may stand on standard error."""
+
+    def run(*arguments, complaints=""):
+        code = invoke([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        assert (code, err) == (0, complaints)
+        return out
+
+    return run
+
+
+@pytest.fixture
+def instance():
+    mask = np.ones((2, 3), dtype=bool)
+    pixels, theta = np.array([[0, 0], [0, 2], [1, 1]]), np.array([0.3, 2.0, 1.2])
+    return cf.Instance("tiny", mask, pixels, theta, np.array([1.0, 0.7, 0.5]))
+
+
+@pytest.fixture
+def instance_file(tmp_path, instance):
+    return cf.write_instance(instance, tmp_path / "tiny.json")
+
+
+def child(*arguments, **options):
+    command = [sys.executable, "-m", "crossfield", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+# The verbs, one after the other
+
+
+def test_the_tour_of_the_verbs(tmp_path, crossfield):
+    """instance, export, solve, read, draw: each takes what the one before has left."""
+    out = crossfield("instance", "skew", "--size", 6, "-o", tmp_path / "skew.json")
+    instance = cf.read_instance(tmp_path / "skew.json")
+    assert f"{instance.grid.width} x {instance.grid.height}, {instance.grid.size} pixels" in out
+
+    crossfield("export", tmp_path / "skew.json", "-f", "milp-mccormick", "-o", tmp_path / "files")
+    names = {path.name for path in (tmp_path / "files").iterdir()}
+    stem = "skew.milp-mccormick"
+    suffixes = (".nl", ".row", ".col", ".gms", ".lp", ".mps", ".manifest.json")
+    assert names == {"skew.instance.json", *(stem + suffix for suffix in suffixes)}
+
+    solve = (
+        "solve",
+        tmp_path / "skew.json",
+        "-f",
+        "milp-mccormick",
+        "--time-limit",
+        5,
+        "-o",
+        tmp_path / "solved",
+    )
+    facts = json.loads(crossfield(*solve, "--json"))
+    assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], rel=1e-9)
+
+    read = (
+        "read",
+        tmp_path / "solved" / f"{stem}.highs.sol",
+        "--manifest",
+        tmp_path / "files" / f"{stem}.manifest.json",
+    )
+    again = json.loads(crossfield(*read, "-o", tmp_path / "field.json", "--json"))
+    same = ("objective_recomputed", "objective_reported", "worst_violation", "energy_1_norm", "energy_2_norm")
+    assert [again[key] for key in same] == [facts[key] for key in same]
+    assert again["status"] == facts["status"]
+    field = cf.read_field(tmp_path / "field.json")
+    assert field.energy(1).total == facts["energy_1_norm"]
+
+    for picture, head in (("p.png", b"\x89PNG"), ("p.svg", b"<?xml"), ("p.pdf", b"%PDF")):
+        crossfield("draw", tmp_path / "field.json", "-o", tmp_path / picture)
+        assert (tmp_path / picture).read_bytes().startswith(head)
+    crossfield("draw", tmp_path / "skew.json", "-o", tmp_path / "instance.png")
+    crossfield(
+        "draw",
+        tmp_path / "field.json",
+        "--kind",
+        "overview",
+        "--title",
+        "[bold]x[/]",
+        "-o",
+        tmp_path / "o.png",
+    )
+
+
+RUN_FILES = {
+    "field.json", "field.npz", "field.obj", "field.rawfield", "report.json",
+    "angle.png", "crosses.png", "field.png", "instance.png", "overview.png",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def two_parts(tmp_path_factory):
+    """A run on a sketch whose mask has two parts: its folder, and what it printed, complaints included."""
+    folder = tmp_path_factory.mktemp("run")
+    sketch, mask = Image.new("L", (60, 40), 255), Image.new("L", (60, 40), 0)
+    for line in ((5, 5, 55, 35), (5, 35, 55, 5), (8, 3, 8, 37)):
+        ImageDraw.Draw(sketch).line(line, fill=0, width=3)
+    for box in ((0, 0, 20, 39), (40, 0, 59, 39)):
+        ImageDraw.Draw(mask).rectangle(box, fill=255)
+    sketch.save(folder / "cross.png")
+    mask.save(folder / "mask.png")
+    options = (
+        "--mask",
+        folder / "mask.png",
+        "--size",
+        9,
+        "--time-limit",
+        0.5,
+        "--threads",
+        1,
+        "-o",
+        folder / "out",
+    )
+    return folder / "out", child("run", folder / "cross.png", *options)
+
+
+def test_a_run_leaves_everything(two_parts):
+    folder, done = two_parts
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES
+    models = {path.name for path in (folder / "models").iterdir()}
+    assert {name.split(".")[1] for name in models} == {"instance", *FORMULATIONS}
+    report = json.loads((folder / "report.json").read_text())
+    assert report["files"] == sum(Path(name).suffix[1:] in FORMATS for name in models) == 34
+    assert not [path for path in folder.rglob("*") if path.suffix == ".part"]
+
+
+def test_a_run_keeps_the_field_of_least_2_norm_energy(two_parts):
+    folder, _ = two_parts
+    report = json.loads((folder / "report.json").read_text())
+    energies = [row["energy_2_norm"] for row in report["methods"]]
+    field = cf.read_field(folder / "field.npz")
+    assert field.energy(2).total == pytest.approx(min(energies), rel=1e-9)
+    assert energies == pytest.approx(sorted(energies), rel=1e-8)
+    assert report["best"] == report["methods"][0]["method"]
+    assert len(report["methods"]) == 6
+    assert report["failures"] == {}
+    for row in report["methods"]:
+        if "status" in row:
+            assert row["worst_violation"] < 1e-6
+    by_method = {row["method"]: row for row in report["methods"]}
+    assert by_method["search"]["energy_2_norm"] <= by_method["greedy"]["energy_2_norm"] + 1e-7
+    assert by_method["power + QP"]["energy_2_norm"] <= by_method["power"]["energy_2_norm"] + 1e-7
+    assert by_method["MILP"]["energy_1_norm"] <= by_method["greedy"]["energy_1_norm"] + 1e-7
+    assert by_method["two-stage"]["energy_2_norm"] <= by_method["MILP"]["energy_2_norm"] + 1e-7
+
+
+def test_several_parts_are_said(two_parts):
+    folder, done = two_parts
+    assert "pixels in 2 separate parts" in done.stdout
+    assert json.loads((folder / "report.json").read_text())["instance"]["parts"] == 2
+
+
+def test_a_folder_with_the_name_of_a_sample_does_not_hide_it(tmp_path, crossfield, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        crossfield("export", "skew", "--size", 6, "-f", "qp-fixed", "-F", "nl", "-o", "skew")
+    assert Path("skew/skew.qp-fixed.nl").exists()
+
+
+def test_options_of_the_formulation_reach_the_files(tmp_path, crossfield, instance_file):
+    options = (
+        "--facet",
+        "printed",
+        "--stroke-norm",
+        2,
+        "--relax",
+        "--gauge",
+        "box",
+        "--gams-layout",
+        "scalar",
+        "--nl-form",
+        "binary",
+    )
+    crossfield("export", instance_file, "-f", "milp-mccormick", *options, "--gzip", "-o", tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "tiny.milp-mccormick.manifest.json").read_text())
+    assert document["options"] == {"facet": "printed", "stroke_norm": 2, "beta_norm": 1, "relax": True}
+    assert document["instance"]["gauge"] == "box"
+    names = [file["name"].removeprefix("tiny.milp-mccormick.") for file in document["files"]]
+    assert sorted(names) == ["col", "gms.gz", "lp.gz", "mps.gz", "nl.gz", "row"]
+    assert {file["dialect"] for file in document["files"]} == {"binary", "scalar", ""}
+
+
+def test_a_start_gives_the_jumps_of_qp_fixed(tmp_path, crossfield, instance, instance_file):
+    power = cf.power_field(instance)
+    start = cf.write_field(power, tmp_path / "power.npz")
+    crossfield("export", instance_file, "-f", "qp-fixed", "--start", start, "-o", tmp_path / "files")
+    problem = cf.read_manifest(tmp_path / "files" / "tiny.qp-fixed.manifest.json").problem()
+    assert problem.jumps.tolist() == power.p.tolist()
+    facts = json.loads(
+        crossfield("solve", instance_file, "-f", "qp-fixed", "--start", start, "-o", tmp_path / "s", "--json")
+    )
+    assert facts["energy_2_norm"] <= power.energy(2).total + 1e-9
+
+
+def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
+    """A search without a point removes the field of an earlier call."""
+    stale = tmp_path / "tiny.minlp-cubic.field.npz"
+    mask = np.ones((1, 2), dtype=bool)
+    instance = cf.Instance("tiny", mask, np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
+    cf.write_field(cf.greedy(instance), stale)
+    cf.write_instance(instance, tmp_path / "tiny.json")
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "casadi.py").write_text("raise ImportError('gone')")
+    done = child(
+        "solve",
+        tmp_path / "tiny.json",
+        "-f",
+        "minlp-cubic",
+        "--relax",
+        "-o",
+        tmp_path,
+        env=os.environ | {"PYTHONPATH": str(broken)},
+    )
+    assert done.returncode == 1
+    assert "ipopt left no answer" in done.stderr
+    assert not (tmp_path / "tiny.minlp-cubic.ipopt.sol").exists()
+
+
+# Usage, help, exit codes
+
+
+@for_each(
+    "arguments",
+    [
+        ["fly"],
+        ["run", "mouse"],
+        ["run", "mouse", "-o", "x", "--wings"],
+        ["run", "mouse", "-o", "x", "--size", "large"],
+        ["run", "mouse", "-o", "x", "--gauge", "none"],
+        ["run", "mouse", "-o", "x", "--time-limit", "0"],
+        ["solve", "mouse", "-o", "x"],
+        ["export", "mouse", "-o", "x", "--stroke-norm", "3"],
+        ["read", "a.sol", "-o", "x.npz"],
+    ],
+)
+def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert invoke(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Usage: " in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys; from crossfield.export.cli.app import invoke; invoke(['--help']); print(*sorted(sys.modules), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in done.stderr.split()}
+    assert not loaded & {
+        "numpy",
+        "scipy",
+        "sympy",
+        "matplotlib",
+        "PIL",
+        "casadi",
+        "highspy",
+        "pyomo",
+        "jinja2",
+        "jsonschema",
+        "distributed",
+    }
+    for verb in ("run", "instance", "export", "solve", "read", "draw", "list", "samples"):
+        assert re.search(rf"^\W*{verb} ", done.stdout, re.MULTILINE)
+
+
+@for_each("verb", ["run", "instance", "export", "solve", "read", "draw", "list", "samples"])
+def test_every_verb_has_help(verb, crossfield):
+    for flag in ("--help", "-h"):
+        assert f"crossfield {verb}" in crossfield(verb, flag)
+
+
+def test_without_a_command_there_is_help(capsys):
+    assert invoke([]) in {0, 2}
+    captured = capsys.readouterr()
+    assert "Commands" in captured.out + captured.err
+
+
+def test_the_version_is_that_of_the_package(crossfield):
+    from importlib.metadata import version
+
+    assert crossfield("--version") == f"crossfield {version('crossfield')}\n"
+
+
+def test_debug_shows_the_traceback(tmp_path, capsys):
+    (tmp_path / "bad.json").write_text("{}")
+    arguments = ["run", str(tmp_path / "bad.json"), "-o", str(tmp_path / "out")]
+    assert invoke(arguments) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    done = child("--debug", *arguments)
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "InstanceError" in done.stderr
+
+
+def test_what_should_not_happen_is_one_line_too(tmp_path, instance_file):
+    code = (
+        "import sys, crossfield.models.search.greedy as g, crossfield.export.cli.app as c\n"
+        "g.greedy = lambda *_, **__: 1 / 0\n"
+        "sys.exit(c.invoke(sys.argv[1:]))"
+    )
+    arguments = ["solve", str(instance_file), "-f", "qp-fixed", "-o", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.count("\n") == 1
+    assert "please report it: ZeroDivisionError" in done.stderr
+
+
+# Quiet, JSON, tables, progress
+
+
+def test_quiet_prints_nothing(tmp_path, crossfield, instance_file):
+    set_ = tmp_path / "set"
+    assert crossfield("instance", "skew", "--size", 6, "-o", tmp_path / "i.npz", "-q") == ""
+    assert crossfield("export", instance_file, "-f", "milp-mccormick", "-o", set_, "-q") == ""
+    assert crossfield("solve", instance_file, "-f", "milp-mccormick", "-o", set_, "-q") == ""
+    solution, manifest = set_ / "tiny.milp-mccormick.highs.sol", set_ / "tiny.milp-mccormick.manifest.json"
+    assert crossfield("read", solution, "--manifest", manifest, "-o", tmp_path / "f.npz", "-q") == ""
+    assert crossfield("draw", tmp_path / "f.npz", "-o", tmp_path / "f.png", "-q") == ""
+    assert (
+        crossfield("run", instance_file, "--time-limit", 1, "--threads", 1, "-o", tmp_path / "run", "-q")
+        == ""
+    )
+
+
+def test_json_is_all_there_is_on_standard_output(tmp_path, crossfield, instance_file):
+    exported = json.loads(
+        crossfield("export", instance_file, "-f", "miqp-exact", "-o", tmp_path / "e", "--json")
+    )
+    assert exported == [json.loads((tmp_path / "e" / "tiny.miqp-exact.manifest.json").read_text())]
+    solved = json.loads(
+        crossfield("solve", instance_file, "-f", "miqp-exact", "-o", tmp_path / "e", "--json")
+    )
+    assert solved["status"] == "optimal-local"
+
+
+def test_list_says_which_go_together(crossfield):
+    listed = json.loads(crossfield("list", "--json"))
+    assert [row["name"] for row in listed["formulations"]] == list(FORMULATIONS)
+    assert [row["name"] for row in listed["formats"]] == list(FORMATS)
+    assert all(set(DRIVEN) < set(row) for row in listed["solvers"])
+    assert [row["name"] for row in listed["methods"]] == list(METHODS)
+    text = crossfield("list")
+    for name in (*FORMULATIONS, *FORMATS, *DRIVEN, *(row["name"] for row in listed["readers"])):
+        assert name in text
+
+
+def test_samples_are_listed(crossfield):
+    listed = json.loads(crossfield("samples", "--json"))
+    assert [row["name"] for row in listed] == list(SAMPLES)
+    text = crossfield("samples")
+    assert all(name in text for name in SAMPLES)
+
+
+def assert_fits(text, *, but=()):
+    """Every line of the tables has at most 80 characters; lines of prose with paths may be longer."""
+    long = [
+        line
+        for line in text.splitlines()
+        if len(line.rstrip()) > 80 and not any(word in line for word in but)
+    ]
+    assert long == []
+
+
+def test_tables_fit_80_columns(tmp_path, crossfield, instance_file, two_parts):
+    for verb in ("list", "samples"):
+        assert_fits(crossfield(verb))
+    assert_fits(two_parts[1].stdout, but=("/",))
+    assert_fits(crossfield("export", instance_file, "-o", tmp_path / "e"), but=("/", "not written"))
+    assert_fits(crossfield("solve", instance_file, "-f", "qp-fixed", "-o", tmp_path / "e"), but=("/",))
+
+
+def test_the_table_of_a_run_stands_in_lines(two_parts):
+    rows = [
+        line
+        for line in two_parts[1].stdout.splitlines()
+        if re.match(r" *(greedy|power|MILP|two-stage|search)", line)
+    ]
+    assert len(rows) == 6
+    assert sum("*" in row for row in rows) == 1
+    assert "*" in rows[0]
+
+
+def in_terminal(arguments, columns=80):
+    """Exit code and everything that a command line writes when it runs on a terminal of 80 columns."""
+    leader, follower = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": str(columns), "LINES": "30"}
+    command = [sys.executable, "-m", "crossfield", *map(str, arguments)]
+    written = b""
+    with subprocess.Popen(
+        command, stdin=follower, stdout=follower, stderr=follower, env=environment
+    ) as process:
+        os.close(follower)
+        while select.select([leader], [], [])[0]:
+            try:
+                piece = os.read(leader, 1 << 16)
+            except OSError:  # the other end was closed
+                break
+            if not piece:
+                break
+            written += piece
+        code = process.wait()
+    os.close(leader)
+    return code, written.decode()
+
+
+def test_progress_is_shown_on_a_terminal_only(tmp_path, instance_file):
+    arguments = ("solve", instance_file, "-f", "qp-fixed", "-o", tmp_path / "t")
+    code, shown = in_terminal(arguments)
+    assert code == 0
+    assert "solving qp-fixed" in shown
+    assert "\x1b[2K" in shown  # lines that are wiped again
+    code, shown = in_terminal([*arguments, "--quiet"])
+    assert (code, shown) == (0, "")
+    done = child(*arguments)
+    assert "solving" not in done.stdout + done.stderr
+    assert done.stderr == ""
+
+
+def test_the_plan_of_a_run_is_told_on_a_terminal_unless_it_shall_be_quiet(tmp_path):
+    (tmp_path / "file").touch()
+    arguments = ("run", "skew", "--size", "4", "--time-limit", "20", "-o", tmp_path / "file")
+    code, shown = in_terminal(arguments)
+    assert code == 1
+    plan = "at most 40 s: search 20 s, two-stage 20 s; files and pictures come on top"
+    assert plan in shown
+    assert plan not in in_terminal([*arguments, "--quiet"])[1]
+
+
+# The same bytes twice
+
+
+def test_exports_are_the_same_bytes_twice(tmp_path):
+    """In two processes with different hash seeds, at different times, into two folders."""
+    for number in ("1", "2"):
+        environment = os.environ | {"PYTHONHASHSEED": number}
+        code = (
+            "import sys; from crossfield.export.cli.app import invoke\n"
+            "assert invoke(['export', 'mouse', '--size', '8', '-o', sys.argv[1]]) == 0\n"
+            "assert invoke(['instance', 'mouse', '--size', '8', '-o', sys.argv[1] + '/i.npz']) == 0"
+        )
+        subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path / number)],
+            check=True,
+            capture_output=True,
+            env=environment,
+        )
+        field = cf.greedy(cf.read_instance(tmp_path / number / "i.npz"))
+        for suffix in (".npz", ".json", ".rawfield"):
+            cf.write_field(field, tmp_path / number / f"field{suffix}")
+    first, second = ({path.name: path.read_bytes() for path in (tmp_path / n).iterdir()} for n in ("1", "2"))
+    assert len(first) > 60
+    assert first == second
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_leaves_a_field_and_tells_its_energy(tmp_path, crossfield, instance_file, method):
+    out = crossfield(
+        "solve",
+        instance_file,
+        "--method",
+        method,
+        "--time-limit",
+        0.5,
+        "--threads",
+        1,
+        "--json",
+        "-o",
+        tmp_path,
+    )
+    facts = json.loads(out)
+    (path,) = tmp_path.glob(f"*.{method}.field.npz")
+    assert facts["energy_2_norm"] == pytest.approx(cf.read_field(path).energy().total, rel=1e-12)
+    assert facts["interrupted"] is False
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        (),
+        ("--method", "search", "-f", "qp-fixed"),
+        ("--method", "search", "--relax"),
+        ("--method", "greedy", "--solver", "highs"),
+    ],
+)
+def test_a_method_and_a_formulation_exclude_each_other(tmp_path, instance_file, options, capsys):
+    assert invoke(["solve", str(instance_file), *options, "-o", str(tmp_path / "out")]) == 2
+    assert "method" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,417 @@
+"""Inputs made to cost time, memory or trust: each is read or refused with a CrossfieldError, and none costs more than its size asks for."""
+
+import io
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from pathlib import Path
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.plan.spec import read_spec
+from crossfield.models import input_limits
+from crossfield.models.array_archive import pack_arrays
+from crossfield.models.errors import LONGEST, CrossfieldError, InputError, printable, shortened
+from crossfield.models.instance.file import arrays_of
+from crossfield.models.sketch.svg import read_svg
+from PIL import Image
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
+STROKES = '<path d="M5 5 L55 35 M5 35 L55 5" stroke="black"/>'
+
+
+def styled(text):
+    return SVG.format(f"<style>{text}</style>{STROKES}").encode()
+
+
+def drawn(shape, count=1):
+    return SVG.format(shape * count).encode()
+
+
+ZIGZAG = "".join(f"L{k % 60} {k % 40}" for k in range(200))
+COSTLY_SVG = {
+    **{f"style of {text!r}": styled(text * 60_000) for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "\\", '"')},
+    "a selector of many": styled(",".join(f".c{k}" for k in range(20_000)) + "{stroke:red}"),
+    "uses of one path": drawn(f'<path id="p" stroke="black" d="M0 0{ZIGZAG}"/>' + '<use href="#p"/>' * 2000),
+    "rules and paths": SVG.format(
+        "<style>" + "".join(f".c{k}{{stroke:red}}" for k in range(5000)) + "</style>"
+        + "".join(f'<path class="c{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
+    ).encode(),
+    "rules of one class": SVG.format(
+        "<style>" + "".join(f".c.d{k}{{stroke:red}}" for k in range(5000)) + "</style>"
+        + "".join(f'<path class="c e{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
+    ).encode(),
+    "closed subpaths": drawn('<path stroke="black" d="M5 5' + "L3 4z" * 20_000 + '"/>'),
+    "a point list without blanks": drawn('<polyline stroke="black" points="' + "1" * 100_000 + '"/>'),
+    "a colour of digits": drawn('<path stroke="rgb(' + "1" * 50_000 + '" d="M5 5L9 9"/>'),
+    "a transform that never closes": drawn('<path stroke="black" transform="' + "translate(" * 40_000 + '" d="M5 5L9 9"/>'),
+    "uses of uses": SVG.format(
+        f'<g id="a0">{STROKES}</g>' + "".join(f'<g id="a{k + 1}"><use href="#a{k}"/></g>' for k in range(9000))
+    ).encode(),
+}  # fmt: skip
+
+
+def member(archive, name, shape, kind, length):
+    """A member of an archive that holds so many zeros."""
+    entry = zipfile.ZipInfo(f"{name}.npy")
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    with archive.open(entry, "w") as stream:
+        np.lib.format.write_array_header_1_0(stream, {"descr": kind, "fortran_order": False, "shape": shape})
+        for _ in range(length >> 20):
+            stream.write(bytes(1 << 20))
+
+
+def instance():
+    mask = np.ones((2, 2), dtype=bool)
+    return cf.Instance("tiny", mask, np.array([[0, 0], [1, 1]]), np.array([0.3, 1.2]), np.array([1.0, 0.5]))
+
+
+def archive_with(name, shape, kind, length):
+    data = io.BytesIO(
+        pack_arrays({key: array for key, array in arrays_of(instance()).items() if key != name})
+    )
+    with zipfile.ZipFile(data, "a") as archive:
+        member(archive, name, shape, kind, length)
+    return data.getvalue()
+
+
+def png(side):
+    """A white picture with a thick black line, 3 bytes a pixel, a few hundred times smaller when packed."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    packer = zlib.compressobj(9)
+    rows = (
+        packer.compress(b"\0" + (b"\0" if 0 < row - side // 2 < 60 else b"\xff") * (3 * side))
+        for row in range(side)
+    )
+    data = b"".join(rows) + packer.flush()
+    head = struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+def repeated_strokes(tmp_path):
+    cf.write_instance(instance(), tmp_path / "a.json")
+    document = json.loads((tmp_path / "a.json").read_text())
+    document["strokes"] = document["strokes"][:1] * 300_000
+    return json.dumps(document).encode()
+
+
+READER = """
+import json, resource, sys
+import crossfield as cf
+resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
+for path in sys.argv[1:]:
+    try:
+        (cf.read_instance if path.endswith(("npz", "json")) else lambda p: cf.read_sketch(p, size=24))(path)
+        said = ""
+    except cf.CrossfieldError as error:
+        said = str(error)
+    print(json.dumps([path, said, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024]), flush=True)
+"""
+
+
+def read_by_child(*paths):
+    """What is said of each file by a process that reads them one after the other and has 60 s of processor time, and its memory in MB."""
+    done = subprocess.run(
+        [sys.executable, "-c", READER, *map(str, paths)], check=False, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(found) == len(paths)
+    return {Path(path).name: (said, memory) for path, said, memory in found}
+
+
+@pytest.mark.slow
+def test_drawings_that_ask_for_much_work_do_not_get_it(tmp_path):
+    """Before, most of them took minutes, 200,000 blanks in a style sheet 207 s."""
+    paths = []
+    for number, data in enumerate(COSTLY_SVG.values()):
+        paths.append(tmp_path / f"{number}.svg")
+        paths[-1].write_bytes(data)
+    found = [said for said, _ in read_by_child(*paths).values()]
+    refused = {name: said for name, said in zip(COSTLY_SVG, found, strict=True) if said}
+    assert set(refused) == {
+        "rules of one class",
+        "a point list without blanks",
+        "a transform that never closes",
+        "uses of uses",
+    }
+    assert f"nested more than {input_limits.MAX_USE_DEPTH} deep" in refused["uses of uses"]
+    assert f"more than {input_limits.MAX_RULE_CHECKS} comparisons" in refused["rules of one class"]
+    assert f"more than {input_limits.MAX_TRANSFORM} characters" in refused["a transform that never closes"]
+
+
+@pytest.mark.slow
+def test_small_files_do_not_take_much_memory(tmp_path):
+    """Before: 3046, 1559, 772 and 1094 MB. The picture comes last, because memory is counted from the start of the process."""
+    files = {
+        "extra.npz": archive_with("extra", (1 << 29,), "|u1", 1 << 29),
+        "mask.npz": archive_with("mask", (20_000, 40_000), "|b1", 800 << 20),
+        "strokes.json": repeated_strokes(tmp_path),
+        "many.scap": b"#60\t40\n@1\n{\n#1\t1\n" + b"1\t2\t1\n3\t4\t1\n" * 1_000_000 + b"}\n",
+        "big.png": png(8900),
+    }
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+    found = read_by_child(*(tmp_path / name for name in files))
+    said = {name: words for name, (words, _) in found.items()}
+    assert said["extra.npz"] == said["big.png"] == ""
+    assert "array 'mask' has shape (20000, 40000); expected 2 dimensions of at most 9999" in said["mask.npz"]
+    assert "lists 300000 stroke pixels, but its mask has 4 pixels" in said["strokes.json"]
+    assert f"more than {input_limits.MAX_LINES} lines" in said["many.scap"]
+    assert found["many.scap"][1] < 350
+    assert found["big.png"][1] < 800
+
+
+def test_limits_of_drawings_are_told(monkeypatch):
+    """Each with a small limit in place of the real one."""
+    from crossfield.models.sketch import path_data, style_sheet, svg
+
+    for module, name, most, text in (
+        (svg, "MAX_TAGS", 5, "tags and attributes"),
+        (svg, "MAX_ELEMENTS", 2, "elements"),
+        (svg, "MAX_USES", 1, "<use> elements"),
+        (svg, "MAX_USE_DEPTH", 0, "nested"),
+        (svg, "MAX_DATA", 20, "characters of paths"),
+        (svg, "MAX_CURVES", 3, "segments of curves"),
+        (path_data, "MAX_CURVES", 1, "segments of curves"),
+        (style_sheet, "MAX_STYLE", 3, "style sheets have more than"),
+        (style_sheet, "MAX_RULE_CHECKS", 2, "comparisons"),
+    ):
+        drawing = SVG.format(
+            f'<style>path{{fill:none}}</style><g id="a">{STROKES}</g><use href="#a"/><use href="#a"/>'
+        ).encode()
+        assert len(read_svg(drawing).points) == 6
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, most)
+            with pytest.raises(InputError, match=re.escape(text)) as caught:
+                read_svg(drawing)
+            assert re.search(r"more than \d+ ", str(caught.value))
+
+
+STRANGE_SVG = {
+    **{
+        f"{data} without a move": (f'<path stroke="black" d="{data}"/>', "not with a move (M)")
+        for data in ("C 1 1 2 2 3 3", "T 1 1", "Q 1 1 2 2", "S 1 1 2 2", "A 1 1 0 0 0 2 2", "L 1 1 2 2")
+    },
+    "a length in em": ('<line stroke="black" x1="1em" x2="32" y1="4" y2="4"/>', [16, 4, 32, 4]),
+    "data that ends in em": ('<path stroke="black" d="M1 1 L5em"/>', "its numbers cannot be read"),
+    "a number and em": ('<path stroke="black" d="M1 1 L5 5em"/>', [1, 1, 5, 5]),
+    "an unknown unit": ('<circle stroke="black" r="1vw"/>', "its length '1vw' cannot be read"),
+    "digits in a style": (f'<path style="stroke-width:{"1" * 5000}" stroke="black" d="M1 1 L5 5"/>', [1, 1, 5, 5]),
+    "a smooth curve after another kind": (
+        '<path stroke="black" d="M0 0Q2 2 4 0S6 3 9 0" />',
+        [0, 0, 9, 0],
+    ),
+}  # fmt: skip
+
+
+def test_strange_shapes_are_read_as_browsers_do_or_refused():
+    for shape, expected in STRANGE_SVG.values():
+        drawing = SVG.format(shape).encode()
+        if isinstance(expected, str):
+            with pytest.raises(InputError, match=re.escape(expected)):
+                read_svg(drawing)
+        else:
+            points = read_svg(drawing).points
+            assert [*points[0, 0], *points[-1, -1]] == pytest.approx(expected)
+
+
+def test_pages_without_extent_are_refused(tmp_path):
+    for name, content in (
+        ("a.scap", "#1e-320\t1\n{\n1\t2\t1\n3\t4\t1\n}\n"),
+        ("a.svg", SVG.replace("60 40", "1e-320 40").format(STROKES)),
+    ):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(InputError, match="1e-320"):
+            cf.read_sketch(tmp_path / name)
+
+
+def test_numbers_of_thousands_of_digits_in_a_specification_are_refused(tmp_path):
+    head = 'format = "crossfield-library-spec"\nversion = 1\ntitle = "t"\n[[sketches]]\nname = "a"\nsample = "mouse"\n'
+    for number in ("9" * 5000, "9" * 4000, "0x" + "f" * 5000):
+        (tmp_path / "spec.toml").write_text(f"{head}[rungs.tiny]\nsizes = [{number}]\n")
+        with pytest.raises(InputError, match=r"spec\.toml: ") as caught:
+            read_spec(tmp_path / "spec.toml")
+        assert len(str(caught.value)) < 500
+
+
+def test_floating_point_pictures_without_numbers_are_refused(tmp_path):
+    for value in (np.nan, np.inf):
+        values = np.ones((40, 60), dtype=np.float32)
+        values[20] = 0
+        values[3, 3] = value
+        Image.fromarray(values).save(tmp_path / "a.tiff")
+        with pytest.raises(InputError, match="no finite numbers"):
+            cf.read_sketch(tmp_path / "a.tiff")
+
+
+def test_damaged_tiffs_are_refused_and_nothing_else_is_said(tmp_path, capfd):
+    values = np.full((40, 60), 255, dtype=np.uint8)
+    values[20:23] = 0
+    refused = 0
+    for packing in ("tiff_lzw", "tiff_deflate", "packbits"):
+        Image.fromarray(values).save(tmp_path / "a.tiff", compression=packing)
+        whole = bytearray((tmp_path / "a.tiff").read_bytes())
+        for at in range(8, len(whole), 5):
+            damaged = whole.copy()
+            damaged[at : at + 4] = b"\xff\x00\x07\x80"
+            (tmp_path / "a.tiff").write_bytes(damaged[: len(damaged)])
+            try:
+                cf.read_sketch(tmp_path / "a.tiff", size=6)
+            except CrossfieldError:
+                refused += 1
+    assert refused > 10
+    assert capfd.readouterr() == ("", "")
+
+
+def test_pictures_are_the_same_in_bands(tmp_path, monkeypatch):
+    """However many rows are looked at together."""
+    from crossfield.models.sketch import bitmap
+
+    rng = np.random.default_rng(3)
+    shades = np.where(rng.random((90, 130, 1)) < 0.1, rng.integers(0, 200, (90, 130, 3)), 255).astype(
+        np.uint8
+    )
+    shades[30:34] = 20
+    for name, image in {
+        "rgb.png": Image.fromarray(shades),
+        "grey.png": Image.fromarray(shades[..., 0]),
+        "deep.png": Image.fromarray(shades[..., 0].astype(np.uint16) * 256),
+        "float.tiff": Image.fromarray(shades[..., 0].astype(np.float32)),
+        "alpha.png": Image.fromarray(np.dstack([shades, 255 - shades[..., :1]])),
+        "palette.gif": Image.fromarray(shades).quantize(16),
+    }.items():
+        image.save(tmp_path / name)
+        whole = bitmap.read_picture((tmp_path / name).read_bytes(), 4)
+        with monkeypatch.context() as patch:
+            patch.setattr(bitmap, "_BAND", 400)
+            banded = bitmap.read_picture((tmp_path / name).read_bytes(), 4)
+            mask = bitmap.read_white((tmp_path / name).read_bytes())
+        np.testing.assert_array_equal(whole.ink, banded.ink)
+        np.testing.assert_array_equal(mask, bitmap.read_white((tmp_path / name).read_bytes()))
+
+
+def test_texts_from_files_are_safe_in_messages(tmp_path):
+    strange = "a\x1b[31m\u202eb\u200b\x07\x9b\udcffc\u2028d"
+    assert printable(strange) == r"a\x1b[31m\u202eb\u200b\x07\x9b\udcffc d"
+    assert printable("Öl – 12.3° 図") == "Öl – 12.3° 図"
+    assert len(shortened("x" * 10_000)) == 80
+    assert len(shortened("\x1b" * 10_000)) == 80
+    assert "thousands of digits" in shortened(1 << 20_000)
+    error = InputError(f"{strange}{'long ' * 10_000}; write it again", file=tmp_path / "a\u202eb.svg")
+    assert str(error).isprintable()
+    assert str(error).endswith("; write it again")
+    assert r"a\u202eb.svg: " in str(error)
+    assert len(str(InputError("word " * 10_000))) == LONGEST
+    assert str(InputError(str(error))).endswith("; write it again")
+    assert str(InputError(printable(strange))) == printable(strange)
+
+
+def test_a_damaged_archive_is_told_in_short(tmp_path):
+    arrays = io.BytesIO(
+        pack_arrays({name: array for name, array in arrays_of(instance()).items() if name != "w"})
+    )
+    with zipfile.ZipFile(arrays, "a") as archive:
+        header = b"{'descr': '" + b"\x1b[31m\x07" * 300 + b"'}\n"
+        archive.writestr("w.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+    (tmp_path / "a.npz").write_bytes(arrays.getvalue())
+    with pytest.raises(CrossfieldError) as caught:
+        cf.read_instance(tmp_path / "a.npz")
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < len(str(tmp_path)) + 200
+
+
+def test_fields_of_numbers_that_are_no_angles_are_refused(tmp_path):
+    field = cf.greedy(instance())
+    cf.write_field(field, tmp_path / "a.json")
+    document = json.loads((tmp_path / "a.json").read_text())
+    for column, value in ((2, 1e308), (3, -1e308), (0, 1e400), (4, 1e400), (2, float("nan"))):
+        changed = json.loads(json.dumps(document))
+        changed["pixels"][1][column] = value
+        (tmp_path / "b.json").write_text(json.dumps(changed))
+        with pytest.raises(CrossfieldError):
+            cf.read_field(tmp_path / "b.json")
+
+
+def test_output_degrades_where_the_terminal_has_no_unicode(tmp_path):
+    """The report of a run has a sign for degrees, drawings may have any name."""
+    (tmp_path / "Skizze – 図.svg").write_text(SVG.format(STROKES))
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    program = (
+        "from crossfield.export.cli.output import degrade, say, complain, show_table\n"
+        "degrade(); say('12.3°'); complain('12.3°'); show_table('°', ('|β|',), [['1.4°']])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, env=environment)
+    assert done.returncode == 0
+    assert done.stdout.startswith(b"12.3")
+    assert rb"1.4\xb0" in done.stdout
+    assert done.stderr.startswith(b"crossfield: 12.3")
+    command = [sys.executable, "-m", "crossfield", "instance", tmp_path / "Skizze – 図.svg", "--size", "8"]
+    for output, code in (("ö.json", 0), ("ö.txt", 1)):
+        done = subprocess.run(
+            [*command, "-o", tmp_path / output], check=False, capture_output=True, env=environment
+        )
+        assert (done.returncode, b"should not happen" in done.stderr) == (code, False)
+        assert done.stdout + done.stderr
+
+
+def test_written_files_obey_the_umask(tmp_path):
+    if os.name == "nt":
+        pytest.skip("Windows has no umask")
+    for mask in (0o077, 0o027, 0o002):
+        before = os.umask(mask)
+        try:
+            cf.write_instance(instance(), tmp_path / f"{mask}.json")
+        finally:
+            os.umask(before)
+        assert (tmp_path / f"{mask}.json").stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from crossfield.models.storage import replacing
+with replacing(Path(sys.argv[1])) as stream:
+    stream.write(b"half")
+    stream.flush()
+    if sys.argv[2] == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_what_a_killed_process_has_left_is_removed_by_the_next_and_nothing_else(tmp_path):
+    if os.name == "nt":
+        pytest.skip("Windows does not say whether a process lives")
+    target = tmp_path / "a.json"
+    target.write_text("whole")
+    (tmp_path / ".a.json.mine.part").write_text("of somebody else")
+    (tmp_path / ".a.json.00000000-1-0a.part").write_text("of another machine")
+    assert subprocess.run([sys.executable, "-c", KILLED, target, "dies"], check=False).returncode < 0
+    assert len(list(tmp_path.iterdir())) == 4
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, target, "waits"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout.readline() == b"writing\n"
+        assert len(list(tmp_path.iterdir())) == 4  # the one of the dead is gone, that of the living has come
+        assert invoke(["instance", "mouse", "--size", "6", "-q", "-o", str(target)]) == 0
+        assert target.read_bytes() != b"half"
+        other.communicate()
+    assert other.returncode == 0
+    assert target.read_bytes() == b"half"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".a.json.00000000-1-0a.part",
+        ".a.json.mine.part",
+        "a.json",
+    ]

@@ -1,0 +1,118 @@
+"""With integrality dropped, a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
+
+import json
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.bundle.manifest import write_all
+from crossfield.export.cli.tables import tables
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.solving.local import solver_for
+from crossfield.export.verify.verify import Verdict, compared, verify
+
+LIFTED = ("minlp-quartic", "minlp-cubic")
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Two pixels whose strokes pull p1 between 0 and 1: there the hull of the product is larger than the product."""
+    mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
+    return cf.Instance("two", mask, pixels, [0.5, 2.2], [1.0, 1.0], w_beta=1.0, gauge="box")
+
+
+@pytest.fixture(scope="module")
+def written(two, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("relaxed")
+    manifests = write_all(
+        two, folder, [*LIFTED, "minlp-parity"], ["nl", "lp", "mps", "qplib"], options={"relax": True}
+    )
+    return {manifest.formulation: manifest for manifest in manifests}
+
+
+@pytest.mark.parametrize("name", LIFTED)
+def test_a_lifted_relaxation_is_called_one(name, written):
+    manifest = written[name]
+    for file in manifest.document["files"]:
+        if file["format"] == "nl":
+            assert file["lifted"] == ""
+            continue
+        assert "a relaxation" in file["lifted"]
+        assert "exact" not in file["lifted"]
+        head = (manifest.folder / file["name"]).read_text().splitlines()[:6]
+        assert any("a relaxation" in line for line in head)
+        assert not any("exact" in line for line in head)
+        assert any(f"continuous relaxation of {name}" in line for line in head)
+
+
+def test_the_table_tells_both():
+    cells = {row["name"]: row["mps"] for row in tables()["formulations"][1]}
+    assert {cells[name] for name in LIFTED} == {"lifted, exact; relaxed, weaker"}
+
+
+def test_no_other_relaxation_is_called_the_same_problem(written):
+    """cos(pi p) between whole p is another function than (1 - 2 p1)."""
+    reasons = written["minlp-parity"].document["refused"]
+    assert sorted(reasons) == ["lp", "mps", "qplib"]
+    for reason in reasons.values():
+        assert "same problem" not in reason
+        assert "choose nl or gms" in reason
+
+
+def test_the_hull_is_larger(two):
+    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible there and lower than any point of the products."""
+    problem = cf.formulate(two, "minlp-quartic", relax=True)
+    lifted = cf.solve(problem, "highs")
+    assert lifted.violation.worst < 1e-6
+    assert lifted.objective == pytest.approx(0.198, abs=1e-3)
+    z, p1, beta = (lifted.point[lifted.problem.blocks[name].columns] for name in ("z", "p1", "beta"))
+    assert abs(z - p1 * beta[:1]).max() > 0.01
+    best = min(cf.solve(problem, "ipopt", start=start).objective for start in starts(two))
+    assert best == pytest.approx(0.247, abs=1e-3)
+
+
+def starts(instance):
+    """Fields at every jump that the pair may have."""
+    p_min, p_max = int(instance.p_min[0]), int(instance.p_max[0])
+    for p in range(p_min, p_max + 1):
+        yield cf.CrossField(instance, (instance.alpha_lower + instance.alpha_upper) / 2, np.zeros(2), [p])
+
+
+def test_a_solver_is_chosen_that_reads_the_products(two):
+    """HiGHS would solve the weaker problem of the .mps; it does so when it is asked for, and the facts tell."""
+    problem = cf.formulate(two, "minlp-quartic", relax=True)
+    assert solver_for(problem).formats[0] == "nl"
+    assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
+    assert carried(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.weakened is False
+
+
+@pytest.mark.slow
+@pytest.mark.oracles
+def test_verify_compares_optima_across_formats(written, two, tmp_path):
+    """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, and a contradiction if both were called optima of one problem."""
+    if not PROGRAMS["scip"].present:
+        pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
+    write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
+    found = verify(tmp_path, seconds=4.0, consumers=["scip", "highs"])
+    assert found.bad == []
+    solves = {f.file.rpartition(".")[2]: f for f in found.findings if f.step == "solve" and f.objective}
+    weak, whole = solves["mps"], solves["nl"]
+    assert weak.relaxes == whole.group != weak.group
+    assert weak.objective < whole.objective - 0.04
+    assert weak.reason.startswith("a relaxation")
+    called_exact = [replace(weak, group=whole.group, relaxes=""), replace(whole, proven=True)]
+    assert Verdict.DIFFERS in {each.verdict for each in compared(called_exact)}
+    too_high = [replace(weak, objective=0.3, bound=None), whole]
+    assert [each.verdict for each in compared(too_high)] == [Verdict.DIFFERS, whole.verdict]
+
+
+@pytest.mark.oracles
+def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
+    (manifest,) = write_all(two, tmp_path, ["minlp-quartic"], ["mps"], options={"relax": True})
+    document = json.loads(manifest.path.read_text())
+    document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
+    manifest.path.write_text(json.dumps(document))
+    (bad,) = verify(tmp_path, consumers=["highs"]).bad
+    assert "the manifest says" in bad.reason

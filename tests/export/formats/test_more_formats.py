@@ -1,0 +1,729 @@
+"""AMPL .mod and .dat, OSiL, QPLIB and BARON files, read by programs and readers that nobody here wrote, and evaluated as text.
+
+.mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are parameters: its MathProg is
+a second implementation of the language, and AMPL itself cannot be had for free. .osil: SCIP, and the XML taken at its word. .qplib: pyqplib,
+where it is installed, and a reader after qplib.zib.de/doc.html. .bar: Pyomo's BARON writer, and BARON itself in its free size.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from math import cos
+from pathlib import Path
+from typing import Any
+
+import defusedxml.ElementTree as Xml
+import numpy as np
+import pytest
+from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
+from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
+from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
+from crossfield.export.solutions.solution import read_solution
+from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
+from crossfield.export.verify.programs import glpk as consumer_glpk
+from crossfield.export.verify.programs import scip as consumer_scip
+from crossfield.export.verify.programs.reading import Meaning, Points
+from crossfield.export.verify.verify import Verdict, verify
+from crossfield.export.writing import records
+from crossfield.export.writing.curvature import probtype
+from crossfield.export.writing.names import column_names, row_names
+from crossfield.export.writing.terms import terms
+from crossfield.models.errors import UnsupportedByFormatError
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import Problem, with_integers_fixed
+from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.samples import sample
+from loops import for_each
+
+MORE = ("mod", "osil", "qplib", "bar")
+PINNED = [label for label in CASES if "pinned" in label]
+FREE = [label for label in CASES if "pinned" not in label]
+POLYNOMIAL = [label for label in CASES if not label.startswith("minlp-parity") or "pixel" in label]
+LINEAR = [label for label in FREE if problem_of(label).problem_class == "MILP"]
+
+
+def held(label: str, name: str) -> Problem:
+    return carried(problem_of(label), FORMATS[name])
+
+
+def written(problem: Problem, path: Path, **given: Any) -> str:
+    write(problem, path, **given)
+    return path.read_text("ascii")
+
+
+def names(problem: Problem) -> tuple[list[str], list[str]]:
+    return names_of(column_names(problem)), names_of(row_names(problem)) if problem.rows else []
+
+
+def limits(problem: Problem) -> tuple[Any, Any]:
+    """Left and right sides of all rows, the row `c_ONE` of LP and MPS left out."""
+    model = of_problem(problem)
+    return model.row_lower[: problem.row_count], model.row_upper[: problem.row_count]
+
+
+def assert_values(found: list[float], expected: Any) -> None:
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def feasible_points(problem: Problem) -> Points:
+    fields = [problem.point(make_field(problem.instance, seed)) for seed in (2, 3)]
+    values = np.concatenate([points_of(problem, 2), np.array(fields)])
+    return Points(names(problem)[0], values, values_at(problem, values)[0], 2)
+
+
+def tiny() -> Instance:
+    """Two pixels with strokes that no field follows without loss: the window is that of the box."""
+    pixels = [[0, 0], [0, 1]]
+    return Instance("small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], w_beta=1e-2, gauge="box")
+
+
+# all of them
+
+
+@for_each("name", MORE)
+@for_each("formulation", FORMULATIONS)
+def test_every_formulation_is_written_or_refused_by_name(formulation: str, name: str, tmp_path: Path):
+    problem = make_problem(formulation, make_instance())
+    path = tmp_path / f"model.{name}"
+    if formulation == "minlp-parity" and name in {"qplib", "bar"}:
+        with pytest.raises(UnsupportedByFormatError, match="write minlp-quartic, which is the same problem"):
+            write(problem, path)
+        assert list(tmp_path.iterdir()) == []
+        return
+    done = write(problem, path)
+    beside = {"model.dat"} if name == "mod" else set()
+    assert {file.name for file in tmp_path.iterdir()} == set(done.files) == {path.name} | beside
+    lifts = name == "qplib" and formulation in {"minlp-quartic", "minlp-cubic"}
+    assert done.lifted == ("z = p1 beta_i with the hull facets (26)-(29), exact" if lifts else "")
+
+
+def test_they_are_written_only_when_asked_for(tmp_path: Path):
+    assert DEFAULTS == ("nl", "gms", "lp", "mps")
+    problem = make_problem("milp-mccormick", make_instance())
+    assert {entry["format"] for entry in write_problem(problem, tmp_path).document["files"]} == set(DEFAULTS)
+    (manifest,) = write_all(problem.instance, tmp_path / "more", ["milp-mccormick"], MORE)
+    listed = [entry["name"] for entry in manifest.document["files"]]
+    assert listed == [f"tiny.milp-mccormick.{suffix}" for suffix in ("mod", "dat", "osil", "qplib", "bar")]
+    for entry in read_manifest(manifest.path).document["files"]:
+        data = (tmp_path / "more" / entry["name"]).read_bytes()
+        assert entry["sha256"] == hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.parametrize("name", MORE)
+def test_compressed_files_hold_the_same_bytes(name: str, tmp_path: Path):
+    problem = problem_of("milp-mccormick gauge=strokes")
+    plain, packed = tmp_path / f"model.{name}", tmp_path / f"model.{name}.gz"
+    write(problem, plain)
+    for file in write(problem, packed).files:
+        assert file.endswith(".gz")
+        assert gzip.decompress((tmp_path / file).read_bytes()) == (tmp_path / file[:-3]).read_bytes()
+
+
+@for_each("name", MORE)
+@for_each("formulation", ["minlp-quartic", "miqcp-bilinear", "miqp-exact", "qp-fixed"])
+def test_no_record_is_lost_at_the_border_of_a_block(
+    formulation: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    problem = make_problem(formulation, make_instance("full"))
+    whole, parts = tmp_path / f"whole.{name}", tmp_path / f"parts.{name}"
+    files = write(problem, whole).files
+    monkeypatch.setattr(records, "BLOCK", 3)
+    write(problem, parts)
+    for file in files:
+        assert (tmp_path / file).read_bytes() == (tmp_path / file.replace("whole", "parts")).read_bytes()
+
+
+def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
+    chosen = ["minlp-quartic", "miqcp-bilinear", "milp-mccormick"]
+    code = (
+        "import sys; from crossfield.export.bundle.manifest import write_all; from crossfield.models.sketch.samples import sample\n"
+        f"write_all(sample('skew', 6), sys.argv[1], {chosen!r}, {MORE!r})"
+    )
+    here = tmp_path / "here"
+    write_all(sample("skew", 6), here, chosen, MORE)
+    environment = os.environ | {"PYTHONHASHSEED": "7"}
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "there")], check=True, env=environment)
+    files = sorted(path.name for path in here.iterdir())
+    assert len(files) == 1 + 3 * (1 + 5)
+    for name in files:
+        assert (here / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", MORE)
+def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
+    problem = make_problem("milp-mccormick", make_instance(w_beta=1e-12))
+    with pytest.raises(UnsupportedByFormatError, match="1e-12"):
+        write(problem, tmp_path / f"model.{name}")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.oracles
+def test_verify_hands_them_to_their_readers(tmp_path: Path):
+    """SCIP reads every .osil, GLPK the linear .mod; the others are refused as the table states. Nobody is handed .qplib or .bar."""
+    write_all(tiny(), tmp_path, formats=MORE)
+    found = verify(tmp_path, consumers=["scip", "glpk"], seconds=0.3)
+    assert found.bad == []
+    read = {(f.consumer, f.file.split(".", 1)[1]): f.verdict for f in found.findings if f.step == "read"}
+    if PROGRAMS["glpk"].present:
+        agrees = {
+            name for (consumer, name), verdict in read.items() if (consumer, verdict) == ("glpk", "agrees")
+        }
+        assert agrees == {"milp-mccormick.mod"}
+        assert read["glpk", "minlp-cubic.mod"] == Verdict.REFUSED
+        solved = [f for f in found.findings if (f.consumer, f.step) == ("glpk", "solve") and f.proven]
+        assert [f.file for f in solved] == ["small.milp-mccormick.mod"]
+    assert {name for consumer, name in read if consumer == "scip"} == {
+        f"{name}.osil" for name in FORMULATIONS
+    }
+    assert {verdict for (consumer, _), verdict in read.items() if consumer == "scip"} == {Verdict.AGREES}
+    assert not any(f.file.endswith((".qplib", ".bar", ".dat")) for f in found.findings)
+
+
+# AMPL
+
+
+def glpsol(*arguments: str | Path) -> str:
+    done = subprocess.run(["glpsol", *map(str, arguments)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def indexed(problem: Problem) -> Iterator[tuple[str, str, Any]]:
+    """Each block that is not empty: its name, its indices as data, and its columns."""
+    for block in filter(lambda block: block.count, problem.blocks.values()):
+        labels = names(problem)[0][block.columns]
+        places = [
+            re.sub(r"_0*(\d)", r" \1", label.removeprefix(block.name)).replace("_", " ") for label in labels
+        ]
+        yield block.name, places, range(block.offset, block.offset + block.count)
+
+
+def as_parameters(text: str) -> tuple[str, list[str]]:
+    """The model with its variables as parameters, printing `number value` for objective, rows and bounds; and what each number means."""
+    meaning = ["objective"]
+
+    def printed(what: str, domain: str, expression: str) -> str:
+        meaning.append(what)
+        return f'printf{domain}: "{len(meaning) - 1} %.17g\\n", {expression};\n'
+
+    def row(found: re.Match[str]) -> str:
+        tag, domain, left, sense, right = found.groups()
+        return printed(f"{tag} {sense}", domain, f"({left}) - ({right})")
+
+    def variable(found: re.Match[str]) -> str:
+        name, domain, attributes = found.groups()
+        ends.extend((name, domain, end[:2], end[3:]) for end in re.split(r", (?=[<>]=)|(?<=integer), ", attributes.strip()) if end[:1] in set("<>"))  # fmt: skip
+        return f"param {name}{domain};"
+
+    ends: list[tuple[str, str, str, str]] = []
+    text = re.sub(r"[ ]*#.*", "", text)
+    text = re.sub(r"^var (\w+)(\{[^}]*\})(.*);$", variable, text, flags=re.MULTILINE)
+    text = re.sub(
+        r"minimize energy:(.*?);\n", lambda m: f'printf "0 %.17g\\n", {m[1]};\n', text, flags=re.DOTALL
+    )
+    text = re.sub(r"subject to (\w+)(\{.*?\}):\s*(.*?) ([<>]?=) (.*?);\n", row, text, flags=re.DOTALL)
+    bounds = [printed(f"{sign} {name}", domain, end) for name, domain, sign, end in ends]
+    return text + "".join(bounds) + "end;\n", meaning
+
+
+def as_data(problem: Problem, point: Any) -> str:
+    """The values of all columns in the style of a .dat."""
+    blocks = (
+        f"param {name} :=\n" + "".join(f"{place} {point[at]:.17g}\n" for place, at in zip(places, columns, strict=True)) + ";\n"
+        for name, places, columns in indexed(problem)
+    )  # fmt: skip
+    return "".join(blocks) + "end;\n"
+
+
+@pytest.mark.needs("glpk")
+@for_each("label", FREE)
+def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Path):
+    """Bounds to the bit, and objective and rows at a random point, by GLPK's own translator."""
+    problem = problem_of(label)
+    text = written(problem, tmp_path / "model.mod")
+    integer = re.findall(r"^var (\w+)\{[^}]*\} integer", text, re.MULTILINE)
+    assert set(integer) == {block.name for block in problem.blocks.values() if block.integer and block.count}
+    text, meaning = as_parameters(text)
+    (tmp_path / "model.mod").write_text(text)
+    point = points_of(problem, 1)[0]
+    data = (tmp_path / "model.dat").read_text().removesuffix("end;\n") + as_data(problem, point)
+    (tmp_path / "model.dat").write_text(data)
+    out = glpsol("-m", tmp_path / "model.mod", "-d", tmp_path / "model.dat", "--check")
+    lines = re.findall(r"^(\d+) (\S+)$", out, re.MULTILINE)
+    found: dict[str, list[float]] = {what: [] for what in meaning}
+    for number, value in lines:
+        found[meaning[int(number)]].append(float(value))
+    assert_values(found.pop("objective"), [problem.objective_value(point)])
+    for family in problem.rows:
+        sense = family.family.sense.replace("==", "=")
+        assert_values(found.pop(f"{family.family.tag} {sense}"), family.values(point))
+    for block in problem.blocks.values():
+        for sign, ends in ((">=", block.lower), ("<=", block.upper)):
+            told = found.pop(
+                f"{sign} {block.name}", np.full(block.count, -np.inf if sign == ">=" else np.inf)
+            )
+            np.testing.assert_array_equal(told, ends)
+    assert found == {}
+
+
+@pytest.mark.needs("glpk")
+@for_each("label", LINEAR)
+def test_glpk_reads_the_linear_ampl_model_as_the_problem(
+    label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)  # where the consumer puts its files
+    problem = problem_of(label)
+    write(problem, tmp_path / "model.mod")
+    points = feasible_points(problem)
+    found = consumer_glpk.evaluate(tmp_path / "model.mod", points)
+    assert evaluation_difference(found, problem, points) == ""
+    assert found.integer.sum() == problem.integer.sum()
+
+
+@pytest.mark.needs("glpk")
+def test_an_answer_of_the_ampl_model_is_read_back(tmp_path: Path):
+    problem = make_problem(
+        "milp-mccormick", Instance("two", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 2.0], [1, 1])
+    )
+    text = written(problem, tmp_path / "model.mod")
+    printed = (
+        text[text.index("# printf") :]
+        .replace("# printf", "printf")
+        .replace("this.sol", str(tmp_path / "answer.sol"))
+    )
+    (tmp_path / "solved.mod").write_text(f"{text}\nsolve;\n{printed}end;\n")
+    out = glpsol("-m", tmp_path / "solved.mod", "-d", tmp_path / "model.dat")
+    assert "INTEGER OPTIMAL SOLUTION FOUND" in out
+    solution = read_solution(tmp_path / "answer.sol", problem)
+    assert solution.violation.worst < 1e-6
+    (claim,) = re.findall(r"^=obj= (\S+)$", (tmp_path / "answer.sol").read_text(), re.MULTILINE)
+    assert solution.objective == pytest.approx(float(claim), abs=1e-9)
+
+
+def test_the_ampl_model_grows_with_the_data_alone(tmp_path: Path):
+    small, large = (written(make_problem("miqp-exact", make_instance(shape)), tmp_path / f"{shape}.mod") for shape in ("column", "full"))  # fmt: skip
+    assert re.sub(r"sha256 \w+", "", small) == re.sub(r"sha256 \w+", "", large)
+    assert (tmp_path / "column.dat").stat().st_size < (tmp_path / "full.dat").stat().st_size
+
+
+@pytest.mark.parametrize("label", PINNED[:2])
+def test_the_ampl_model_refuses_fixed_integers(label: str, tmp_path: Path):
+    with pytest.raises(UnsupportedByFormatError, match="columns fixed one by one; write nl, lp or mps"):
+        write(problem_of(label), tmp_path / "model.mod")
+    assert list(tmp_path.iterdir()) == []
+
+
+# OSiL
+
+SPACE = {"": "os.optimizationservices.org"}
+
+
+def node_value(node: Any, point: Any) -> float:
+    """The value of a nonlinear expression, after the schema OSnL."""
+    inside = [node_value(child, point) for child in node]
+    match node.tag.split("}")[1]:
+        case "number":
+            return float(node.get("value"))
+        case "variable":
+            return float(node.get("coef", "1")) * point[int(node.get("idx"))]
+        case "sum":
+            return sum(inside)
+        case "product":
+            return float(np.prod(inside))
+        case "square":
+            return inside[0] ** 2
+        case "cos":
+            return cos(inside[0])
+        case other:
+            raise AssertionError(other)
+
+
+def bound(text: str) -> float:
+    return float(text.replace("INF", "inf"))
+
+
+def osil_model(path: Path) -> tuple[Meaning, Any, float]:
+    """What the XML says: coefficients, the nonlinear node or None, and the constant."""
+    root = Xml.parse(path).getroot()
+    data = root.find("instanceData", SPACE)
+
+    def all_of(where: str, count: str) -> list[Any]:
+        parent = data.find(where, SPACE)
+        if parent is None:
+            return []
+        assert int(parent.get(count)) == len(parent)
+        return list(parent)
+
+    variables = all_of("variables", "numberOfVariables")
+    rows = all_of("constraints", "numberOfConstraints")
+    (objective,) = all_of("objectives", "numberOfObjectives")
+    assert objective.get("maxOrMin") == "min"
+    assert int(objective.get("numberOfObjCoef")) == len(objective)
+    costs = np.zeros(len(variables))
+    costs[[int(coef.get("idx")) for coef in objective]] = [float(coef.text) for coef in objective]
+    products = all_of("quadraticCoefficients", "numberOfQuadraticTerms")
+    at = [[int(term.get(key)) for key in ("idx", "idxOne", "idxTwo")] for term in products]
+    squares = terms(at, [float(term.get("coef")) for term in products], indices=3, products=2)
+    goal = squares.at[:, 0] == -1
+    linear = data.find("linearConstraintCoefficients", SPACE)
+    matrix = None
+    if linear is not None:
+        start, columns, values = (
+            [float(el.text) for el in linear.find(key, SPACE)] for key in ("start", "colIdx", "value")
+        )
+        assert int(linear.get("numberOfValues")) == len(columns) == len(values) == start[-1]
+        row = np.repeat(np.arange(len(rows)), np.diff(start).astype(int))
+        matrix = terms(np.stack([row, np.array(columns, int)], axis=1), values, indices=2)
+    nonlinear = all_of("nonlinearExpressions", "numberOfNonlinearExpressions")
+    assert [nl.get("idx") for nl in nonlinear] in ([], ["-1"])
+    model = Meaning.of(
+        [v.get("name") for v in variables],
+        [r.get("name") for r in rows],
+        lower=[bound(v.get("lb")) for v in variables],
+        upper=[bound(v.get("ub")) for v in variables],
+        integer=[v.get("type") in {"B", "I"} for v in variables],
+        costs=costs,
+        row_lower=[bound(r.get("lb")) for r in rows],
+        row_upper=[bound(r.get("ub")) for r in rows],
+        quadratic=type(squares)(squares.at[goal, 1:], squares.value[goal]),
+        matrix=matrix,
+        row_quadratic=type(squares)(squares.at[~goal], squares.value[~goal]),
+    )
+    return model, nonlinear[0][0] if nonlinear else None, float(objective.get("constant"))
+
+
+def assert_means(model: Meaning, problem: Problem) -> None:
+    """Names, bounds, types and rows are the problem's to the bit; ONE and its row, which LP and MPS have, are not there."""
+    expected = of_problem(problem)
+    n, m = problem.columns, problem.row_count
+    assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
+    for name in ("lower", "upper", "integer"):
+        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name)[:n], err_msg=name)
+    for name in ("row_lower", "row_upper"):
+        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name)[:m], err_msg=name)
+    for name in ("matrix_at", "matrix", "row_quadratic_at", "row_quadratic") if m else ():
+        np.testing.assert_array_equal(getattr(model, name), getattr(expected, name), err_msg=name)
+    if problem.objective_degree <= 2:
+        np.testing.assert_array_equal(model.costs, expected.costs[:n])
+        np.testing.assert_array_equal(model.quadratic_at, expected.quadratic_at)
+        np.testing.assert_array_equal(model.quadratic, expected.quadratic)
+
+
+@for_each("label", CASES)
+def test_osil_says_what_the_problem_is(label: str, tmp_path: Path):
+    problem = problem_of(label)
+    write(problem, tmp_path / "model.osil")
+    model, nonlinear, constant = osil_model(tmp_path / "model.osil")
+    assert_means(model, problem)
+    assert (nonlinear is not None) == (problem.objective_degree > 2)
+    points = points_of(problem, 5)
+    values = model.objective(points) + constant
+    if nonlinear is not None:
+        values = values + [node_value(nonlinear, point) for point in points]
+    assert_values(values, values_at(problem, points)[0])
+
+
+@for_each("label", [f"{name} gauge=strokes" for name in FORMULATIONS] + [f"{name} shape=pixel" for name in ("minlp-parity", "milp-mccormick")])  # fmt: skip
+def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
+    problem = problem_of(label)
+    write(problem, tmp_path / "model.osil")
+    points = feasible_points(problem)
+    found = consumer_scip.evaluate(tmp_path / "model.osil", points)
+    assert evaluation_difference(found, problem, points) == ""
+    assert np.isfinite(found.objective[2:]).all()
+
+
+def test_scip_notices_a_wrong_osil(tmp_path: Path):
+    problem = problem_of("minlp-quartic gauge=strokes")
+    text = written(problem, tmp_path / "model.osil")
+    (tmp_path / "model.osil").write_text(text.replace('<number value="2"/>', '<number value="2.001"/>'))
+    points = feasible_points(problem)
+    assert "objective" in evaluation_difference(
+        consumer_scip.evaluate(tmp_path / "model.osil", points), problem, points
+    )
+
+
+def scip_optimum(path: Path) -> float:
+    import pyscipopt
+
+    scip = pyscipopt.Model()
+    scip.hideOutput()
+    scip.readProblem(str(path))
+    scip.setParam("limits/gap", 1e-4)
+    scip.setParam("limits/time", 10.0)
+    scip.optimize()
+    assert scip.getStatus() in {"optimal", "gaplimit"}
+    return float(scip.getObjVal())
+
+
+@for_each("formulation", FORMULATIONS)
+def test_scip_finds_the_same_optimum_from_osil_as_from_nl(formulation: str, tmp_path: Path):
+    problem = make_problem(formulation, tiny())
+    for name in ("osil", "nl"):
+        write(problem, tmp_path / f"model.{name}")
+    found, expected = (scip_optimum(tmp_path / f"model.{name}") for name in ("osil", "nl"))
+    assert expected > 0.01
+    assert found == pytest.approx(expected, rel=2e-4)
+
+
+# QPLIB
+
+
+def qplib_model(text: str) -> tuple[str, Meaning, float]:
+    """Type, coefficients and constant of a QPLIB file, read after qplib.zib.de/doc.html: x'Qx/2 with Q lower triangular."""
+    lines = iter([line.split("#")[0].split() for line in text.splitlines()])
+    first = lambda: next(lines)[0]  # noqa: E731
+    listed = lambda: [next(lines) for _ in range(int(first()))]  # noqa: E731
+
+    def vector(count: int) -> Any:
+        values = np.full(count, float(first()))
+        for index, value in listed():
+            values[int(index) - 1] = float(value)
+        return values
+
+    def products(indices: int) -> Any:
+        entries = listed()
+        at = np.array([[int(word) - 1 for word in entry[:-1]] for entry in entries]).reshape(-1, indices)
+        assert (at[:, -2] >= at[:, -1]).all()
+        assert len(np.unique(at, axis=0)) == len(at)
+        return terms(at, [float(entry[-1]) / 2 for entry in entries], indices=indices, products=2)
+
+    name, letters, sense, n = first(), first(), first(), int(first())
+    assert (name, sense) in {("tiny", "minimize"), ("small", "minimize")}
+    m = 0 if letters[2] in "NB" else int(first())
+    quadratic = None if letters[0] == "L" else products(2)
+    costs, constant = vector(n), float(first())
+    row_quadratic = products(3) if letters[2] in "DCQ" else None
+    entries = listed() if m else []
+    matrix = terms(
+        [[int(i) - 1, int(j) - 1] for i, j, _ in entries], [float(v) for *_, v in entries], indices=2
+    )
+    infinity = float(first())
+    finite = lambda values: np.where(np.abs(values) >= infinity, np.copysign(np.inf, values), values)  # noqa: E731
+    row_lower, row_upper = (finite(vector(m)), finite(vector(m))) if m else (np.zeros(0), np.zeros(0))
+    lower, upper = finite(vector(n)), finite(vector(n))
+    integer = vector(n) if letters[1] in "MG" else np.zeros(n)
+    starts = [vector(n), *([vector(m)] if m else []), vector(n)]
+    assert all((start == 0).all() for start in starts)
+    columns, rows = [[label for _, label in listed()] for _ in range(2)]
+    assert next(lines, None) is None
+    model = Meaning.of(
+        columns, rows, lower=lower, upper=upper, integer=integer == 1, costs=costs, row_lower=row_lower,
+        row_upper=row_upper, quadratic=quadratic, matrix=matrix, row_quadratic=row_quadratic,
+    )  # fmt: skip
+    return letters, model, constant
+
+
+@for_each("label", POLYNOMIAL)
+def test_qplib_says_what_the_problem_is(label: str, tmp_path: Path):
+    problem = held(label, "qplib")
+    letters, model, constant = qplib_model(written(problem_of(label), tmp_path / "model.qplib"))
+    assert_means(model, problem)
+    assert constant == problem.merged_objective(0)[1][0]
+    points = points_of(problem, 5)
+    assert_values(model.objective(points) + constant, values_at(problem, points)[0])
+    assert (letters[0] == "L") == (problem.objective_degree <= 1)
+    assert (letters[1] == "C") == (not problem.integer.any())
+    assert letters[2] == ("B" if not problem.rows else "Q" if problem.row_degree == 2 else "L")
+    if letters[0] in "DC":  # what is called convex is so
+        hessian = np.zeros((problem.columns, problem.columns))
+        np.add.at(hessian, tuple(model.quadratic_at.T), model.quadratic)
+        assert np.linalg.eigvalsh(hessian + hessian.T).min() > -1e-9
+
+
+KINDS = {
+    "minlp-quartic": "CGL", "minlp-cubic": "QGL", "miqcp-bilinear": "CGQ", "miqcp-bilinear-l1": "LGQ",
+    "miqp-mccormick": "CGL", "milp-mccormick": "LGL", "qp-fixed": "CCB", "miqp-exact": "CGL",
+}  # fmt: skip
+
+
+@for_each("formulation", KINDS)
+def test_qplib_types(formulation: str):
+    problem = carried(make_problem(formulation, make_instance("full")), FORMATS["qplib"])
+    assert probtype(problem) == KINDS[formulation]
+
+
+def without_names(text: str) -> str:
+    """The file with numbers for names, which is all that pyqplib takes."""
+    head = text[: text.index(" # names of variables")].rsplit("\n", 1)[0]
+    return head + "\n0\n0\n"
+
+
+@pytest.mark.needs("pyqplib")
+@for_each("label", [label for label in POLYNOMIAL if "gauge" in label or "pixel" in label])
+def test_pyqplib_reads_the_problem(label: str, tmp_path: Path):
+    import pyqplib
+
+    problem = held(label, "qplib")
+    (tmp_path / "model.qplib").write_text(without_names(written(problem_of(label), tmp_path / "model.qplib")))
+    found = pyqplib.read_problem(str(tmp_path / "model.qplib"))
+    low, high = limits(problem)
+    np.testing.assert_array_equal([found.var_lb, found.var_ub], [problem.lower, problem.upper])
+    np.testing.assert_array_equal([kind.name != "CONTINUOUS" for kind in found.var_types], problem.integer)
+    np.testing.assert_array_equal([found.cons_lb, found.cons_ub], [low, high])
+    points = points_of(problem, 5)
+    objective, rows = values_at(problem, points)
+    assert_values([found.obj_val(point) for point in points], objective)
+    assert_values([found.cons_val(point) for point in points], rows)
+
+
+@pytest.mark.parametrize("name", ["qplib", "bar"])
+def test_a_start_has_its_place(name: str, tmp_path: Path):
+    problem = make_problem("milp-mccormick", make_instance())
+    field = make_field(problem.instance)
+    point = problem.point(field)
+    text = written(problem, tmp_path / f"model.{name}", start=field)
+    labels = names(problem)[0]
+    if name == "bar":
+        found = dict(re.findall(r"(\w+): (\S+);", text[text.index("STARTING_POINT") :]))
+        assert {key: float(value) for key, value in found.items()} == dict(
+            zip(labels, point.tolist(), strict=True)
+        )
+        return
+    usual, count, *rest = text[: text.index("start of a row's dual")].split("# start, where not listed")
+    lines = (usual.rsplit("\n", 1)[1] + count).split("\n")
+    values = np.full(problem.columns, float(lines[0]))
+    for line in lines[2:-1]:
+        values[int(line.split()[0]) - 1] = float(line.split()[1])
+    assert rest == []
+    np.testing.assert_array_equal(values, point)
+
+
+# BARON
+
+
+def bar_model(text: str) -> dict[str, Any]:
+    """The sections of a .bar file: kinds of variables, bounds, rows and the objective as expressions in Python."""
+    text = re.sub(r"//.*", "", text)
+    found: dict[str, Any] = {"kind": {}, "rows": {}, "lower": {}, "upper": {}}
+    for keyword, listed in re.findall(r"^(\w*VARIABLES)\s([^;]*);", text, re.MULTILINE):
+        found["kind"] |= dict.fromkeys(re.split(r",\s*", listed.strip()), keyword)
+    for end in ("lower", "upper"):
+        body = re.search(rf"{end.upper()}_BOUNDS\s*{{(.*?)}}", text, re.DOTALL)
+        pairs = re.findall(r"(\w+): *(\S+?);", body[1]) if body else []
+        found[end] = {name: float(value) for name, value in pairs}
+    objective = re.search(r"OBJ: minimize(.*?);", text, re.DOTALL)
+    found["objective"] = python(objective[1])
+    equations = re.search(r"^EQUATIONS\s([^;]*);", text, re.MULTILINE)
+    body = text[text.index("EQUATIONS") : objective.start()] if equations else ""
+    for name, left, sense, right in re.findall(r"(\w+):\s([^;:]*?)(<=|>=|==)([^;]*);", body):
+        found["rows"][name] = (python(left), sense, float(right))
+    declared = re.split(r",\s*", equations[1].strip()) if equations else []
+    assert list(found["rows"]) == declared
+    return found
+
+
+def python(expression: str) -> Any:
+    return compile(" ".join(expression.replace("^", "**").split()), "bar", "eval")
+
+
+def evaluated(model: dict[str, Any], names: list[str], point: Any) -> tuple[float, dict[str, float]]:
+    """Objective, and rows with their right side moved to the left, turned so that they are `>= 0` or `== 0`."""
+    given = dict(zip(names, point.tolist(), strict=True))
+    signs = {"<=": -1.0}
+    rows = {
+        name: signs.get(sense, 1.0) * (eval(left, {}, given) - right)
+        for name, (left, sense, right) in model["rows"].items()
+    }
+    return eval(model["objective"], {}, given), rows
+
+
+@for_each("label", POLYNOMIAL)
+def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
+    problem = problem_of(label)
+    model = bar_model(written(problem, tmp_path / "model.bar"))
+    columns, rows = names(problem)
+    binary = np.concatenate(
+        [
+            np.full(b.count, b.integer and bool(((b.lower == 0) & (b.upper == 1)).all()))
+            for b in problem.blocks.values()
+        ]
+    )
+    kinds = np.where(binary, "BINARY_VARIABLES", np.where(problem.integer, "INTEGER_VARIABLES", "VARIABLES"))
+    assert model["kind"] == dict(zip(columns, kinds.tolist(), strict=True))
+    for end, bounds in (("lower", problem.lower), ("upper", problem.upper)):
+        told = np.isfinite(bounds) & ~binary
+        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(told)[0].tolist()}
+    assert list(model["rows"]) == rows
+    low, high = limits(problem)
+    senses = np.where(low == high, "==", np.where(np.isfinite(low), ">=", "<="))
+    assert [sense for _, sense, _ in model["rows"].values()] == senses.tolist()
+    for point in points_of(problem, 3):
+        objective, activities = evaluated(model, columns, point)
+        (expected,), (values,) = values_at(problem, point[None])
+        assert_values([objective], [expected])
+        sign = np.where(np.isfinite(low), 1, -1)
+        assert_values(list(activities.values()), sign * (values - np.where(np.isfinite(low), low, high)))
+    assert max(map(len, columns + rows)) <= 15
+
+
+@for_each("formulation", [name for name in FORMULATIONS if name != "minlp-parity"])
+def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
+    """Kinds, bounds, and at random points objective and rows; Pyomo bounds binaries too, and adds a column ONE_VAR_CONST__."""
+    from crossfield.export.formats.pyomo_model import to_pyomo
+
+    problem = make_problem(formulation, make_instance("row"))
+    ours = bar_model(written(problem, tmp_path / "model.bar"))
+    model = to_pyomo(problem)
+    _, key = model.write(str(tmp_path / "theirs.bar"), format="bar")
+    symbols = model.solutions.symbol_map[key].bySymbol
+    label = lambda part: re.sub(r"\[(\d+),(\d+),?(\w?)\]", lambda m: "_".join(["", m[1].zfill(2), m[2].zfill(2), *m[3]]), part.name)  # noqa: E731  # fmt: skip
+    known = {symbol: label(part) for symbol, part in symbols.items()}
+    text = re.sub(r"\w+", lambda m: known.get(m[0], m[0]), (tmp_path / "theirs.bar").read_text())
+    theirs = bar_model(re.sub(r"minimize\s+", "minimize ", text))
+    columns, rows = names(problem)
+    used = [name for name in columns if name in theirs["kind"]]
+    assert len(used) >= len(columns) - 2
+    merged = lambda found: {name: "VARIABLES" if found["kind"][name] == "POSITIVE_VARIABLES" else found["kind"][name] for name in used}  # noqa: E731  # fmt: skip
+    assert merged(theirs) == merged(ours)
+    for point in points_of(problem, 3):
+        mine, mine_rows = evaluated(ours, columns, point)
+        other, other_rows = evaluated(theirs, [*columns, "ONE_VAR_CONST__"], np.append(point, 1.0))
+        assert_values([mine], [other])
+        assert_values([mine_rows[name] for name in rows], [other_rows[name] for name in rows])
+
+
+BARON = importlib.util.find_spec("gamspy_baron")
+FITS = ["minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqp-mccormick", "miqp-exact", "qp-fixed"]
+"""What two pixels keep within BARON's free size: 10 columns, 10 rows, 50 nonlinear operations."""
+
+
+def by_baron(path: Path, problem: Problem) -> Any:
+    """What BARON, in its free edition of 10 columns and 10 rows, answers to the file."""
+    program = Path(BARON.submodule_search_locations[0]) / "baron"
+    done = subprocess.run([program, path.name], cwd=path.parent, capture_output=True, text=True, check=False)
+    assert "Normal completion" in done.stdout, done.stdout
+    return read_solution(path.parent / "res.lst", problem)
+
+
+@pytest.mark.needs("baron")
+@pytest.mark.parametrize("formulation", FITS)
+def test_baron_solves_its_file_to_the_optimum(formulation: str, tmp_path: Path):
+    """(9) takes BARON more than a minute as it stands, and nothing with its jumps fixed."""
+    problem = make_problem(formulation, tiny())
+    if formulation == "minlp-cubic":
+        problem = with_integers_fixed(problem, make_field(problem.instance))
+    write(problem, tmp_path / "model.bar")
+    solution = by_baron(tmp_path / "model.bar", problem)
+    write(problem, tmp_path / "model.nl")
+    assert solution.violation.worst < 1e-5
+    assert solution.objective == pytest.approx(scip_optimum(tmp_path / "model.nl"), rel=2e-4)
+
+
+@pytest.mark.needs("baron")
+@pytest.mark.parametrize("formulation", ["miqcp-bilinear-l1", "milp-mccormick"])
+def test_baron_takes_linear_files_of_one_pixel(formulation: str, tmp_path: Path):
+    pixel = Instance("small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], w_beta=1e-2, gauge="box")
+    problem = make_problem(formulation, pixel)
+    write(problem, tmp_path / "model.bar")
+    solution = by_baron(tmp_path / "model.bar", problem)
+    skew = 2.2 - np.pi / 2
+    assert solution.objective == pytest.approx(1e-2 * skew, abs=1e-6)

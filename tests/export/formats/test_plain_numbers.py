@@ -1,0 +1,76 @@
+"""Messages tell numbers as people write them, and advice that helps."""
+
+import re
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.bundle.manifest import write_all
+from crossfield.export.writing.records import check_coefficients
+from crossfield.models.errors import CrossfieldError, UnsupportedByFormatError
+
+ALL = ["nl", "gms", "lp", "mps", "mod", "osil", "qplib", "bar"]
+SCALAR = re.compile(r"np\.|\barray\(|dtype")
+"""What the representation of a NumPy number or array has and a plain number has not."""
+
+
+def one_stroke(theta=1.0, w=1.0, **given):
+    return cf.Instance("two", np.ones((1, 2), bool), [[0, 0]], [theta], [w], **given)
+
+
+def refusals(instance, folder):
+    """Why writers refuse what they refuse of an instance, but for what is beyond a format's degree."""
+    manifests = write_all(instance, folder, formats=ALL)
+    reasons = [reason for each in manifests for reason in each.document["refused"].values()]
+    return [reason for reason in reasons if "nothing beyond" not in reason]
+
+
+@pytest.mark.parametrize(
+    "given, better",
+    [
+        ({"theta": 2e-8, "w": 1e-3}, {"theta": 0.0, "w": 1e-3}),
+        ({"w_beta": 1e-11}, {"w_beta": 1e-8}),
+        ({"w_beta": 1e-11}, {"w_beta": 0.0}),
+    ],
+)
+def test_the_advice_of_a_writer_helps(given, better, tmp_path):
+    """A stroke that is nearly horizontal has a tiny cost whatever the weights: its direction is what can be changed."""
+    told = refusals(one_stroke(**given), tmp_path / "refused")
+    assert told
+    assert all(
+        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in told
+    )
+    assert not any(map(SCALAR.search, told))
+    assert refusals(one_stroke(**better), tmp_path / "written") == []
+
+
+def test_a_coefficient_is_told_as_a_plain_number():
+    with pytest.raises(UnsupportedByFormatError, match=r"coefficient 1e\+16; .* smaller$"):
+        check_coefficients(np.array([1.0, 1e16]), "a row")
+    with pytest.raises(UnsupportedByFormatError, match=r"coefficient 2e-12; .* exactly 0$"):
+        check_coefficients(np.float64(2e-12), "a row")
+
+
+def test_messages_about_numbers_of_numpy_are_plain():
+    """Values that come out of arrays, handed to everything that tells them."""
+    mask, one = np.ones((1, 2), bool), np.float64(1.0)
+    instance = one_stroke()
+    field = cf.greedy(instance)
+    wrong = [
+        lambda: one_stroke(w_beta=np.float64(-1.0)),
+        lambda: one_stroke(w_strokes=np.float64("nan")),
+        lambda: one_stroke(theta=np.float64("inf")),
+        lambda: one_stroke(w=np.float64(2.0)),
+        lambda: cf.Instance("two", mask, np.array([[0, 7]]), [one], [one]),
+        lambda: cf.Instance("two", mask, np.array([[0, 0]]), [one], [one], pixel_size=np.float64(0.0)),
+        lambda: cf.Instance("two", mask, np.array([[0, 0]]), [one, one], [one]),
+        lambda: cf.CrossField(instance, field.alpha[:1], field.beta, field.p),
+        lambda: cf.CrossField(instance, field.alpha * np.nan, field.beta, field.p),
+        lambda: cf.formulate(instance, "qp-fixed", p=field.p[:0]),
+        lambda: cf.formulate(instance, "milp-mccormick", stroke_norm=np.int64(3)),
+        lambda: cf.Limits(np.float64(-1.0), np.float64(0.0)),
+    ]
+    for act in wrong:
+        with pytest.raises(CrossfieldError) as told:
+            act()
+        assert not SCALAR.search(str(told.value)), str(told.value)

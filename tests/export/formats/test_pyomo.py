@@ -1,0 +1,175 @@
+"""The Pyomo model: the same problem again, and Pyomo's own writers as a second opinion on ours."""
+
+from __future__ import annotations
+
+import io
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyomo.environ as pyo
+import pytest
+from cases import CASES, LOW_DEGREE, make_field, make_instance, make_problem, names_of, points_of, problem_of
+from crossfield.export.formats.pyomo_model import to_pyomo
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.writing.names import column_names
+from crossfield.models.errors import InstanceError
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import Problem
+from loops import for_each
+from oracles import by_casadi, by_highs, by_scip
+from pyomo.repn.plugins.lp_writer import LPWriter
+from pyomo.repn.plugins.nl_writer import NLWriter
+
+
+def our_name(component) -> str:
+    """`p1[0,2,u]` as `p1_00_02_u`."""
+    place = component.index() if isinstance(component.index(), tuple) else (component.index(),)
+    return "_".join(
+        [component.parent_component().name, *(f"{i:02}" if isinstance(i, int) else i for i in place)]
+    )
+
+
+def columns_of(model, problem: Problem) -> list:
+    return [
+        variable for block in problem.blocks.values() for variable in model.component(block.name).values()
+    ]
+
+
+@for_each("label", [label for label in CASES if "far" not in label])
+def test_model_is_the_problem(label: str):
+    problem = problem_of(label)
+    model = to_pyomo(problem)
+    columns = columns_of(model, problem)
+    assert [our_name(variable) for variable in columns] == names_of(column_names(problem))
+    assert [-math.inf if v.lb is None else v.lb for v in columns] == problem.lower.tolist()
+    assert [math.inf if v.ub is None else v.ub for v in columns] == problem.upper.tolist()
+    assert [v.is_integer() for v in columns] == problem.integer.tolist()
+    assert all(
+        v.domain is pyo.Binary for v in columns if v.parent_component().name == "p1" and v.is_integer()
+    )
+    assert all(v.value is None for v in columns)
+    rows = list(model.component_data_objects(pyo.Constraint))
+    assert len(rows) == problem.row_count
+    for point in points_of(problem, 3):
+        for variable, value in zip(columns, point, strict=True):
+            variable.set_value(value, skip_validation=True)
+        assert pyo.value(model.obj) == pytest.approx(problem.objective_value(point), rel=1e-9, abs=1e-9)
+        for family in problem.rows:
+            component = model.component(family.family.tag)
+            value = family.values(point)
+            expected = {">=": value, "<=": -value, "==": -np.abs(value)}[family.family.sense]
+            np.testing.assert_allclose(
+                [row.slack() for row in component.values()], expected, rtol=1e-9, atol=1e-9
+            )
+            assert all(row.equality == (family.family.sense == "==") for row in component.values())
+
+
+@pytest.mark.parametrize(
+    "label",
+    [
+        "minlp-parity gauge=strokes",
+        "miqp-exact gauge=box",
+        "milp-mccormick gauge=strokes",
+        "qp-fixed gauge=box",
+    ],
+)
+def test_start_is_the_point_of_the_field(label: str):
+    problem = problem_of(label)
+    field = make_field(problem.instance)
+    model = to_pyomo(problem, start=field)
+    assert [variable.value for variable in columns_of(model, problem)] == problem.point(field).tolist()
+    assert pyo.value(model.obj) == pytest.approx(problem.objective_value(problem.point(field)), rel=1e-12)
+    for row in model.component_data_objects(pyo.Constraint):
+        assert row.lslack() > -1e-12
+        assert row.uslack() > -1e-12
+    with pytest.raises(InstanceError, match="not on 'tiny'"):
+        to_pyomo(problem, start=make_field(make_instance("row")))
+
+
+def test_components_read_like_the_paper():
+    model = to_pyomo(make_problem("miqcp-bilinear", make_instance("row", "box")))
+    assert str(model.c14[0, 0, "r"].expr) == (
+        "alpha[0,0] - alpha[0,1] + 1.5707963267948966*(p1[0,0,r] + 2*p2[0,0,r])  <=  s[0,0,r]"
+    )
+    assert sorted(model.component_map(pyo.Constraint)) == ["c14", "c15", "c16", "c17", "jlo"]
+    assert model.name == "tiny miqcp-bilinear"
+
+
+@for_each("label", CASES)
+def test_values_of_pyomos_nl_are_ours(label: str, tmp_path: Path):
+    problem = problem_of(label)
+    stream = io.StringIO()
+    model = to_pyomo(problem)  # the parts of the answer hold on to it weakly
+    info = NLWriter().write(model, stream, linear_presolve=False, scale_model=False)
+    (tmp_path / "model.nl").write_text(stream.getvalue())
+    read = by_casadi(tmp_path / "model.nl")
+    index = {name: place for place, name in enumerate(names_of(column_names(problem)))}
+    width = 3 if "far" in label else 2
+    order = [index[_wide(our_name(variable), width)] for variable in info.variables]
+    assert read.discrete.tolist() == problem.integer[order].tolist()
+    np.testing.assert_array_equal(read.lower, problem.lower[order])
+    np.testing.assert_array_equal(read.upper, problem.upper[order])
+    for point in points_of(problem):
+        objective, rows = read.evaluate(point[order])
+        assert objective == pytest.approx(problem.objective_value(point), rel=1e-9, abs=1e-9)
+        excess = np.concatenate(
+            [np.maximum(read.row_lower - rows, 0), np.maximum(rows - read.row_upper, 0)]
+        ).max(initial=0)
+        assert excess == pytest.approx(problem.violation(point).rows, rel=1e-9, abs=1e-9)
+
+
+def _wide(name: str, width: int) -> str:
+    return "_".join(part.zfill(width) if part.isdigit() else part for part in name.split("_"))
+
+
+@for_each("label", [label for label in LOW_DEGREE if "far" not in label and "pixel" not in label])
+def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
+    """As LP holds them, with products lifted; SCIP reads the bilinear rows, HiGHS the rest."""
+    problem = carried(problem_of(label), FORMATS["lp"])
+    stream = io.StringIO()
+    source = to_pyomo(problem)
+    info = LPWriter().write(source, stream, symbolic_solver_labels=True)
+    path = tmp_path / "model.lp"
+    path.write_text(stream.getvalue())
+    if problem.row_degree > 1:
+        path.write_text(stream.getvalue().replace(" ^ ", " ^"))  # SCIP takes no blank after the caret
+        model = by_scip(path)
+    else:
+        model = by_highs(path)
+    index = {name: place for place, name in enumerate(names_of(column_names(problem)))}
+    components = info.symbol_map.bySymbol.items()
+    symbols = {
+        symbol: index[our_name(part)]
+        for symbol, part in components
+        if part.ctype is pyo.Var and isinstance(part.index(), tuple)
+    }
+    chosen = [symbols.get(name) for name in model.columns]
+    assert [name for name, place in zip(model.columns, chosen, strict=True) if place is None] in (
+        [],
+        ["ONE_VAR_CONSTANT"],
+    )
+    for point in points_of(problem):
+        given = np.array([1.0 if place is None else point[place] for place in chosen])[None]
+        assert model.objective(given)[0] == pytest.approx(problem.objective_value(point), rel=1e-9, abs=1e-9)
+        rows = model.activities(given)[0]
+        own = np.array([not name.startswith("c_e_ONE") for name in model.rows], dtype=bool)
+        excess = np.maximum(np.maximum(model.row_lower - rows, rows - model.row_upper), 0)[own].max(initial=0)
+        assert excess == pytest.approx(problem.violation(point).rows, rel=1e-9, abs=1e-9)
+
+
+@for_each("name", FORMULATIONS)
+def test_one_pixel_has_empty_components(name: str):
+    problem = make_problem(name, make_instance("pixel"))
+    model = to_pyomo(problem)
+    assert len(columns_of(model, problem)) == problem.columns
+
+
+def test_pyomo_is_imported_for_this_alone():
+    """The rest of the package starts fast, and works where Pyomo is absent."""
+    wanted = "writing.names, formats.registry, formats.nl, formats.lp, formats.mps, formats.gams_scalar, bundle.manifest, solving.local"
+    imports = ", ".join(f"crossfield.export.{name}" for name in wanted.split(", "))
+    script = f"import sys; sys.modules['pyomo'] = None; import {imports}"
+    subprocess.run([sys.executable, "-c", script], check=True)

@@ -1,0 +1,551 @@
+"""The standalone checker: against our own evaluation, against real solvers, against calculation by hand,
+and bad input.
+"""
+
+import ast
+import gzip
+import json
+import math
+import subprocess
+import sys
+import tracemalloc
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import places
+import pytest
+from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, problem_of
+from crossfield.export.formats.registry import FORMATS, carried, write
+from crossfield.export.library.documents import check_point
+from crossfield.export.library.documents.check_point import BadInputError, check
+from crossfield.export.writing.names import column_names
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate
+from crossfield.models.instance.file import write_instance
+from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.samples import sample
+from loops import for_each
+
+SOLUTIONS = places.SOLUTIONS / "tiny"
+SCRIPT = Path(check_point.__file__)
+
+
+def save_point(path, problem, point, *, zeros=True):
+    """A list of names and values as any program might write it."""
+    pairs = zip(names_of(column_names(problem)), point.tolist(), strict=True)
+    path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs if zeros or value != 0))
+    return str(path)
+
+
+def run(*arguments):
+    """The checker as users run it, without any installed package."""
+    command = [sys.executable, "-I", "-S", str(SCRIPT), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def called(capsys, *arguments):
+    """Exit code and output of the checker in this process."""
+    code = check_point.main(list(map(str, arguments)))
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def label(finding, name):
+    return dict(finding.lines)[name]
+
+
+# against our own evaluation
+
+
+@for_each("case", LOW_DEGREE)
+def test_objective_and_violations_are_those_of_the_problem(case, tmp_path):
+    problem = carried(problem_of(case), FORMATS["mps"])
+    write(problem_of(case), tmp_path / "m.mps.gz")
+    for point in points_of(problem, count=2):
+        found = check(str(tmp_path / "m.mps.gz"), save_point(tmp_path / "p.sol", problem, point))
+        ours, objective = problem.violation(point), problem.objective_value(point)
+        assert float(found.objective) == pytest.approx(objective, rel=1e-11, abs=1e-11)
+        for kind, value in (("bounds", ours.bounds), ("rows", ours.rows), ("integers", ours.integrality)):
+            assert float(found.violations[kind][0]) == pytest.approx(value, rel=1e-11, abs=1e-11)
+
+
+@for_each("name", [name for name in FORMULATIONS if name != "minlp-parity"])
+def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, tmp_path):
+    field = make_field(make_instance("full"))
+    whole = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
+    problem = carried(whole, FORMATS["mps"])
+    write(whole, tmp_path / "m.mps")
+    found = check(
+        str(tmp_path / "m.mps"),
+        save_point(tmp_path / "p.sol", problem, problem.point(field), zeros=False),
+    )
+    assert found.worst < 1e-14
+    norm = 2 if problem.formulation.objective[0].expression.free_symbols and "l1" not in name else 1
+    if name in {"minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed"}:
+        assert float(label(found, "objective")) == pytest.approx(field.energy(norm).total, rel=1e-12)
+    if name in {"milp-mccormick", "miqcp-bilinear-l1"}:
+        assert float(label(found, "objective")) == pytest.approx(field.energy(1).total, rel=1e-12)
+
+
+@for_each("gauge", ["strokes", "box"])
+@for_each("shape", ["full", "parts", "far", "pixel"])
+def test_energies_of_an_instance_are_those_of_its_field(gauge, shape, tmp_path):
+    field = make_field(make_instance(shape, gauge))
+    write_instance(field.instance, tmp_path / "i.json")
+    for name in ("minlp-parity", "milp-mccormick"):
+        problem = formulate(field.instance, name)
+        found = check(str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, problem.point(field)))
+        said = [float(text.split()[0]) for kind, text in found.lines if kind in {"2-norm", "", "1-norm"}]
+        expected = [field.energy().total] * 2 + [
+            field.with_best_jumps().energy().total,
+            field.energy(1).total,
+        ]
+        assert said == pytest.approx(expected, rel=1e-12, abs=1e-12)
+        assert found.worst < 1e-15
+
+
+@pytest.mark.parametrize(
+    "block, by, kind",
+    [("alpha", 2.0, "bounds"), ("beta", 2.0, "bounds"), ("p1", 0.25, "integers"), ("p2", 5.0, "bounds")],
+)
+def test_what_breaks_an_instance_is_found_there(block, by, kind, tmp_path):
+    field = make_field(make_instance("full"))
+    problem = formulate(field.instance, "minlp-quartic")
+    write_instance(field.instance, tmp_path / "i.json")
+    point = problem.point(field)
+    point[problem.blocks[block].offset] += by
+    found = check(str(tmp_path / "i.json"), save_point(tmp_path / "p.sol", problem, point))
+    worst, place = found.violations[kind]
+    assert worst > 0.1
+    assert place.endswith(names_of(column_names(problem))[problem.blocks[block].offset].split("_", 1)[1])
+
+
+def test_integers_that_are_not_quite_whole_count_as_they_are_or_rounded(tmp_path):
+    field = make_field(make_instance("full"))
+    problem = formulate(field.instance, "miqp-exact")
+    write(problem, tmp_path / "m.mps")
+    write_instance(field.instance, tmp_path / "i.json")
+    exact, point = problem.point(field), problem.point(field)
+    point[problem.integer] += 1e-6
+    file = save_point(tmp_path / "p.sol", problem, point)
+    assert float(check(str(tmp_path / "m.mps"), file).violations["integers"][0]) == pytest.approx(1e-6)
+    rounded = check(str(tmp_path / "m.mps"), file, rounded=True)
+    assert rounded.worst < 1e-14
+    assert float(label(rounded, "objective")) == pytest.approx(problem.objective_value(exact), rel=1e-14)
+    quartic = formulate(field.instance, "minlp-quartic")
+    changed = np.concatenate([point[problem.blocks[name].columns] for name in quartic.blocks])
+    found = check(str(tmp_path / "i.json"), file)
+    given, whole = (
+        float(text.split()[0])
+        for kind, text in found.lines
+        if kind == "2-norm" or (not kind and text.endswith("rounded"))
+    )
+    assert given == pytest.approx(quartic.objective_value(changed), rel=1e-12)
+    assert whole == pytest.approx(field.energy().total, rel=1e-12)
+    assert given != whole
+
+
+# against real solvers
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "gurobi-13.0.3_milp_optimal.sol",
+        "gurobi-13.0.3_qp_optimal.sol",
+        "gurobi-13.0.3_quartic_optimal.sol",
+        "scip-10.0_milp_optimal.sol",
+        "scip-10.0_qp_optimal.sol",
+        "scip-10.0_milp_zeros_without_status.sol",
+        "miplib-by-layout_milp_optimal.sol",
+    ],
+)
+def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_path):
+    tiny = Instance(
+        "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
+        np.array([1.0, 0.75, 0.5]), w_strokes=1.5, w_beta=1e-3, gauge="strokes",
+    )  # fmt: skip
+    kind = file.split("_")[1]
+    name = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[kind]
+    write(formulate(tiny, name, p=np.array([0, 0, -1, 0]) if kind == "qp" else None), tmp_path / "m.mps")
+    found = check(str(tmp_path / "m.mps"), str(SOLUTIONS / file))
+    assert found.worst < 1e-5
+    assert float(label(found, "claimed").rsplit(" ", 1)[1].rstrip(")")) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["milp-mccormick", "qp-fixed"])
+def test_highs_says_the_same_of_its_own_point(name, tmp_path):
+    highspy = pytest.importorskip("highspy")
+    field = make_field(make_instance("row"))
+    write(formulate(field.instance, name, p=field.p if name == "qp-fixed" else None), tmp_path / "m.mps")
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(tmp_path / "m.mps"))
+    highs.run()
+    values = zip(highs.getLp().col_names_, highs.getSolution().col_value, strict=True)
+    (tmp_path / "p.sol").write_text("".join(f"{column} {value!r}\n" for column, value in values))
+    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p.sol"))
+    assert found.worst < 1e-6
+    said = highs.getInfo().objective_function_value
+    assert float(label(found, "objective")) == pytest.approx(said, rel=1e-12, abs=1e-12)
+
+
+BOUNDS = [
+    "",
+    "UP B x 4",
+    "UP B x 0",
+    "LO B x -2",
+    "LO B x -2\n UP B x 7.5",
+    "MI B x\n UP B x -3",
+    "FR B x",
+    "FX B x 2.5",
+    "PL B x",
+    "LO B x 1\n PL B x",
+    "MI B x",
+    "BV B x",
+    "LI B x 2",
+    "UI B x 9",
+    "LI B x -4\n UI B x 4",
+    "LO B x -1e30",
+    "UP B x inf",
+]
+
+
+@for_each("integer", [False, True])
+@for_each("bounds", BOUNDS)
+def test_bounds_mean_what_they_mean_to_highs(bounds, integer, tmp_path):
+    highspy = pytest.importorskip("highspy")
+    open_, close = (" M1 'MARKER' 'INTORG'\n", " M2 'MARKER' 'INTEND'\n") if integer else ("", "")
+    (tmp_path / "m.mps").write_text(
+        f"NAME m\nROWS\n N obj\n L c\nCOLUMNS\n{open_} x obj 1 c 1\n{close}RHS\nBOUNDS\n {bounds}\nENDATA\n"
+    )
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    assert highs.readModel(str(tmp_path / "m.mps")) == highspy.HighsStatus.kOk
+    lp = highs.getLp()
+    (column,) = check_point.MpsReader().read(check_point.lines_of(str(tmp_path / "m.mps"))).columns
+    lower = -math.inf if column.lower is None else float(column.lower)
+    upper = math.inf if column.upper is None else float(column.upper)
+    assert (lower, upper) == (lp.col_lower_[0], lp.col_upper_[0])
+    assert column.integer == bool(
+        len(lp.integrality_) and lp.integrality_[0] == highspy.HighsVarType.kInteger
+    )
+
+
+@pytest.mark.parametrize("sense", ["L", "G", "E"])
+@pytest.mark.parametrize("length", [3, -3])
+def test_ranges_mean_what_they_mean_to_highs(sense, length, tmp_path):
+    highspy = pytest.importorskip("highspy")
+    (tmp_path / "m.mps").write_text(
+        f"NAME m\nROWS\n N obj\n {sense} c\nCOLUMNS\n x obj 1 c 1\nRHS\n R c 2\nRANGES\n G c "
+        f"{length}\nBOUNDS\n FR B x\nENDATA\n"
+    )
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    assert highs.readModel(str(tmp_path / "m.mps")) == highspy.HighsStatus.kOk
+    row = check_point.MpsReader().read(check_point.lines_of(str(tmp_path / "m.mps"))).rows["c"]
+    assert tuple(map(float, row.interval())) == (highs.getLp().row_lower_[0], highs.getLp().row_upper_[0])
+
+
+# by hand
+
+
+PAIR = {
+    "format": "crossfield-instance", "version": 1, "name": "pair", "mask": ["##"],
+    "w_strokes": 2.0, "w_beta": 0.5, "strokes": [[0, 0, 0.0, 0.25]],
+}  # fmt: skip
+BY_HAND = "alpha_00_00 0.1\nalpha_00_01 0.3\nbeta_00_00 0.2\nbeta_00_01 -0.1\np1_00_00_r 1\np2_00_00_r -1\n"
+
+
+def test_two_pixels_by_hand(tmp_path):
+    """A = 0.1 - 0.3 - pi/2, B = -0.2 + 0.1, R = 0.1 + 0.2; weights 2 (pair), 2 x 0.25 (stroke),
+    0.5 (skew).
+    """
+    (tmp_path / "i.json").write_text(json.dumps(PAIR))
+    (tmp_path / "p.sol").write_text(BY_HAND)
+    found = check(str(tmp_path / "i.json"), str(tmp_path / "p.sol"))
+    squares = 2 * ((0.2 + math.pi / 2) ** 2 + 0.01) + 0.5 * 0.09 + 0.5 * 0.05
+    absolute = 2 * (0.2 + math.pi / 2 + 0.1) + 0.5 * 0.3 + 0.5 * 0.3
+    assert float(label(found, "2-norm").split()[0]) == pytest.approx(squares, rel=1e-15)
+    assert float(label(found, "1-norm").split()[0]) == pytest.approx(absolute, rel=1e-15)
+    assert found.worst == 0
+
+
+EVERYTHING = """* every section
+NAME everything
+OBJSENSE
+    MAX
+ROWS
+ N obj
+ N spare
+ L c1
+ E c2
+COLUMNS
+ x obj 0.1 c1 1
+ x spare 5
+ M1 'MARKER' 'INTORG'
+ k obj -3 c2 1
+ M2 'MARKER' 'INTEND'
+ y c1 0.2
+RHS
+ R obj -7 c1 1
+ R c2 2
+BOUNDS
+ UP B x 10
+ UP B k 9
+ FR B y
+QUADOBJ
+ x x 4
+ x y 0.5
+QCMATRIX c1
+ x x 1
+ x y 0.25
+ y x 0.25
+ENDATA
+"""
+
+
+def test_every_section_by_hand_with_the_exact_fraction(tmp_path, capsys):
+    """At x = 0.5, k = 2.25, y = -0.1: 0.05 - 6.75 + 7 + 2/4 - 0.5/20 = 0.775;
+    c1 = 0.5 - 0.02 + 0.25 - 0.025 = 0.705.
+    """
+    (tmp_path / "m.mps").write_text(EVERYTHING)
+    (tmp_path / "p.sol").write_text("=obj= 0.775\nx 0.5\nk 2.25\ny -0.1\n")
+    code, out, err = called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--fraction")
+    lines = dict(line.split(None, 1) for line in out.splitlines() if " " in line)
+    assert code == 1
+    assert not err
+    assert lines["objective"] == "0.775 (maximised)"
+    assert lines["fraction"] == "31/40"
+    assert lines["claimed"] == "0.775 (differs by 0)"
+    assert lines["rows"] == "0.25 at c2"
+    assert lines["integers"] == "0.25 at k"
+    assert lines["bounds"] == "0"
+    assert "NOT feasible" in out
+    assert called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--tolerance", "0.25")[0] == 0
+    assert called(capsys, tmp_path / "m.mps", tmp_path / "p.sol", "--round")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "section, entries, value",
+    [
+        ("QUADOBJ", "x x 4\n y x 3", 2 * 4 + 3 * 6),
+        ("QSECTION obj", "x x 4\n y x 3", 2 * 4 + 3 * 6),
+        ("QMATRIX", "x x 4\n y x 3\n x y 3", 2 * 4 + 3 * 6),
+        ("QCMATRIX obj", "x x 4\n y x 3\n x y 3", 4 * 4 + 2 * 3 * 6),
+    ],
+)
+def test_quadratic_sections_differ_in_triangles_and_one_half(section, entries, value, tmp_path):
+    (tmp_path / "m.mps").write_text(
+        f"NAME q\nROWS\n N obj\nCOLUMNS\n x obj 0\n y obj 0\nRHS\nBOUNDS\n{section}\n {entries}\nENDATA\n"
+    )
+    (tmp_path / "p").write_text("x 2\ny 3\n")
+    assert check(str(tmp_path / "m.mps"), str(tmp_path / "p")).objective == value
+
+
+def linear(entries="x obj 1 c 1", bounds="FR B x", extra=""):
+    return f"NAME m\nROWS\n N obj\n L c\nCOLUMNS\n {entries}\nRHS\n R c 1\nBOUNDS\n {bounds}\n{extra}ENDATA\n"
+
+
+def test_nothing_is_lost_to_rounding(tmp_path):
+    """1e16 + 1 - 1e16 is 1, and a row that is broken by 1e-40 is broken."""
+    (tmp_path / "m.mps").write_text(linear("x obj 1e16 c 1\n y obj 1\n z obj -1e16"))
+    (tmp_path / "p").write_text("x 1.0000000000000000000000000000000000000001\ny 1\nz 1\n")
+    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
+    assert Fraction(found.objective) == 1 + Fraction(10**16, 10**40)
+    assert Fraction(found.violations["rows"][0]) == Fraction(1, 10**40)
+
+
+def test_the_tolerance_is_met_exactly(tmp_path, capsys):
+    (tmp_path / "m.mps").write_text(linear())
+    for value, code in (("1.00000001", 0), ("1.0000000100000000000000000001", 1)):
+        (tmp_path / "p").write_text(f"x {value}\n")
+        assert called(capsys, tmp_path / "m.mps", tmp_path / "p")[0] == code
+
+
+def test_columns_left_out_are_zero_or_what_they_are_fixed_to_and_those_that_solvers_add_are_passed_over(
+    tmp_path,
+):
+    (tmp_path / "m.mps").write_text(linear("x obj 1 c 1\n ONE obj 2.5", "FR B x\n FX B ONE 1"))
+    (tmp_path / "p").write_text("nlobjvar 17\n")
+    found = check(str(tmp_path / "m.mps"), str(tmp_path / "p"))
+    assert label(found, "objective") == "2.5"
+    assert label(found, "point") == "0 values, 2 columns left out, 1 that a solver added passed over"
+    assert found.worst == 0
+
+
+# as a program
+
+
+def test_it_needs_nothing_but_python(tmp_path):
+    write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
+    problem = problem_of("milp-mccormick gauge=strokes")
+    field = make_field(problem.instance)
+    save_point(tmp_path / "p.sol", problem, problem.point(field))
+    (tmp_path / "p.sol.gz").write_bytes(gzip.compress((tmp_path / "p.sol").read_bytes()))
+    write_instance(problem.instance, tmp_path / "i.json")
+    for model in ("m.mps.gz", "i.json"):
+        for point in ("p.sol", "p.sol.gz"):
+            done = run(tmp_path / model, tmp_path / point)
+            assert (done.returncode, done.stderr) == (0, "")
+            assert done.stdout.endswith("feasible within 1e-08\n")
+
+
+def test_it_is_one_file_for_python_3_9_with_the_standard_library_alone():
+    tree = ast.parse(SCRIPT.read_text(), feature_version=(3, 9))
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            names.add(node.module.split(".")[0])
+    assert names <= set(sys.stdlib_module_names)
+    called_names = {
+        node.func.id
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    assert not called_names & {"eval", "exec", "compile", "__import__"}
+
+
+def test_a_grid_of_32_by_32_is_checked(tmp_path):
+    instance = sample("mouse", 32)
+    problem = formulate(instance, "milp-mccormick")
+    write(problem, tmp_path / "m.mps.gz")
+    point = save_point(tmp_path / "p.sol", problem, problem.point(make_field(instance)))
+    assert check(str(tmp_path / "m.mps.gz"), point).worst < 1e-14
+
+
+# bad input
+
+GOOD_POINT = "x 1\n"
+BAD_MODELS = {
+    "cut off": linear()[:-7],
+    "empty": "",
+    "no objective": "NAME m\nROWS\n L c\nCOLUMNS\n x c 1\nENDATA\n",
+    "no MPS": "Minimize\n obj: x\nEnd\n",
+    "an unknown section": linear(extra="SOS\n S1 s1\n"),
+    "an unknown row": linear("x obj 1 d 1"),
+    "an unknown column": linear(bounds="FR B y"),
+    "an unknown bound": linear(bounds="SC B x 4"),
+    "a bound without a value": linear(bounds="UP x"),
+    "two bounds": linear(bounds="UP B x 4\n UP B x 5"),
+    "an ambiguous bound": linear(bounds="UP B x -4"),
+    "an impossible bound": linear(bounds="LO B x inf"),
+    "an entry twice": linear("x obj 1 c 1\n x c 1"),
+    "a column in two places": linear("x obj 1\n y obj 1\n x c 1"),
+    "a right side twice": linear().replace(" R c 1", " R c 1\n R c 2"),
+    "a word for a number": linear("x obj one"),
+    "not a number": linear("x obj nan"),
+    "an endless number": linear("x obj 1e999999999"),
+    "a missing number": linear("x obj"),
+    "an unknown marker": linear("M 'MARKER' 'INTBEG'"),
+    "both triangles in QUADOBJ": linear("x obj 1\n y obj 1", extra="QUADOBJ\n x y 1\n y x 1\n"),
+    "one triangle in QCMATRIX": linear("x obj 1\n y obj 1", extra="QCMATRIX c\n x y 1\n"),
+    "a matrix entry twice": linear("x obj 1\n y obj 1", extra="QUADOBJ\n x x 1\n x x 1\n"),
+    "a row twice": linear().replace(" L c\n", " L c\n G c\n"),
+    "an unknown sense": linear().replace(" L c\n", " X c\n"),
+    "an unknown direction": linear().replace("ROWS", "OBJSENSE\n UPWARDS\nROWS", 1),
+    "no text": "NAME \udcff\udcfe\n",
+    "other JSON": "{}",
+    "damaged JSON": '{"format": ',
+    "deep JSON": '{"a":' + "[" * 100_000,
+    "a JSON with infinity": json.dumps(PAIR | {"w_beta": math.inf}),
+    "a stroke outside": json.dumps(PAIR | {"strokes": [[4, 0, 0.0, 1.0]]}),
+    "a mask of another kind": json.dumps(PAIR | {"mask": 3}),
+    "a long number in JSON": json.dumps(PAIR).replace("0.25", "9" * 5000),
+}
+BAD_POINTS = {
+    "foreign names": "x 1\nq 2\n",
+    "a name twice": "x 1\nx 2\n",
+    "three words": "x 1 2\n",
+    "a word for a value": "x one\n",
+    "infinite": "x inf\n",
+    "an endless value": "x 1e999999999\n",
+    "without a point": "=infeas=\n",
+    "binary": "\udcff\udcfe\udc80",
+}
+
+
+def refused(capsys, *arguments):
+    code, out, err = called(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("check_point: ")
+    assert err.count("\n") == 1
+    assert len(err) < 600
+    return err
+
+
+@for_each("what", BAD_MODELS)
+def test_bad_models_are_one_line(what, tmp_path, capsys):
+    (tmp_path / "m.mps").write_text(BAD_MODELS[what], errors="surrogateescape")
+    (tmp_path / "p").write_text(GOOD_POINT)
+    assert "m.mps: " in refused(capsys, tmp_path / "m.mps", tmp_path / "p")
+
+
+@for_each("what", BAD_POINTS)
+def test_bad_points_are_one_line(what, tmp_path, capsys):
+    (tmp_path / "m.mps").write_text(linear())
+    (tmp_path / "p").write_text(BAD_POINTS[what], errors="surrogateescape")
+    refused(capsys, tmp_path / "m.mps", tmp_path / "p")
+
+
+def test_the_good_ones_are_good(tmp_path):
+    """So that none of the bad ones is refused for another reason."""
+    (tmp_path / "p").write_text(GOOD_POINT)
+    for model in (linear(), json.dumps(PAIR)):
+        (tmp_path / "m").write_text(model)
+        (tmp_path / "p").write_text(GOOD_POINT if model[0] == "N" else BY_HAND)
+        assert check(str(tmp_path / "m"), str(tmp_path / "p")).worst == 0
+
+
+@for_each(
+    "arguments",
+    [
+        (),
+        ("m",),
+        ("m", "p", "q"),
+        ("m", "p", "--tolerance", "x"),
+        ("m", "p", "--tolerance", "-1"),
+        ("m", "p", "--nothing"),
+        ("absent", "p"),
+        (".", "p"),
+    ],
+)
+def test_wrong_usage_is_one_line(arguments, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m").write_text(linear())
+    (tmp_path / "p").write_text(GOOD_POINT)
+    refused(capsys, *arguments)
+
+
+@pytest.mark.parametrize("place", [0.5, 0.99])
+def test_a_packed_file_that_is_cut_off_is_refused(place, tmp_path, capsys):
+    write(problem_of("milp-mccormick gauge=strokes"), tmp_path / "m.mps.gz")
+    data = (tmp_path / "m.mps.gz").read_bytes()
+    (tmp_path / "m.mps.gz").write_bytes(data[: int(len(data) * place)])
+    (tmp_path / "p").write_text("x 0\n")
+    assert "damaged or cut off" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
+
+
+def test_a_packed_file_that_grows_without_end_is_refused_before_it_is_unpacked(tmp_path, capsys):
+    (tmp_path / "m.mps.gz").write_bytes(gzip.compress(b"\0" * (1 << 27)))
+    (tmp_path / "p").write_text("x 0\n")
+    tracemalloc.start()
+    assert "unreasonably long" in refused(capsys, tmp_path / "m.mps.gz", tmp_path / "p")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 8 << 20
+
+
+def test_a_point_of_another_instance_is_named_as_such(tmp_path):
+    one, other = make_field(make_instance("full")), make_field(make_instance("row"))
+    problem, foreign = (formulate(field.instance, "minlp-quartic") for field in (one, other))
+    write(problem, tmp_path / "m.mps")
+    write_instance(one.instance, tmp_path / "i.json")
+    point = save_point(tmp_path / "p", foreign, foreign.point(other))
+    for model in ("m.mps", "i.json"):
+        with pytest.raises(BadInputError, match="another instance or formulation"):
+            check(str(tmp_path / model), point)

@@ -1,0 +1,836 @@
+"""The instance library: what a build makes of a specification, that it is true,
+and that it is the same however it is made.
+"""
+
+import gzip
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import casadi
+import highspy
+import jsonschema
+import numpy as np
+import places
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.library.building.build import build, rebuild
+from crossfield.export.library.contributions.solve import solve_library
+from crossfield.export.library.documents.documents import problem_of, read_library
+from crossfield.export.library.documents.statistics import tangent_bound
+from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
+from crossfield.export.library.ledger.points import complete_point, field_of
+from crossfield.export.library.ledger.search_1norm import better_in_1norm
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.sources import instance_from
+from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.export.solutions.solution import read_solution
+from crossfield.export.solving.job import Limits
+from crossfield.export.solving.local import solve
+from crossfield.models.errors import CrossfieldError, InputError
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.file import read_field
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate, with_integers_fixed
+from crossfield.models.instance.file import read_instance
+from crossfield.models.search.greedy import greedy
+from crossfield.models.sketch.samples import sample, sample_svg
+from loops import for_each
+from scipy import ndimage
+
+SCHEMAS = places.ROOT / "export" / "library" / "documents"
+
+HEAD = """format = "crossfield-library-spec"
+version = 1
+title = "a library for tests"
+"""
+SPEC = (
+    HEAD
+    + """
+[rungs.tiny]
+sizes = [4]
+formats = ["nl", "gms", "lp", "mps"]
+gauges = ["strokes", "box"]
+facets = ["hull", "printed"]
+
+[rungs.medium]
+sizes = [6]
+formats = ["nl", "mps"]
+compress = true
+
+[[sketches]]
+name = "own"
+file = "drawn by hand.svg"
+rungs = ["tiny"]
+
+[[sketches]]
+name = "rand"
+random = "ragged"
+seeds = [2]
+rungs = ["medium"]
+"""
+)
+
+
+def write_spec(folder, text=SPEC):
+    """A specification in a folder, beside the drawing that it names."""
+    (folder / "drawn by hand.svg").write_text(sample_svg("mouse"))
+    path = folder / "spec.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory):
+    return write_spec(tmp_path_factory.mktemp("spec"))
+
+
+@pytest.fixture(scope="module")
+def built(spec, tmp_path_factory):
+    """The library of the specification, built in this process; nobody may change it."""
+    return build(read_spec(spec), tmp_path_factory.mktemp("built") / "library")
+
+
+@pytest.fixture
+def copy(built, tmp_path):
+    """A copy that a test may change."""
+    shutil.copytree(built.folder, tmp_path / "library")
+    return tmp_path / "library"
+
+
+def content(folder):
+    """All files of a folder, hidden ones too."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def by_formulation(library, instance, facet="hull"):
+    return {
+        each["formulation"]: each
+        for each in library.entries
+        if each["instance"]["file"] == f"{instance}.instance.json" and each["options"]["facet"] == facet
+    }
+
+
+# The specification
+
+
+def test_the_shipped_specification_is_a_ladder_of_every_sample(tmp_path):
+    spec = default_spec()
+    entries = [entry.name for each in plan(spec) for entry in each.entries]
+    assert len(entries) == len(set(entries)) > 8 * 4 * 8
+    assert all(re.fullmatch(r"cf_[a-z0-9_]{1,29}", name) for name in entries)
+    assert [rung.name for rung in spec.rungs] == ["tiny", "small", "medium", "large"]
+    assert len({each.what for each in spec.sketches if each.kind == "sample"}) == 10
+    assert {name for rung in spec.rungs for name in rung.formats} >= {"nl", "gms", "lp", "mps"}
+    assert spec.formulations == tuple(FORMULATIONS)
+
+
+GOOD_RUNG = "[rungs.tiny]\nsizes = [4]\n"
+GOOD_SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
+BAD = {
+    "no TOML": ("[[[", "not valid TOML"),
+    "another kind": ('format = "x"\n', "format: must be 'crossfield-library-spec'"),
+    "unknown key": (
+        HEAD + 'colour = "red"\n' + GOOD_RUNG + GOOD_SKETCH,
+        "colour: is unknown; the keys here are format",
+    ),
+    "unknown key of a rung": (HEAD + GOOD_RUNG + "speed = 1\n" + GOOD_SKETCH, "rungs.tiny.speed: is unknown"),
+    "unknown rung": (
+        HEAD + "[rungs.huge]\nsizes = [4]\n" + GOOD_SKETCH,
+        "rungs.huge: is unknown; the keys here are tiny",
+    ),
+    "no rung": (HEAD + GOOD_SKETCH, "rungs: there is none"),
+    "no sketch": (HEAD + GOOD_RUNG, "sketches: there is none"),
+    "size zero": (
+        HEAD + "[rungs.tiny]\nsizes = [0]\n" + GOOD_SKETCH,
+        "rungs.tiny.sizes: 0 is out of range; choose 1 to 999",
+    ),
+    "size too large": (HEAD + "[rungs.tiny]\nsizes = [1000]\n" + GOOD_SKETCH, "1000 is out of range"),
+    "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + GOOD_SKETCH, "must be a list of whole numbers"),
+    "size as truth": (
+        HEAD + "[rungs.tiny]\nsizes = [true]\n" + GOOD_SKETCH,
+        "must be a list of whole numbers",
+    ),
+    "size twice": (
+        HEAD + GOOD_RUNG + "[rungs.small]\nsizes = [4]\n" + GOOD_SKETCH,
+        "a has size 4 on two rungs",
+    ),
+    "unknown format": (
+        HEAD + GOOD_RUNG + 'formats = ["docx"]\n' + GOOD_SKETCH,
+        "there is no 'docx'; choose from nl",
+    ),
+    "unknown formulation": (
+        HEAD + 'formulations = ["lp"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        "formulations: there is no 'lp'",
+    ),
+    "formulation twice": (
+        HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        "'qp-fixed' is listed twice",
+    ),
+    "duplicate name": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + GOOD_SKETCH,
+        "sketches[1].name: 'a' is the name of two sketches",
+    ),
+    "name with a path": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"../a"'),
+        "sketches[0].name: '../a' is not allowed",
+    ),
+    "name in capitals": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
+    "name too long": (
+        HEAD
+        + GOOD_RUNG
+        + 'facets = ["printed"]\ngauges = ["box"]\n'
+        + GOOD_SKETCH.replace('"a"', '"abcdefghijklmn"'),
+        "has 39 characters; shorten",
+    ),
+    "unknown sample": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),
+    "missing file": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n',
+        "sketches[0].file: there is no file",
+    ),
+    "missing mask": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n',
+        "sketches[0].mask: there is no file",
+    ),
+    "no source": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\n',
+        "needs exactly one of sample, file, random",
+    ),
+    "two sources": (HEAD + GOOD_RUNG + GOOD_SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
+    "random without seeds": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
+        "sketches[0].random: goes with seeds",
+    ),
+    "sizes on a rung that is not": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + "sizes = { large = [9] }\n",
+        "sketches[0].sizes.large: is unknown",
+    ),
+    "seeds of a sample": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + "seeds = [1]\n",
+        "sketches[0].seeds: goes with random",
+    ),
+    "mask of a sample": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + 'mask = "m.png"\n',
+        "sketches[0].mask: goes with file",
+    ),
+    "two lines in a title": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH + 'title = "a\\nb"\n',
+        "sketches[0].title: must be one line",
+    ),
+    "two lines in a name": (
+        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"a\\n"'),
+        "sketches[0].name: must be a",
+    ),
+    "compressed as text": (
+        HEAD + GOOD_RUNG + 'compress = "no"\n' + GOOD_SKETCH,
+        "rungs.tiny.compress: must be true or",
+    ),
+    "a rung without sizes": (
+        HEAD + "[rungs.tiny]\n" + GOOD_SKETCH,
+        "rungs.tiny.sizes: there is none; write a list",
+    ),
+    "a sketch that is a number": (
+        HEAD + "sketches = [3]\n" + GOOD_RUNG,
+        "sketches: must be a table [[sketches]]",
+    ),
+    "another shape": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "round"\nseeds = [1]\n',
+        "sketches[0].random: there is no 'round'; choose from full, ragged",
+    ),
+    "missing ledger": (
+        HEAD + 'ledger = "gone.json"\n' + GOOD_RUNG + GOOD_SKETCH,
+        "ledger: there is no file gone.json",
+    ),
+    "a drawing without strokes": (
+        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n',
+        "cf_a_n004",
+    ),
+}
+
+
+@for_each("case", BAD)
+def test_a_bad_specification_is_one_line_with_file_or_name_and_nothing_half_written(tmp_path, capfd, case):
+    text, words = BAD[case]
+    path = write_spec(tmp_path, text)
+    assert invoke(["library", "build", str(path), "-o", str(tmp_path / "out")]) == 1
+    shown = capfd.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert words in shown.err
+    assert "spec.toml" in shown.err or "cf_a" in shown.err
+    out = tmp_path / "out"
+    assert not out.exists() or sorted(content(out)) in ([], ["ledger.json"])
+
+
+# What is built
+
+
+def test_every_sidecar_obeys_the_shipped_schema_and_every_file_its_checksum(built):
+    schema = json.loads((SCHEMAS / "library-entry.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for document in built.entries:
+        jsonschema.validate(document, schema)
+        assert list(document)[:4] == ["format", "version", "name", "family"]
+        assert list(document) == list(schema["required"])
+        for file in document["files"]:
+            data = (built.folder / file["name"]).read_bytes()
+            assert (len(data), hashlib.sha256(data).hexdigest()) == (file["bytes"], file["sha256"])
+
+
+def test_the_library_is_flat_and_sha256sums_lists_all_but_itself(built):
+    names = sorted(content(built.folder))
+    sums = dict(reversed(line.split("  ")) for line in (built.folder / "SHA256SUMS").read_text().splitlines())
+    assert list(sums) == sorted(sums) == [name for name in names if name != "SHA256SUMS"]
+    assert all(
+        hashlib.sha256(data).hexdigest() == sums[name]
+        for name, data in content(built.folder).items()
+        if name in sums
+    )
+    ours = [name for name in names if name.startswith("cf_")]
+    assert all(re.fullmatch(r"cf_[a-z0-9_]{1,29}(\.[A-Za-z0-9]+)+", name) for name in ours)
+    assert {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "library.solu", "check_point.py"} < set(
+        names
+    )
+    assert "CC BY 4.0" in (built.folder / "LICENSE").read_text()
+
+
+def test_sha256sum_of_the_system_agrees(built):
+    if shutil.which("sha256sum") is None:
+        pytest.skip("sha256sum is not installed")
+    done = subprocess.run(
+        ["sha256sum", "--check", "--quiet", "SHA256SUMS"],
+        cwd=built.folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_every_wanted_entry_is_there_in_every_format_or_refused(built):
+    assert len(built.entries) == 2 * (9 + 2) + 9
+    for document in built.entries:
+        wanted = {"nl", "gms", "lp", "mps"} if document["rung"] == "tiny" else {"nl", "mps"}
+        written = {file["format"] for file in document["files"]} - {"sol"}
+        assert written | set(document["refused"]) == wanted
+        assert not written & set(document["refused"])
+        packed = {
+            file["name"].endswith(".gz")
+            for file in document["files"]
+            if file["format"] in {"mps", "gms", "lp"}
+        }
+        assert packed <= {document["rung"] == "medium"}
+        if document["formulation"] == "minlp-parity":
+            assert set(document["refused"]) == wanted & {"lp", "mps"}
+
+
+def test_the_instance_file_is_the_instance_of_the_drawing(built, spec):
+    document = built.entry("cf_own_n004_milp")
+    instance = read_instance(built.folder / document["instance"]["file"])
+    (wanted,) = (each.recipe for each in plan(read_spec(spec)) if each.recipe.name == "cf_own_n004")
+    assert instance.sha256 == document["instance"]["sha256"] == instance_from(wanted).sha256
+    assert (document["source"]["sketch"], document["source"]["kind"]) == ("drawn by hand.svg", "file")
+    assert (built.folder / "cf_own.sketch.svg").read_text() == sample_svg("mouse")
+    assert document["instance"]["pixels"] == instance.grid.size
+    assert document["instance"]["pairs"] == len(instance.grid.first)
+
+
+def test_every_problem_can_be_had_from_instance_and_sidecar(built):
+    for document in built.entries:
+        problem = problem_of(built, document)
+        assert problem.problem_class == document["class"]
+        assert problem.columns == document["counts"]["variables"]
+
+
+# Points, checked with readers that nobody here wrote
+
+
+def highs_model(path, tmp_path):
+    """The model that HiGHS reads from an .mps."""
+    plain = tmp_path / "model.mps"
+    plain.write_bytes(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes())
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", "false")
+    assert highs.readModel(str(plain)) == highspy.HighsStatus.kOk
+    return highs
+
+
+@pytest.mark.parametrize(
+    "name", ["cf_own_n004_milp", "cf_own_n004_printed_milp", "cf_own_n004_box_milp", "cf_rand_n006_s2_milp"]
+)
+def test_highs_finds_the_point_of_a_milp_feasible_with_the_sidecars_objective(built, tmp_path, name):
+    document = built.entry(name)
+    (mps,) = (file["name"] for file in document["files"] if file["format"] == "mps")
+    highs = highs_model(built.folder / mps, tmp_path)
+    first, *lines = (built.folder / document["best"]["point"]).read_text().splitlines()
+    values = {key: float(value) for key, value in map(str.split, lines)}
+    model = highs.getLp()
+    point = highspy.HighsSolution()
+    point.col_value = [values.pop(key, 0.0) for key in model.col_names_]
+    assert values == {}
+    assert highs.setSolution(point) == highspy.HighsStatus.kOk
+    x, rows = np.array(point.col_value), np.array(highs.getSolution().row_value)
+    assert (x >= np.array(model.col_lower_) - 1e-9).all()
+    assert (x <= np.array(model.col_upper_) + 1e-9).all()
+    assert (rows >= np.array(model.row_lower_) - 1e-9).all()
+    assert (rows <= np.array(model.row_upper_) + 1e-9).all()
+    integer = [kind == highspy.HighsVarType.kInteger for kind in model.integrality_]
+    assert (x[integer] == np.round(x[integer])).all()
+    objective = float(x @ np.array(model.col_cost_) + model.offset_)
+    assert objective == pytest.approx(document["best"]["objective"], rel=1e-12)
+    assert float(first.split()[1]) == pytest.approx(objective, rel=1e-12)
+    counted = document["counts"]
+    assert (model.num_row_, highs.getNumNz(), sum(integer)) == (
+        counted["constraints"],
+        counted["nonzeros"],
+        counted["binary"] + counted["integer"],
+    )
+
+
+@pytest.mark.parametrize(
+    "formulation",
+    [
+        "minlp-parity",
+        "minlp-quartic",
+        "minlp-cubic",
+        "miqcp-bilinear",
+        "miqp-mccormick",
+        "miqp-exact",
+        "qp-fixed",
+    ],
+)
+def test_casadi_evaluates_the_nl_at_its_point_as_the_sidecar_says(built, formulation):
+    document = by_formulation(built, "cf_own_n004")[formulation]
+    model = casadi.NlpBuilder()
+    model.import_nl(str(built.folder / f"{document['name']}.nl"))
+    lines = (built.folder / document["best"]["nl_point"]).read_text().splitlines()
+    columns = document["counts"]["variables"]
+    values = list(map(float, lines[-columns - 1 : -1]))
+    assert lines[-1].startswith("objno 0")
+    evaluate = casadi.Function("f", [casadi.vertcat(*model.x)], [model.f, casadi.vertcat(*model.g)])
+    objective, rows = evaluate(values)
+    assert float(objective) == pytest.approx(document["best"]["objective"], rel=1e-9, abs=1e-12)
+    rows = np.array(rows).ravel()
+    assert (rows >= np.array(model.g_lb) - 1e-9).all()
+    assert (rows <= np.array(model.g_ub) + 1e-9).all()
+
+
+def test_points_are_feasible_beyond_what_minlplib_asks(built):
+    for document in built.entries:
+        assert document["best"]["violation"] <= 1e-12
+        assert document["best"]["integrality"] == 0.0
+        found = read_solution(built.folder / document["best"]["point"], problem_of(built, document))
+        assert found.objective == pytest.approx(document["best"]["objective"], rel=1e-9, abs=1e-12)
+        assert found.unknown == 0
+
+
+def test_formulations_of_one_optimum_have_points_of_one_objective(built):
+    for instance in ("cf_own_n004", "cf_own_n004_box", "cf_rand_n006_s2"):
+        found = {name: each["best"]["objective"] for name, each in by_formulation(built, instance).items()}
+        for one, other in (
+            ("minlp-parity", "minlp-quartic"),
+            ("minlp-quartic", "minlp-cubic"),
+            ("minlp-quartic", "miqp-exact"),
+            ("miqcp-bilinear", "miqp-mccormick"),
+            ("miqcp-bilinear-l1", "milp-mccormick"),
+        ):
+            assert found[one] == pytest.approx(found[other], rel=1e-9)
+        assert found["minlp-quartic"] <= found["qp-fixed"] + 1e-12
+
+
+def test_the_printed_facet_gives_a_point_that_is_no_worse(built):
+    hull, printed = (by_formulation(built, "cf_own_n004", facet) for facet in ("hull", "printed"))
+    assert set(printed) == {"miqp-mccormick", "milp-mccormick"}
+    for name, each in printed.items():
+        assert each["best"]["objective"] <= hull[name]["best"]["objective"] + 1e-12
+        assert {"formulation": f"{name} (facet hull)", "entry": hull[name]["name"]}.items() <= each[
+            "not_equivalent"
+        ][-2].items()
+
+
+def test_the_free_z_of_the_printed_facet_is_the_best_for_its_field(built):
+    """No other z in its interval gives a lower t: tried on a lattice of values."""
+    document = by_formulation(built, "cf_own_n004", "printed")["milp-mccormick"]
+    problem = problem_of(built, document)
+    rng = np.random.default_rng(5)
+    instance = problem.instance
+    jumps = rng.integers(instance.p_min, instance.p_max + 1)
+    field = CrossField(
+        instance,
+        rng.uniform(instance.alpha_lower, instance.alpha_upper),
+        rng.uniform(-0.78, 0.78, instance.grid.size),
+        jumps,
+    )
+    point = complete_point(problem, field)
+    assert problem.violation(point).worst < 1e-12
+    z, t = (problem.blocks[name].columns for name in ("z", "t"))
+    first, second = field.beta[instance.grid.first], field.beta[instance.grid.second]
+    for share in np.linspace(-np.pi / 4, np.pi / 4, 101):
+        trial = point.copy()
+        trial[z] = share
+        allowed = np.ones(len(first), dtype=bool)
+        for family in problem.rows:
+            if family.family.tag in {"c26", "c27", "c28", "c29"}:
+                values = family.values(trial)
+                allowed &= (values <= 1e-12) if family.family.sense == "<=" else (values >= -1e-12)
+        assert (np.abs(first - 2 * share - second)[allowed] >= point[t][allowed] - 1e-12).all()
+
+
+# Counts, curvature, letters
+
+
+def test_eigenvalue_counts_are_those_of_differences_of_the_objective(built):
+    """The Hessian once more, from values of the objective alone."""
+    document = by_formulation(built, "cf_own_n004")["qp-fixed"]
+    problem = problem_of(built, document)
+    n = problem.columns
+    unit, zero = np.eye(n), problem.objective_value(np.zeros(n))
+    single = np.array([problem.objective_value(row) for row in unit])
+    hessian = np.array(
+        [
+            [problem.objective_value(unit[i] + unit[j]) - single[i] - single[j] + zero for j in range(n)]
+            for i in range(n)
+        ]
+    )
+    values = np.linalg.eigvalsh(hessian)
+    assert document["curvature"]["eigenvalues"] == {
+        "negative": int((values < -1e-8).sum()),
+        "zero": int((np.abs(values) <= 1e-8).sum()),
+        "positive": int((values > 1e-8).sum()),
+    }
+    assert document["curvature"]["eigenvalues"]["positive"] == n
+
+
+def test_letters_and_curvature_are_those_of_the_formulation(built):
+    found = {
+        name: (each["probtype"], each["curvature"]["objective"], each["curvature"]["constraints"])
+        for name, each in by_formulation(built, "cf_own_n004").items()
+    }
+    assert found == {
+        "minlp-parity": (None, "nonconvex", "none"),
+        "minlp-quartic": (None, "nonconvex", "linear"),
+        "minlp-cubic": (None, "nonconvex", "linear"),
+        "miqcp-bilinear": ("CGQ", "convex", "indefinite"),
+        "miqcp-bilinear-l1": ("LGQ", "linear", "indefinite"),
+        "miqp-mccormick": ("CGL", "convex", "linear"),
+        "milp-mccormick": ("LGL", "linear", "linear"),
+        "qp-fixed": ("CCB", "convex", "none"),
+        "miqp-exact": ("CGL", "convex", "linear"),
+    }
+
+
+def test_eigenvalues_that_are_not_computed_come_with_a_reason(built):
+    for document in built.entries:
+        curvature = document["curvature"]
+        assert (curvature["eigenvalues"] is None) == (curvature["reason"] is not None)
+
+
+def test_the_tangent_bound_never_exceeds_the_optimum(built):
+    document = by_formulation(built, "cf_own_n004")["qp-fixed"]
+    problem = problem_of(built, document)
+    optimum = document["best"]["objective"]
+    assert document["status"] == "optimal"
+    rng = np.random.default_rng(3)
+    bounds = [tangent_bound(problem, rng.uniform(problem.lower, problem.upper)) for _ in range(50)]
+    assert max(bounds) <= optimum + 1e-12
+    assert tangent_bound(formulate(problem.instance, "miqp-exact"), np.zeros(1)) is None
+
+
+# Random instances
+
+
+def test_random_instances_follow_size_and_seed_alone():
+    spec = default_spec()
+    recipes = {each.recipe.name: each.recipe for each in plan(spec) if each.recipe.seed is not None}
+    first, again, other = (instance_from(recipes[f"cf_rand_n024_s{seed}"]) for seed in (1, 1, 2))
+    assert first.sha256 == again.sha256 != other.sha256
+    assert ndimage.label(first.mask)[1] == 1
+    assert 0.4 < first.mask.mean() < 0.8
+    assert len(first.theta) == round(first.grid.size / 5)
+    assert 0.1 <= first.w.min() <= first.w.max() <= 1
+    full = replace(recipes["cf_rand_n024_s1"], sketch=replace(recipes["cf_rand_n024_s1"].sketch, what="full"))
+    assert instance_from(full).mask.all()
+
+
+# The same bytes, however it is made
+
+
+@pytest.mark.slow
+def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(built, spec, tmp_path):
+    command = build_command(spec, tmp_path / "again")
+    environment = os.environ | {"PYTHONHASHSEED": "7"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert content(tmp_path / "again") == content(built.folder)
+
+
+def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
+    """Its threads stay in the process, and their number used to make the next run fail in silence."""
+    instance = sample("mouse", 4, "box")
+    found = []
+    for threads in (1, 2):
+        highs = highspy.Highs()
+        highs.setOptionValue("output_flag", False)
+        highspy.Highs.resetGlobalScheduler(True)
+        highs.setOptionValue("threads", threads)
+        highs.addConstr(highs.addVariable(ub=5, obj=-1, type=highspy.HighsVarType.kInteger) <= 2.5)
+        assert highs.run() == highspy.HighsStatus.kOk
+        found.append([each.field.energy(1).total for each in better_in_1norm(greedy(instance), "tiny")])
+    assert len(found[0]) == 2
+    assert found[0] == found[1]
+
+
+def test_nothing_whole_is_made_again(built, spec, copy):
+    made = []
+    before = {path.name: path.stat().st_mtime_ns for path in copy.glob("cf_*_n*")}
+    build(read_spec(spec), copy, progress=made.append)
+    assert made == ["index and checksums"]
+    assert before == {path.name: path.stat().st_mtime_ns for path in copy.glob("cf_*_n*")}
+
+
+def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, copy):
+    (copy / "cf_own_n004_milp.json").unlink()
+    (copy / "cf_rand_n006_s2_qp.nl.gz").write_bytes(b"half")
+    (copy / "cf_own_n004_box_parity.json").write_text("{}")
+    (copy / ".cf_own_n004_qp.json.abc.part").write_bytes(b"half")
+    made = []
+    build(read_spec(spec), copy, progress=made.append)
+    assert sorted(line.split(": ")[1] for line in made[:-1]) == [
+        "cf_own_n004_box_parity",
+        "cf_own_n004_milp",
+        "cf_rand_n006_s2_qp",
+    ]
+    assert content(copy) == content(built.folder)
+
+
+def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
+    (copy / "cf_own_n004_milp.json").unlink()
+    (copy / "cf_own_n004.about.json").unlink()
+    with pytest.raises(InputError, match=r"cf_own_n004_milp\.json: cannot be read"):
+        _ = read_library(copy).entries
+    rebuild(copy)
+    assert content(copy) == content(built.folder)
+
+
+@pytest.mark.slow
+def test_a_build_that_was_killed_continues_and_leaves_nothing_half_written(built, spec, tmp_path):
+    out = tmp_path / "killed"
+    command = build_command(spec, out)
+    process = subprocess.Popen(command, start_new_session=True)
+    while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    whole = content(built.folder)
+    early = {name: data for name, data in content(out).items() if not name.endswith((".part", ".lock"))}
+    assert 0 < len(early) < len(whole)
+    assert all(whole[name] == data for name, data in early.items())
+    done = [name for name in early if re.fullmatch(r"cf_\w+", name.removesuffix(".json"))]
+    made = []
+    build(read_spec(spec), out, progress=made.append)
+    again = {line.split(": ")[1] + ".json" for line in made[:-1]}
+    assert not again & set(done)
+    assert content(out) == whole
+
+
+def build_command(spec, out):
+    return [sys.executable, "-m", "crossfield", "library", "build", str(spec), "-o", str(out), "--jobs", "2"]
+
+
+@pytest.mark.slow
+def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spec, tmp_path):
+    out = tmp_path / "interrupted"
+    command = build_command(spec, out)
+    process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    _, error = process.communicate()
+    assert process.returncode == 1
+    assert error == "crossfield: interrupted; files that stand are whole\n"
+    whole = content(built.folder)
+    assert all(whole[name] == data for name, data in content(out).items())
+    assert not list(out.glob(".*"))
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built, spec, tmp_path):
+    out = tmp_path / "died"
+    command = build_command(spec, out)
+    process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
+        time.sleep(0.01)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    workers = [
+        int(child)
+        for child in children.read_text().split()
+        if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    assert len(workers) == 2
+    os.kill(workers[0], signal.SIGKILL)
+    _, error = process.communicate()
+    assert process.returncode == 1
+    assert len(error.splitlines()) == 1
+    assert "a process ended before its work was done" in error
+    whole = content(built.folder)
+    assert all(whole[name] == data for name, data in content(out).items())
+
+
+def test_entries_that_left_the_specification_leave_the_folder_and_other_files_stay(built, spec, copy):
+    (copy / "notes.txt").write_text("mine")
+    (copy / "cf_mine_n004_qp.nl").write_text("mine too")
+    smaller = replace(read_spec(spec), formulations=("qp-fixed",))
+    build(smaller, copy)
+    names = set(content(copy))
+    assert {"notes.txt", "cf_mine_n004_qp.nl", "cf_own_n004_qp.json"} <= names
+    assert not [name for name in names if "_milp" in name or "_exact" in name]
+
+
+# The ledger
+
+
+def better_field(library, name):
+    """A field of a lower objective than the library knows: the best angles for the known jumps, by HiGHS."""
+    document = library.entry(name)
+    problem = problem_of(library, document)
+    start = read_field(library.folder / f"{name.rpartition('_')[0]}.field.json")
+    found = solve(with_integers_fixed(problem, start), "highs", limits=Limits(20, 1e-6, 1))
+    return document, problem, field_of(found.problem, found.point)
+
+
+@pytest.mark.slow
+def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_elsewhere(
+    built, spec, copy, tmp_path
+):
+    document, problem, field = better_field(built, "cf_rand_n006_s2_miqp")
+    objective = problem.objective_value(complete_point(problem, field))
+    assert objective < document["best"]["objective"] - 1e-6
+    record = Record(
+        document["name"], problem.sha256, "HiGHS", "1", "limit", primal=objective, seconds=6.0, by="somebody"
+    )
+    kept = add_record(copy, record, field)
+    assert kept.point == "cf_rand_n006_s2_miqp.field.json"
+    made = []
+    library = rebuild(copy, progress=made.append)
+    best = library.entry(document["name"])["best"]
+    assert best["objective"] == pytest.approx(objective, rel=1e-12)
+    assert (best["solver"], best["seconds"], best["by"]) == ("HiGHS", 6.0, "somebody")
+    assert library.entry("cf_rand_n006_s2_bilin")["best"]["objective"] <= objective + 1e-9
+    assert all("cf_rand_n006_s2" in line for line in made[:-1])
+    models = [name for name in content(copy) if re.search(r"\.(nl|mps|gms|lp)(\.gz)?$", name)]
+    assert all((copy / name).read_bytes() == (built.folder / name).read_bytes() for name in models)
+
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    for name in ("ledger.json", kept.point):
+        shutil.copy(copy / name, beside / name)
+    path = write_spec(beside, 'ledger = "ledger.json"\n' + SPEC)
+    build(read_spec(path), tmp_path / "elsewhere")
+    assert content(tmp_path / "elsewhere") == content(copy)
+
+    with (copy / kept.point).open("ab") as stream:
+        stream.write(b" ")
+    with pytest.raises(CrossfieldError, match=r"cf_rand_n006_s2_miqp\.field\.json: is another file than"):
+        rebuild(copy)
+
+
+def test_a_bound_of_another_problem_is_never_taken(copy):
+    library = read_library(copy)
+    document = library.entry("cf_own_n004_milp")
+    for sha, bound in (("0" * 64, document["best"]["objective"]), (document["problem_sha256"], 0.25)):
+        add_record(copy, Record(document["name"], sha, "Any", "1", "limit", bound=bound))
+    after = rebuild(copy).entry(document["name"])
+    assert [each["bound"] for each in after["bounds"]] == [0.25]
+    assert after["status"] == "best known"
+    assert len(read_ledger(copy).records) == 2
+
+
+def test_a_damaged_ledger_is_one_line(copy, capfd):
+    for text, words in (
+        ("{", "is not valid JSON"),
+        ('{"format": "x"}', "is not a file of this kind"),
+        ('{"format": "crossfield-ledger", "version": 1, "records": [{}]}', "$.records[0]"),
+    ):
+        (copy / "ledger.json").write_text(text)
+        assert invoke(["library", "solve", str(copy), "--up-to", "tiny", "--quiet"]) == 1
+        shown = capfd.readouterr().err
+        assert len(shown.splitlines()) == 1
+        assert "ledger.json" in shown
+        assert words in shown
+
+
+def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothing():
+    """Every record is about the very problem that is built today, no bound is above a point,
+    and every kept field has the objective told.
+    """
+    spec = default_spec()
+    ledger = read_ledger(spec.ledger.parent)
+    recipes = {entry.name: (each.recipe, entry) for each in plan(spec) for entry in each.entries}
+    instances = {}
+    assert len(ledger.records) > 50
+    for record in ledger.records:
+        recipe, entry = recipes[record.entry]
+        instance = instances.setdefault(recipe.name, instance_from(recipe))
+        facet = {"facet": entry.facet} if "facet" in FORMULATIONS[entry.formulation].settable else {}
+        problem = formulate(instance, entry.formulation, **facet)
+        assert record.problem_sha256 == problem.sha256
+        assert record.bound is None or record.bound <= record.primal * (1 + 1e-6) + 1e-9
+        if record.point is not None:
+            point = complete_point(problem, ledger.field(record))
+            assert problem.violation(point).worst <= 1e-12
+            assert problem.objective_value(point) == pytest.approx(record.primal, rel=1e-12)
+    named = {record.point for record in ledger.records if record.point is not None}
+    assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json"}
+
+
+def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(tmp_path):
+    text = (
+        HEAD
+        + 'formulations = ["miqcp-bilinear-l1", "milp-mccormick", "qp-fixed"]\n'
+        + '[rungs.tiny]\nsizes = [3]\nformats = ["mps"]\n'
+        + GOOD_SKETCH
+    )
+    folder = build(read_spec(write_spec(tmp_path, text)), tmp_path / "small").folder
+    assert "=opt= cf_a_n003_milp" not in (folder / "library.solu").read_text()
+    records = solve_library(folder, solvers=["highs"], time_limit=250.0)
+    assert [(each["entry"], each["status"]) for each in records] == [
+        ("cf_a_n003_milp", "optimal"),
+        ("cf_a_n003_qp", "optimal"),
+    ]
+    library = read_library(folder)
+    milp, bilinear = library.entry("cf_a_n003_milp"), library.entry("cf_a_n003_bilin1")
+    assert (milp["status"], bilinear["status"]) == ("optimal", "optimal")
+    assert milp["bounds"][0]["via"] is None
+    assert bilinear["bounds"][0]["via"] == "cf_a_n003_milp"
+    solu = (folder / "library.solu").read_text().splitlines()
+    assert solu == [f"=opt= {each['name']} {each['best']['objective']!r}" for each in library.entries]
+    assert solve_library(folder, solvers=["highs"], time_limit=250.0) == []
+
+
+def test_every_format_of_the_table_can_be_asked_for(tmp_path):
+    text = HEAD + 'formulations = ["miqp-exact"]\n[rungs.tiny]\nsizes = [3]\n' + GOOD_SKETCH
+    library = build(read_spec(write_spec(tmp_path, text)), tmp_path / "all")
+    (document,) = library.entries
+    assert {file["format"] for file in document["files"]} | set(document["refused"]) == {*FORMATS, "sol"}
+
+
+def test_unknown_names_and_folders_without_a_library_are_one_line(built, tmp_path, capfd):
+    for arguments, words in (
+        (["solve", tmp_path], "is no library"),
+        (["solve", built.folder, "--solver", "magic"], "there is no solver 'magic'"),
+        (["solve", built.folder, "--up-to", "huge"], "there is no rung 'huge'"),
+        (["build", tmp_path / "gone.toml", "-o", tmp_path / "x"], "gone.toml: cannot be read"),
+    ):
+        assert invoke(["library", *map(str, arguments)]) == 1
+        shown = capfd.readouterr().err
+        assert len(shown.splitlines()) == 1
+        assert words in shown

@@ -1,0 +1,780 @@
+"""Checking a library: archives, everything `verify` must find, and submitting points."""
+
+import bz2
+import gzip
+import io
+import json
+import lzma
+import os
+import shutil
+import tarfile
+import zipfile
+
+import places
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import write
+from crossfield.export.library.building.build import build
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.contributions.submit import submit_point
+from crossfield.export.library.documents import archive, check_point
+from crossfield.export.library.documents.archive import opened
+from crossfield.export.library.documents.documents import problem_of, read_library
+from crossfield.export.library.ledger import points
+from crossfield.export.library.plan.spec import read_spec
+from crossfield.models.errors import CrossfieldError, InputError, SolutionError
+from crossfield.models.field.file import read_field
+from crossfield.models.formulations.problem import with_integers_fixed
+from forging import change, seal
+from loops import for_each
+
+SOLUTIONS = places.SOLUTIONS
+
+# archives
+
+INSIDE = {"lib/README.md": b"hello\n", "lib/cf_a_n004.instance.json": b"{}\n"}
+PACKERS = {"": bytes, ".gz": gzip.compress, ".bz2": bz2.compress, ".xz": lzma.compress}
+
+
+def tar_of(members):
+    """A .tar of (name or header, content) pairs."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w") as tar:
+        for name, content in members:
+            entry = name if isinstance(name, tarfile.TarInfo) else tarfile.TarInfo(name)
+            entry.size = len(content) if entry.isreg() else 0
+            tar.addfile(entry, io.BytesIO(content))
+    return buffer.getvalue()
+
+
+def zip_of(members):
+    """A .zip of (name or header, content) pairs."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, content in members:
+            packed.writestr(name, content)
+    return buffer.getvalue()
+
+
+def special(kind, target="/etc/passwd"):
+    entry = tarfile.TarInfo("lib/special")
+    entry.type, entry.linkname = kind, target
+    return entry
+
+
+def linked():
+    entry = zipfile.ZipInfo("lib/link")
+    entry.external_attr = 0o120777 << 16
+    return entry
+
+
+def everything_below(folder):
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    }
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """The folder for temporary folders, so that it can be looked at."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+@for_each("kind", [*PACKERS, "zip"])
+@for_each("lead", ["lib/", "./lib/", "", "./"])
+def test_an_archive_is_opened_as_the_folder_it_holds_and_gone_afterwards(kind, lead, tmp_path, temporary):
+    members = [(name.replace("lib/", lead), content) for name, content in INSIDE.items()]
+    data = zip_of(members) if kind == "zip" else PACKERS[kind](tar_of(members))
+    (tmp_path / "archive").write_bytes(data)
+    with opened(tmp_path / "archive") as folder:
+        assert everything_below(folder) == {name.removeprefix("lib/"): data for name, data in INSIDE.items()}
+    assert not list(temporary.iterdir())
+
+
+def test_a_folder_is_opened_as_it_is(tmp_path):
+    with opened(tmp_path) as folder:
+        assert folder == tmp_path
+
+
+OUTSIDE = ["../evil", "lib/../../evil", "/tmp/evil", "..", "C:\\evil", "lib\\..\\..\\evil", "lib/new\nline"]
+SPECIAL = [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE, tarfile.FIFOTYPE]
+TRAPS = {
+    **{f"tar {name!r}": lambda name=name: tar_of([*INSIDE.items(), (name, b"x")]) for name in OUTSIDE},
+    **{
+        f"tar.gz {name!r}": lambda name=name: gzip.compress(tar_of([*INSIDE.items(), (name, b"x")]))
+        for name in OUTSIDE
+    },
+    **{f"zip {name!r}": lambda name=name: zip_of([*INSIDE.items(), (name, b"x")]) for name in OUTSIDE},
+    **{
+        f"tar {kind!r}": lambda kind=kind: tar_of([*INSIDE.items(), (special(kind), b"")]) for kind in SPECIAL
+    },
+    "tar link inside": lambda: tar_of([*INSIDE.items(), (special(tarfile.SYMTYPE, "README.md"), b"")]),
+    "zip link": lambda: zip_of([*INSIDE.items(), (linked(), b"/etc/passwd")]),
+    "tar twice": lambda: tar_of([*INSIDE.items(), *INSIDE.items()]),
+    "cut tar": lambda: tar_of(INSIDE.items())[:700],
+    "cut tar.gz": lambda: gzip.compress(tar_of([("a", os.urandom(5000))]))[:-3000],
+    "cut tar.xz": lambda: lzma.compress(tar_of([("a", os.urandom(5000))]))[:-3000],
+    "cut zip": lambda: zip_of([("a", os.urandom(5000))])[:-200],
+    "damaged zip": lambda: (
+        zip_of([("a", b"abc" * 500)]).replace(b"\x4b\x4c", b"\x4b\x4d", 1)[:60] + b"PK" * 40
+    ),
+    "gz of text": lambda: gzip.compress(b"hello" * 1000),
+    "text": lambda: b"hello" * 1000,
+    "empty": lambda: b"",
+}
+
+
+@for_each("what", TRAPS)
+def test_a_bad_archive_is_refused_in_one_line_and_nothing_is_written(what, tmp_path, temporary):
+    (tmp_path / "archive").write_bytes(TRAPS[what]())
+    before = everything_below(tmp_path)
+    with pytest.raises(InputError) as refusal, opened(tmp_path / "archive"):
+        pytest.fail("it was opened")
+    assert str(refusal.value).startswith(f"{tmp_path / 'archive'}: ")
+    assert "\n" not in str(refusal.value)
+    assert everything_below(tmp_path) == before
+    assert not list(temporary.iterdir())
+
+
+def header_of(size, kind=tarfile.REGTYPE):
+    entry = tarfile.TarInfo("lib/zeros")
+    entry.size, entry.type = size, kind
+    return entry.tobuf()
+
+
+BOMBS = {
+    "zip": lambda: zip_of([(f"lib/{number}", b"\0" * (1 << 20)) for number in range(6)]),
+    "tar.xz": lambda: lzma.compress(header_of(1 << 23) + b"\0" * (1 << 23)),
+    "tar.xz in a header": lambda: lzma.compress(header_of(1 << 24, tarfile.XHDTYPE) + b"\0" * (1 << 24)),
+    "tar that claims": lambda: header_of(1 << 40) + b"\0" * 10240,
+    "many files": lambda: zip_of([(f"lib/{number}", b"") for number in range(300)]),
+}
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_an_archive_that_grows_without_reason_is_refused(kind, tmp_path, temporary, monkeypatch):
+    """With limits that small files reach too; they are the same but for their size."""
+    monkeypatch.setattr(archive, "LEAST_LIMIT", 1 << 22)
+    monkeypatch.setattr(archive, "MOST_FILES", 200)
+    (tmp_path / "archive").write_bytes(BOMBS[kind]())
+    with pytest.raises(InputError, match="unreasonably much"), opened(tmp_path / "archive"):
+        pytest.fail("it was opened")
+    assert not list(temporary.iterdir())
+
+
+def test_nothing_at_the_path_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="no such folder or archive"), opened(tmp_path / "absent"):
+        pytest.fail("it was opened")
+
+
+# verifying
+
+SPEC = """
+format = "crossfield-library-spec"
+version = 1
+title = "a library for tests"
+formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]
+[rungs.medium]
+sizes = [4]
+formats = ["nl", "mps"]
+compress = true
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+"""
+STEM = "cf_rand_n004_s1"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_searches():
+    """How good the fields of a library are is nothing to its check."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(points, "_ROUNDS", 1)
+        yield
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A library of one instance in four formulations; not to be changed."""
+    folder = tmp_path_factory.mktemp("built")
+    (folder / "spec.toml").write_text(SPEC)
+    build(read_spec(folder / "spec.toml"), folder / "lib")
+    return folder / "lib"
+
+
+@pytest.fixture
+def lib(built, tmp_path):
+    """A copy of it that may be changed."""
+    return shutil.copytree(built, tmp_path / "lib")
+
+
+def repack(path, old, new):
+    """Change the content of a .gz in one place."""
+    text = gzip.decompress(path.read_bytes())
+    assert old in text
+    path.write_bytes(gzip.compress(text.replace(old, new, 1), mtime=0))
+
+
+def rewrite(path, old, new):
+    text = path.read_bytes()
+    assert old in text
+    path.write_bytes(text.replace(old, new, 1))
+
+
+def swap(lib):
+    shutil.copy(lib / f"{STEM}_milp.sol", lib / f"{STEM}_miqp.sol")
+
+
+def link(lib):
+    (lib / "README.md").unlink()
+    (lib / "README.md").symlink_to("/etc/passwd")
+
+
+def break_point(lib):
+    """The first pixel's alpha leaves its window."""
+    lines = (lib / f"{STEM}_milp.sol").read_text().splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith("alpha_"))
+    lines[at] = lines[at].split()[0] + " 7.5"
+    (lib / f"{STEM}_milp.sol").write_text("\n".join(lines) + "\n")
+
+
+def add_record(lib, **given):
+    record = {
+        "entry": f"{STEM}_milp",
+        "problem_sha256": "0" * 64,
+        "solver": "S",
+        "version": "1",
+        "status": "feasible",
+    }
+    change(lib / "ledger.json", records=[record | given])
+
+
+def bound_of(value):
+    one = {
+        "solver": "S",
+        "version": "1",
+        "bound": value,
+        "status": "limit",
+        "seconds": 1.0,
+        "threads": 1,
+        "via": None,
+    }
+    return {"bounds": [one], "bound": value, "status": "optimal", "gap": 0.0}
+
+
+MILP, MIQP, QP = f"{STEM}_milp.json", f"{STEM}_miqp.json", f"{STEM}_qp.json"
+PLAIN = {
+    "a byte of a model": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.nl.gz", b"\x1f", b"\x1e"),
+        f"{STEM}_milp.nl.gz",
+        "another SHA-256",
+    ),
+    "a byte of a text": (lambda lib: rewrite(lib / "README.md", b"e", b"E"), "README.md", "another SHA-256"),
+    "a missing file": (lambda lib: (lib / f"{STEM}_qp.mps.gz").unlink(), f"{STEM}_qp.mps.gz", "is missing"),
+    "a missing sidecar": (lambda lib: (lib / QP).unlink(), QP, "is missing"),
+    "a missing list of checksums": (lambda lib: (lib / "SHA256SUMS").unlink(), "SHA256SUMS", "is missing"),
+    "a missing index": (lambda lib: (lib / "library.json").unlink(), "library.json", "is missing"),
+    "a missing instance": (
+        lambda lib: (lib / f"{STEM}.instance.json").unlink(),
+        f"{STEM}.instance.json",
+        "is missing",
+    ),
+    "an extra file": (lambda lib: (lib / "notes.txt").write_text("x"), "notes.txt", "not in SHA256SUMS"),
+    "a folder": (lambda lib: (lib / "more").mkdir(), "more", "is a folder"),
+    "a link": (link, "README.md", "is a link"),
+    "what a stopped build left": (
+        lambda lib: (lib / ".a.mps.x.part").write_text(""),
+        ".a.mps.x.part",
+        "a build that was stopped",
+    ),
+    "a path upwards in the checksums": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  ../README.md"),
+        "SHA256SUMS",
+        "no plain file name",
+    ),
+    "an absolute path in the checksums": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b"  /etc/passwd"),
+        "SHA256SUMS",
+        "no plain file name",
+    ),
+    "a line that is no checksum": (
+        lambda lib: rewrite(lib / "SHA256SUMS", b"  README.md", b" README.md"),
+        "SHA256SUMS",
+        "no checksum",
+    ),
+    "a damaged index": (lambda lib: (lib / "library.json").write_text("{"), "library.json", "not valid JSON"),
+    "a damaged sidecar": (lambda lib: (lib / QP).write_bytes(b"\xff\xfe"), QP, "not JSON"),
+}
+SEALED = {
+    "a coefficient of the .mps": (
+        lambda lib: repack(lib / f"{STEM}_milp.mps.gz", b" 1.5707963267948966\n", b" 1.5707963267948968\n"),
+        f"{STEM}_milp.mps.gz",
+        "does not hold the problem",
+    ),
+    "a bound in the .nl": (
+        lambda lib: repack(lib / f"{STEM}_qp.nl.gz", b"0.7853981633974483", b"0.7853981633974484"),
+        f"{STEM}_qp.nl.gz",
+        "does not hold the problem",
+    ),
+    "a name in the .col": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.col", b"alpha_00_00", b"alpha_00_09"),
+        f"{STEM}_milp.col",
+        "does not hold the problem",
+    ),
+    "a packed file that is cut off": (
+        lambda lib: (lib / f"{STEM}_milp.mps.gz").write_bytes(
+            (lib / f"{STEM}_milp.mps.gz").read_bytes()[:-40]
+        ),
+        f"{STEM}_milp.mps.gz",
+        "does not hold the problem",
+    ),
+    "a file that nothing names": (
+        lambda lib: (lib / "notes.txt").write_text("x"),
+        "notes.txt",
+        "belongs to nothing",
+    ),
+    "a path in a sidecar": (
+        lambda lib: change(lib / MILP, files=lambda files: [*files, files[0] | {"name": "../../secret.mps"}]),
+        MILP,
+        "does not match",
+    ),
+    "a path to the instance": (
+        lambda lib: change(lib / MILP, instance__file="../other.json"),
+        MILP,
+        "does not match",
+    ),
+    "a path in the ledger": (
+        lambda lib: add_record(lib, point="../x.field.json"),
+        "ledger.json",
+        "does not match",
+    ),
+    "an unknown key": (
+        lambda lib: change(lib / MILP, files=lambda files: [file | {"more": 1} for file in files]),
+        MILP,
+        "more",
+    ),
+    "a name that is too long": (
+        lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_" + "a" * 30]),
+        "library.json",
+        "does not match",
+    ),
+    "an entry that is not there": (
+        lambda lib: change(lib / "library.json", entries=lambda names: [*names, "cf_more_n003_qp"]),
+        "cf_more_n003_qp.json",
+        "cannot be read",
+    ),
+    "other counts": (
+        lambda lib: change(lib / MILP, counts__variables=lambda value: value + 1),
+        MILP,
+        "another counts",
+    ),
+    "another class": (lambda lib: change(lib / MILP, **{"class": "MIQP"}), MILP, "another class"),
+    "other ranges": (lambda lib: change(lib / MIQP, ranges__matrix=[1.0, 2.0]), MIQP, "another ranges"),
+    "other curvature": (
+        lambda lib: change(lib / MIQP, curvature__objective="indefinite"),
+        MIQP,
+        "another curvature",
+    ),
+    "an unknown formulation": (
+        lambda lib: change(lib / MILP, formulation="nothing"),
+        MILP,
+        "no entry can have",
+    ),
+    "a jump beyond all numbers": (lambda lib: change(lib / QP, jumps=[[0, 10**30]]), QP, "no entry can have"),
+    "a jump of no pair": (lambda lib: change(lib / QP, jumps=[[999, 1]]), QP, "does not have"),
+    "an objective beyond all numbers": (
+        lambda lib: change(lib / QP, best__objective=10**400),
+        f"{STEM}_qp.sol",
+        "has objective",
+    ),
+    "an objective that is no number": (
+        lambda lib: change(lib / QP, best__objective=float("nan")),
+        f"{STEM}_qp.sol",
+        "has objective",
+    ),
+    "a bound beyond all numbers": (
+        lambda lib: change(lib / QP, **bound_of(10**400)),
+        QP,
+        "no entry can have",
+    ),
+    "another option": (
+        lambda lib: change(lib / MILP, options__facet="printed"),
+        f"{STEM}.instance.json",
+        "is not the instance",
+    ),
+    "another objective": (
+        lambda lib: change(lib / MIQP, best__objective=lambda value: value + 1e-7),
+        f"{STEM}_miqp.sol",
+        "has objective",
+    ),
+    "another energy": (
+        lambda lib: change(lib / MIQP, best__energy_2norm=lambda value: value + 1e-7),
+        f"{STEM}_miqp.sol",
+        "of a field of energy",
+    ),
+    "the point of another entry": (swap, f"{STEM}_miqp.sol", "the checker refuses it"),
+    "a point that is not feasible": (break_point, f"{STEM}_milp.sol", "is not feasible"),
+    "a claim that is not so": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.sol", b"=obj= ", b"=obj= 1"),
+        f"{STEM}_milp.sol",
+        "claims objective",
+    ),
+    "a damaged point": (
+        lambda lib: rewrite(lib / f"{STEM}_milp.nl.sol", b"Options", b"Option"),
+        f"{STEM}_milp.nl.sol",
+        "no solution file of a known kind",
+    ),
+    "a bound above a point": (lambda lib: change(lib / MIQP, **bound_of(1e3)), MIQP, "above the objective"),
+    "a status that does not follow": (
+        lambda lib: change(lib / MIQP, **bound_of(-1.0)),
+        MIQP,
+        "another status or gap",
+    ),
+    "a bound that is none of the bounds": (
+        lambda lib: change(lib / QP, bound=-5.0),
+        QP,
+        "the best of its bounds",
+    ),
+    "a fact in library.solu": (
+        lambda lib: rewrite(lib / "library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
+        "library.solu",
+        "not what its sidecar says",
+    ),
+    "a line in library.solu": (
+        lambda lib: rewrite(lib / "library.solu", b"=", b"~"),
+        "library.solu",
+        "no fact",
+    ),
+    "another checker": (
+        lambda lib: rewrite(lib / "check_point.py", b"1e-8", b"1e-1"),
+        "check_point.py",
+        "is not the checker",
+    ),
+    "a field of another energy": (
+        lambda lib: change(lib / f"{STEM}.about.json", fields__least_2__energy_2norm=0.0),
+        f"{STEM}.about.json",
+        "other energies",
+    ),
+    "another instance": (
+        lambda lib: change(lib / f"{STEM}.instance.json", w_beta=0.5),
+        f"{STEM}.instance.json",
+        "is not the instance",
+    ),
+    "a record of nothing": (
+        lambda lib: add_record(lib, entry="cf_more_n003_qp"),
+        "ledger.json",
+        "not in the library",
+    ),
+    "a record without its field": (
+        lambda lib: add_record(lib, point=f"{STEM}_milp.field.json", point_sha256="0" * 64),
+        f"{STEM}_milp.field.json",
+        "cannot be read",
+    ),
+    "another program": (
+        lambda lib: change(lib / MILP, generator="crossfield 0.0.1"),
+        MILP,
+        "was made by crossfield 0.0.1",
+    ),
+}
+
+
+def told(folder, file, words):
+    found = verify_library(folder)
+    for finding in found:
+        assert "\n" not in str(finding)
+        assert finding.remedy
+        assert str(folder) not in finding.what
+    assert [finding for finding in found if finding.file == file and words in finding.what], "\n".join(
+        map(str, found)
+    )
+    return found
+
+
+@for_each("what", PLAIN)
+def test_what_was_changed_is_found(what, built, tmp_path):
+    spoil, file, words = PLAIN[what]
+    lib = shutil.copytree(built, tmp_path / "lib")
+    spoil(lib)
+    told(lib, file, words)
+
+
+@for_each("what", SEALED)
+def test_what_was_changed_is_found_when_all_checksums_fit_too(what, built, tmp_path):
+    spoil, file, words = SEALED[what]
+    lib = shutil.copytree(built, tmp_path / "lib")
+    spoil(lib)
+    seal(lib)
+    found = told(lib, file, words)
+    assert not [finding for finding in found if "SHA-256" in finding.what and finding.file != "library.json"]
+
+
+def test_sealing_alone_changes_nothing(lib):
+    seal(lib)
+    assert verify_library(lib) == []
+
+
+def test_a_library_as_it_was_built_is_as_it_should_be(built, capsys):
+    assert invoke(["library", "verify", str(built)]) == 0
+    assert "everything is as it should be" in capsys.readouterr().out
+    assert invoke(["library", "verify", str(built), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == []
+
+
+@pytest.mark.parametrize("suffix", ["zip", "gztar", "xztar"])
+def test_an_archive_of_a_library_is_verified(suffix, built, tmp_path, temporary):
+    packed = shutil.make_archive(str(tmp_path / "a"), suffix, built.parent, built.name)
+    assert verify_library(packed) == []
+    assert not list(temporary.iterdir())
+
+
+def test_findings_are_one_line_each_and_the_exit_code_is_1(lib, capsys):
+    (lib / "notes.txt").write_text("x")
+    rewrite(lib / "README.md", b"e", b"E")
+    assert invoke(["library", "verify", str(lib)]) == 1
+    said = capsys.readouterr()
+    assert said.err.splitlines() == [
+        (
+            "crossfield: README.md: has another SHA-256 than SHA256SUMS says; fetch it again, "
+            "or build the library again"
+        ),
+        "crossfield: notes.txt: is not in SHA256SUMS; remove it, or build the library again",
+    ]
+    assert invoke(["library", "verify", str(lib), "--json"]) == 1
+    assert [finding["file"] for finding in json.loads(capsys.readouterr().out)] == ["README.md", "notes.txt"]
+
+
+@pytest.mark.parametrize("path", [".", "absent", "archive"])
+def test_what_is_no_library_is_one_line(path, tmp_path, capsys):
+    (tmp_path / "archive").write_bytes(tar_of([("../evil", b"x")]))
+    assert invoke(["library", "verify", str(tmp_path / path)]) == 1
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    assert said.err.startswith("crossfield: ")
+
+
+# submitting
+
+
+def better_point(library, entry, path):
+    """A solution file as HiGHS writes it: the optimal angles of a convex entry for the
+    jumps of the least 2-norm field.
+    """
+    highspy = pytest.importorskip("highspy")
+    problem = problem_of(library, json.loads((library / f"{entry}.json").read_text()))
+    write(with_integers_fixed(problem, read_field(library / f"{STEM}.field.json")), path.with_suffix(".mps"))
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.setOptionValue("primal_feasibility_tolerance", 1e-10)
+    highs.readModel(str(path.with_suffix(".mps")))
+    highs.run()
+    highs.writeSolution(str(path), 0)
+    return highs.getInfo().objective_function_value
+
+
+ENTRY = f"{STEM}_miqp"
+
+
+@pytest.fixture(scope="module")
+def solved(built, tmp_path_factory):
+    """HiGHS's better point of an entry, its objective, and the library after it was submitted;
+    not to be changed.
+    """
+    folder = tmp_path_factory.mktemp("solved")
+    objective = better_point(built, ENTRY, folder / "found.sol")
+    lib = shutil.copytree(built, folder / "lib")
+    happened = submit_point(
+        folder / "found.sol", lib, entry=ENTRY, solver="HiGHS", version="1.15", seconds=0.5, by="A. Body"
+    )
+    return folder / "found.sol", objective, lib, happened
+
+
+def submit(file, lib):
+    return submit_point(file, lib, entry=ENTRY, solver="HiGHS", version="1.15", seconds=0.5, by="A. Body")
+
+
+def test_a_better_point_is_kept_with_its_provenance(built, solved):
+    _, objective, lib, happened = solved
+    before = json.loads((built / f"{ENTRY}.json").read_text())["best"]
+    assert happened.better
+    assert happened.known == before["objective"]
+    assert happened.objective == pytest.approx(objective, rel=1e-9)
+    assert objective < before["objective"] * (1 - 1e-3)
+    best = json.loads((lib / f"{ENTRY}.json").read_text())["best"]
+    assert best["objective"] == happened.objective
+    assert [best[key] for key in ("solver", "version", "seconds", "by")] == ["HiGHS", "1.15", 0.5, "A. Body"]
+    found = check_point.check(str(lib / f"{ENTRY}.mps.gz"), str(lib / f"{ENTRY}.sol"))
+    assert float(found.objective) == pytest.approx(objective, rel=1e-9)
+    assert found.worst < 1e-12
+
+
+def test_the_library_is_as_it_should_be_after_a_submission(solved):
+    assert verify_library(solved[2]) == []
+
+
+def test_a_build_from_specification_and_ledger_gives_the_same_library(built, solved, tmp_path):
+    lib = solved[2]
+    (tmp_path / "spec.toml").write_text(SPEC.replace("title", 'ledger = "ledger.json"\ntitle', 1))
+    for path in (lib / "ledger.json", *lib.glob(f"{ENTRY}.field.json")):
+        shutil.copy(path, tmp_path)
+    build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
+    assert everything_below(tmp_path / "lib") == everything_below(lib)
+    assert everything_below(lib) != everything_below(built)
+
+
+def test_a_point_that_is_no_better_changes_nothing(solved, tmp_path, capsys):
+    file, _, done, _ = solved
+    lib = shutil.copytree(done, tmp_path / "lib")
+    before = everything_below(lib)
+    shutil.copy(lib / f"{ENTRY}.sol", tmp_path / f"{ENTRY}.sol")
+    for path in (file, tmp_path / f"{ENTRY}.sol"):
+        assert invoke(["library", "submit-point", str(path), "--library", str(lib), "--entry", ENTRY]) == 0
+        assert "not better" in capsys.readouterr().out
+    assert everything_below(lib) == before
+
+
+def test_the_entry_is_found_by_the_name_of_the_file_or_by_its_columns(built, solved, tmp_path):
+    lib = solved[2]
+    for name in (f"{ENTRY}.sol", f"{ENTRY}.of-highs.sol", "anything.sol"):
+        shutil.copy(solved[0], tmp_path / name)
+        assert submit_point(tmp_path / name, lib).entry == ENTRY
+
+
+def states(before, after):
+    """Folders as a submission may leave them when it is stopped: files are written one by one,
+    checksums last.
+    """
+    changed = [name for name in after if after[name] != before.get(name)]
+    field, ledger, sums = f"{ENTRY}.field.json", "ledger.json", "SHA256SUMS"
+    rest = sorted(set(changed) - {field, ledger, sums})
+    assert {field, ledger, sums} <= set(changed)
+    sidecars = [name for name in rest if name.count(".") == 1 and name.startswith("cf_")]
+    others = [name for name in rest if name not in sidecars and name.startswith("cf_")]
+    return {
+        "field": [field],
+        "ledger": [field, ledger],
+        "half of the files": [field, ledger, *others[: len(others) // 2]],
+        "all but the sidecars": [field, ledger, *others],
+        "the sidecars too": [field, ledger, *others, *sidecars],
+        "all but the checksums": [field, ledger, *rest],
+    }
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "field",
+        "ledger",
+        "half of the files",
+        "all but the sidecars",
+        "the sidecars too",
+        "all but the checksums",
+    ],
+)
+def test_a_submission_that_was_stopped_is_told_and_mended_by_the_next(state, built, solved, tmp_path):
+    before, after = everything_below(built), everything_below(solved[2])
+    lib = shutil.copytree(built, tmp_path / "lib")
+    for name in states(before, after)[state]:
+        (lib / name).write_bytes(after[name])
+    assert verify_library(lib)
+    submit(solved[0], lib)
+    assert everything_below(lib) == after
+
+
+def spoiled(solved, tmp_path, old, new):
+    """The point with the value of its first column of a name changed."""
+    lines = solved[0].read_text().splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith(old))
+    lines[at] = new
+    (tmp_path / "spoiled.sol").write_text("\n".join(lines) + "\n")
+    return tmp_path / "spoiled.sol"
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("alpha_00_00", "alpha_00_00 9.5", "not a feasible point"),
+        ("p1_01_00_u", "p1_01_00_u 0.4", "not a feasible point"),
+        ("alpha_00_00", "alpha_09_09 0.5", "another instance, formulation or option"),
+        ("alpha_00_00", "alpha_00_00 nan", "line"),
+    ],
+)
+def test_a_point_that_cannot_be_is_one_line_and_changes_nothing(
+    old, new, words, solved, built, tmp_path, capsys
+):
+    lib = shutil.copytree(built, tmp_path / "lib")
+    before = everything_below(lib)
+    file = spoiled(solved, tmp_path, old, new)
+    assert invoke(["library", "submit-point", str(file), "--library", str(lib), "--entry", ENTRY]) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith(f"crossfield: {file}: ")
+    assert words in said.err
+    assert said.err.count("\n") == 1
+    assert everything_below(lib) == before
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"entry": "../x"}, "no entry"),
+        ({"entry": "cf_more"}, "no entry"),
+        ({"entry": f"{STEM}_milp"}, "another instance, formulation or option"),
+        ({"entry": ENTRY, "by": "two\nlines"}, "one line"),
+        ({"entry": ENTRY, "solver": "x" * 300}, "at most 200"),
+    ],
+)
+def test_wrong_options_are_refused_before_anything_is_written(options, words, solved, built, tmp_path):
+    lib = shutil.copytree(built, tmp_path / "lib")
+    before = everything_below(lib)
+    with pytest.raises(CrossfieldError, match=words):
+        submit_point(solved[0], lib, **options)
+    assert everything_below(lib) == before
+
+
+def test_a_file_without_a_point_is_one_line(built, capsys):
+    file = SOLUTIONS / "highs-1.15.1_infeasible_style0.sol"
+    assert invoke(["library", "submit-point", str(file), "--library", str(built), "--entry", ENTRY]) == 1
+    assert "holds no point" in capsys.readouterr().err
+
+
+def test_a_point_of_another_instance_fits_no_entry(built, solved, tmp_path):
+    lines = [line.replace("_00_00", "_07_07") for line in solved[0].read_text().splitlines()]
+    (tmp_path / "other.sol").write_text("\n".join(lines) + "\n")
+    with pytest.raises(SolutionError, match="fits no entry"):
+        submit_point(tmp_path / "other.sol", built)
+
+
+def test_a_point_below_a_dual_bound_is_a_contradiction_that_is_told(solved, lib):
+    change(lib / f"{ENTRY}.json", **bound_of(solved[1] * 1.01))
+    with pytest.raises(SolutionError, match="that bound is wrong"):
+        submit(solved[0], lib)
+
+
+def test_a_library_of_another_version_takes_no_points(solved, lib):
+    change(lib / "library.json", generator="crossfield 0.0.1")
+    with pytest.raises(InputError, match="was built by crossfield"):
+        submit(solved[0], lib)
+
+
+def test_an_archive_takes_no_points(solved, built, tmp_path):
+    packed = shutil.make_archive(str(tmp_path / "a"), "zip", built.parent, built.name)
+    with pytest.raises(InputError, match="unpack the archive"):
+        submit(solved[0], packed)
+
+
+def test_all_formulations_and_formats_verify(tmp_path):
+    text = SPEC.replace(
+        'formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]\n', ""
+    )
+    text = text.replace(
+        'formats = ["nl", "mps"]\ncompress = true',
+        'facets = ["hull", "printed"]',
+    )
+    (tmp_path / "spec.toml").write_text(text)
+    library = build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
+    assert len(library.entries) == 11
+    assert verify_library(tmp_path / "lib") == []
+    assert read_library(tmp_path / "lib").document == library.document

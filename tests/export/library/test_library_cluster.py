@@ -1,0 +1,132 @@
+"""The library built on a cluster: a real scheduler and two real workers,
+one of which is killed in the middle.
+"""
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.plan.spec import read_spec
+
+SPEC = """format = "crossfield-library-spec"
+version = 1
+title = "a library for tests of clusters"
+
+[rungs.tiny]
+sizes = [3, 4]
+formats = ["nl", "mps"]
+
+[rungs.medium]
+sizes = [6]
+formats = ["nl", "mps"]
+compress = true
+
+[[sketches]]
+name = "mouse"
+sample = "mouse"
+
+[[sketches]]
+name = "skew"
+sample = "skew"
+"""
+
+BUILD = """import sys
+from crossfield.export.library.building.build import build
+from crossfield.export.library.plan.spec import read_spec
+spec, folder, address = sys.argv[1:4]
+build(read_spec(spec), folder, scheduler=address, progress=lambda line: print(line, flush=True))
+"""
+
+
+def started(arguments, log, words):
+    """A process whose output goes to a file, once that holds what the words match; and the match."""
+    with log.open("wb") as stream:
+        process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-m", *arguments], stdout=stream, stderr=subprocess.STDOUT
+        )
+    while True:
+        found = re.search(words, log.read_text("utf-8", "replace"))
+        if found:
+            return process, found
+        assert process.poll() is None, log.read_text("utf-8", "replace")
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Address of a scheduler on this machine, and its two workers."""
+    pytest.importorskip("distributed")
+    arguments = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler, found = started(
+        arguments, tmp_path / "scheduler.log", r"Scheduler at: +(tcp://127\.0\.0\.1:\d+)"
+    )
+    processes = [scheduler]
+    address = found.group(1)
+    try:
+        for number in (1, 2):
+            arguments = [
+                "distributed.cli.dask_worker",
+                address,
+                "--nthreads",
+                "1",
+                "--no-nanny",
+                "--no-dashboard",
+                "--name",
+                f"w{number}",
+            ]
+            arguments += ["--local-directory", str(tmp_path / f"worker{number}")]
+            processes.append(started(arguments, tmp_path / f"worker{number}.log", "Registered to")[0])
+        yield address, processes[1:]
+    finally:
+        for process in reversed(processes):
+            process.kill()
+            process.wait()
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.slow
+def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(tmp_path, cluster):
+    address, (first, second) = cluster
+    spec = tmp_path / "spec.toml"
+    spec.write_text(SPEC)
+    out, lines = tmp_path / "cluster", []
+    command = [sys.executable, "-c", BUILD, str(spec), str(out), address]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        for line in process.stdout:
+            lines.append(line.strip())
+            if len(lines) == 20:
+                first.kill()
+        assert process.wait() == 0
+    assert first.wait() == -signal.SIGKILL
+    assert second.poll() is None
+
+    local = build(read_spec(spec), tmp_path / "local")
+    names = [line.split(": ")[1] for line in lines[:-1]]
+    assert len(lines) > 40
+    assert len(names) == len(set(names))
+    assert set(names) == set(local.document["entries"])
+    assert [int(line.split()[0]) for line in lines[:-1]] == list(range(1, len(names) + 1))
+    assert content(out) == content(local.folder)
+
+
+def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, capfd):
+    pytest.importorskip("distributed")
+    spec = tmp_path / "spec.toml"
+    spec.write_text(SPEC)
+    for address in ("nonsense", "ftp://127.0.0.1:1"):
+        assert (
+            invoke(["library", "build", str(spec), "-o", str(tmp_path / "out"), "--scheduler", address]) == 1
+        )
+        shown = capfd.readouterr().err
+        assert len(shown.splitlines()) == 1
+        assert "no scheduler answers at" in shown
+    assert not list(Path(tmp_path / "out").glob("cf_*"))

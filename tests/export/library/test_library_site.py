@@ -1,0 +1,789 @@
+"""The site of a library: its pages and files as they lie on disk, and as a real browser shows them."""
+
+import functools
+import hashlib
+import http.server
+import json
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.documents.mathematics import model
+from crossfield.export.library.ledger import points
+from crossfield.export.library.plan.spec import read_spec
+from crossfield.export.library.site.site import count, percent, size, value, write_site
+from crossfield.export.pictures.svg import told
+from crossfield.models.errors import InputError, InstanceError, OutputError
+from crossfield.models.field.file import read_field
+from crossfield.models.formulations.catalogue import FORMULATIONS, declare
+from crossfield.models.instance.file import read_instance
+from loops import for_each
+from oracles import browser as browser_program
+
+SPEC = """format = "crossfield-library-spec"
+version = 1
+title = "a small library"
+formulations = ["minlp-quartic", "milp-mccormick", "qp-fixed"]
+
+[rungs.tiny]
+sizes = [4]
+formats = ["nl", "gms", "lp", "mps"]
+
+[rungs.small]
+sizes = [6]
+formats = ["nl", "mps"]
+compress = true
+
+[[sketches]]
+name = "mouse"
+sample = "mouse"
+
+[[sketches]]
+name = "rand"
+random = "ragged"
+seeds = [1]
+"""
+ENTRY, INSTANCE = "cf_mouse_n006_milp", "cf_mouse_n006"
+KINDS = ("index.html", "about.html", f"instance/{INSTANCE}.html", f"entry/{ENTRY}.html")
+MATHML = "{http://www.w3.org/1998/Math/MathML}"
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("library")
+    (folder / "spec.toml").write_text(SPEC)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(points, "_ROUNDS", 1)  # how good the fields are is nothing to the site
+        return build(read_spec(folder / "spec.toml"), folder / "built")
+
+
+@pytest.fixture(scope="module")
+def site(library, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("web") / "site"
+    write_site(library.folder, folder)
+    return folder
+
+
+@pytest.fixture
+def other_library(library, tmp_path):
+    """A copy that may be damaged."""
+    return Path(shutil.copytree(library.folder, tmp_path / "library"))
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def content_of(folder):
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    }
+
+
+def sealed(folder):
+    """The folder after its SHA256SUMS was brought up to date."""
+    names = sorted(path.name for path in folder.iterdir() if path.name != "SHA256SUMS")
+    sums = [f"{hashlib.sha256((folder / name).read_bytes()).hexdigest()}  {name}\n" for name in names]
+    (folder / "SHA256SUMS").write_text("".join(sums))
+    return folder
+
+
+class Page(HTMLParser):
+    """Links, ids, headings and shown checksums of a page."""
+
+    VOID = frozenset({"meta", "link", "img", "input", "br", "wbr"})
+
+    def __init__(self, path):
+        super().__init__()
+        self.elements, self.open, self.texts, self.misplaced = [], [], [], []
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.misplaced.append((tag, self.getpos()))
+
+    def handle_data(self, data):
+        if data.strip():
+            self.texts.append((self.open[-1] if self.open else "", data.strip()))
+
+    def all(self, *tags):
+        return [attributes for tag, attributes in self.elements if tag in tags]
+
+    @property
+    def ids(self):
+        return [attributes["id"] for _, attributes in self.elements if "id" in attributes]
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    return {path.relative_to(site).as_posix(): Page(path) for path in sorted(site.rglob("*.html"))}
+
+
+# what is written
+
+
+def test_there_is_a_page_for_every_entry_and_every_instance(library, pages):
+    instances = {entry["instance"]["file"].removesuffix(".instance.json") for entry in library.entries}
+    expected = {
+        "index.html",
+        "about.html",
+        *(f"entry/{entry['name']}.html" for entry in library.entries),
+        *(f"instance/{name}.html" for name in instances),
+    }
+    assert set(pages) == expected
+    assert (len(library.entries), len(instances)) == (12, 4)
+
+
+def test_the_same_library_gives_the_same_bytes(library, site, tmp_path):
+    write_site(library.folder, tmp_path / "again")
+    assert content_of(tmp_path / "again") == content_of(site)
+
+
+def test_the_whole_library_is_in_the_folder_of_files(library, site):
+    assert content_of(site / "files") == content_of(library.folder)
+
+
+def test_the_command_says_how_many_pages_there_are_and_replaces_an_earlier_site(
+    library, site, tmp_path, capsys
+):
+    earlier = shutil.copytree(site, tmp_path / "web")
+    (earlier / "index.html").write_text("old")
+    (earlier / "entry" / "cf_gone.html").write_text("old")
+    assert invoke(["library", "site", str(library.folder), "-o", str(earlier)]) == 0
+    assert "18 pages" in capsys.readouterr().out
+    assert content_of(earlier) == content_of(site)
+    assert names_in(tmp_path) == ["web"]
+
+
+def test_a_run_that_fails_leaves_the_earlier_site_and_nothing_else(site, other_library, tmp_path):
+    earlier = Path(shutil.copytree(site, tmp_path / "web"))
+    path = other_library / f"{INSTANCE}.field.json"
+    path.write_text(path.read_text().replace('"pixels"', '"pixel"', 1))
+    with pytest.raises(InstanceError, match=rf"{INSTANCE}\.field\.json"):
+        write_site(sealed(other_library), earlier)
+    assert content_of(earlier) == content_of(site)
+    assert names_in(tmp_path) == ["library", "web"]
+
+
+def test_a_file_that_differs_from_its_checksum_is_named(other_library, tmp_path):
+    with (other_library / f"{ENTRY}.sol").open("a") as stream:
+        stream.write("\n")
+    with pytest.raises(InputError, match=rf"{ENTRY}\.sol: is missing or differs"):
+        write_site(other_library, tmp_path / "web")
+    with pytest.raises(InstanceError, match=rf"disagree about {ENTRY}\.sol"):
+        write_site(sealed(other_library), tmp_path / "web")
+    assert names_in(tmp_path) == ["library"]
+
+
+@pytest.mark.parametrize("line", ["", "../secret", "a/b", ".hidden"])
+def test_checksums_of_places_elsewhere_are_refused(other_library, tmp_path, line):
+    with (other_library / "SHA256SUMS").open("a") as stream:
+        stream.write(f"{64 * '0'}  {line}\n")
+    with pytest.raises(InputError, match="is no checksum of a file of the library"):
+        write_site(other_library, tmp_path / "web")
+
+
+def test_a_folder_with_other_things_is_left_alone(library, tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(OutputError, match=r"holds 'thesis\.tex', which is no part of a site"):
+        write_site(library.folder, tmp_path)
+    with pytest.raises(OutputError, match="is a file"):
+        write_site(library.folder, tmp_path / "thesis.tex")
+    for inside in (library.folder, library.folder / "web"):
+        with pytest.raises(OutputError, match="lies inside the library"):
+            write_site(library.folder, inside)
+    assert names_in(tmp_path) == ["thesis.tex"]
+
+
+def test_texts_of_files_are_escaped_everywhere(other_library, tmp_path):
+    hostile = "\"'><img src=x onerror=alert(1)> & <script>"
+    for path in other_library.glob("cf_*.json"):
+        document = json.loads(path.read_text())
+        if document.get("format") in {"crossfield-library-entry", "crossfield-library-instance"}:
+            document |= {"title": hostile, "generator": hostile}
+            document["source"] |= {
+                "sketch": hostile,
+                "description": hostile,
+                "parameters": {hostile: hostile},
+            }
+            if document["format"] == "crossfield-library-entry":
+                document |= {
+                    "transformations": [hostile],
+                    "refused": {hostile: hostile},
+                    "references": [hostile],
+                    "paper": hostile,
+                }
+                document["best"] |= {"solver": hostile, "version": hostile, "by": hostile}
+                document["files"][0]["dialect"] = hostile
+                relation = {"formulation": hostile, "entry": None, "why": hostile}
+                document["equivalent"] = document["not_equivalent"] = [relation]
+            path.write_text(json.dumps(document))
+    index = json.loads((other_library / "library.json").read_text())
+    index["generator"] = index["spec"]["title"] = hostile
+    (other_library / "library.json").write_text(json.dumps(index))
+    (other_library / "CITATION.cff").write_text(hostile)
+    write_site(sealed(other_library), tmp_path / "web")
+    for path in (tmp_path / "web").rglob("*.html"):
+        page = Page(path)
+        assert [attributes.get("defer") for attributes in page.all("script")] == [None]
+        assert not [each for _, each in page.elements if "onerror" in each]
+        assert not page.misplaced
+        assert page.open == []
+    shown = Page(tmp_path / "web" / "entry" / f"{ENTRY}.html")
+    assert sum(hostile in text for _, text in shown.texts) >= 10
+
+
+# pages as documents
+
+
+def test_every_internal_link_leads_somewhere_and_only_anchors_lead_out(site, pages):
+    for name, page in pages.items():
+        targets = [each["href"] for each in page.all("a", "link")] + [
+            each["src"] for each in page.all("img", "script")
+        ]
+        for target in targets:
+            parts = urlsplit(target)
+            if parts.scheme:
+                assert parts.scheme == "https"
+                assert target in [each["href"] for each in page.all("a")]
+                continue
+            path = (site / name).parent / unquote(parts.path) if parts.path else site / name
+            assert path.resolve().is_relative_to(site)
+            assert path.is_file(), (name, target)
+            if parts.fragment:
+                assert parts.fragment in pages[path.resolve().relative_to(site).as_posix()].ids
+    css = (site / "site.css").read_text()
+    assert "url(" not in css
+    assert "@import" not in css
+
+
+def test_checksums_and_sizes_on_the_pages_are_those_of_the_files(library, site, pages):
+    checked = set()
+    for name, page in pages.items():
+        if "/" not in name:
+            continue
+        rows = re.findall(
+            r'href="\.\./files/([^"]+)" download>\1</a></th>(?:\s*<td>[^<]*</td>)?\s*<td '
+            r'class="number">([^<]+)</td>\s*'
+            r'<td><code class="sum">([0-9a-f]{64})</code>',
+            (site / name).read_text(),
+        )
+        for file, told_size, told_sum in rows:
+            data = (site / "files" / file).read_bytes()
+            assert hashlib.sha256(data).hexdigest() == told_sum
+            assert size(len(data)) == told_size
+            checked.add(file)
+        assert len(rows) == len([each for each in page.all("code") if each.get("class") == "sum"])
+    of_entries = {file["name"] for entry in library.entries for file in entry["files"]}
+    assert of_entries < checked
+
+
+def test_pages_are_well_formed_and_have_what_a_screen_reader_needs(pages):
+    titles = []
+    for name, page in pages.items():
+        assert page.misplaced == [], name
+        assert page.open == []
+        assert page.all("html")[0]["lang"] == "en"
+        assert (
+            len(page.all("h1"))
+            == len(page.all("main"))
+            == len(page.all("header"))
+            == len(page.all("footer"))
+            == 1
+        )
+        assert len(set(page.ids)) == len(page.ids)
+        assert all("alt" in each for each in page.all("img"))
+        assert len(page.all("caption")) == len(page.all("table"))
+        assert all(each.get("scope") for each in page.all("th"))
+        assert all(each.get("aria-label") for each in page.all("nav"))
+        assert all(
+            {"aria-label", "aria-labelledby"} & set(each)
+            for _, each in page.elements
+            if each.get("role") == "region"
+        )
+        assert all(
+            each["aria-labelledby"] in page.ids for _, each in page.elements if "aria-labelledby" in each
+        )
+        levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+        assert levels[0] == 1
+        assert all(after <= before + 1 for before, after in pairwise(levels))
+        titles += [text for tag, text in page.texts if tag == "title"]
+    assert len(set(titles)) == len(pages)
+
+
+def test_an_entry_shows_what_its_sidecar_says(library, site, pages):
+    for entry in library.entries:
+        page = pages[f"entry/{entry['name']}.html"]
+        texts = {text for _, text in page.texts}
+        wanted = [
+            *map(count, entry["counts"].values()),
+            entry["class"],
+            entry["status"],
+            repr(entry["best"]["objective"] + 0.0),
+            *(repr(bound["bound"] + 0.0) for bound in entry["bounds"]),
+        ]
+        assert {each for each in wanted if each not in texts} == set()
+        source = "\n".join(text for _, text in page.texts)
+        assert model(entry["formulation"], entry["options"]).latex in source
+        download = [each["href"] for each in page.all("a") if "download" in each]
+        assert {f"../files/{file['name']}" for file in entry["files"]} <= set(download)
+
+
+def test_the_command_that_a_page_shows_checks_the_point(site, pages):
+    for name in (f"entry/{ENTRY}.html", f"entry/{INSTANCE}_quartic.html", "about.html"):
+        (command,) = {text for tag, text in pages[name].texts if text.startswith("python3 check_point.py")}
+        program, *arguments = command.split()
+        assert program == "python3"
+        done = subprocess.run(
+            [sys.executable, *arguments], cwd=site / "files", capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_numbers_are_written_for_people():
+    assert [count(n) for n in (0, 999, 1234567)] == ["0", "999", "1\u202f234\u202f567"]
+    assert [value(x) for x in (None, 0.0, -0.0, -1.5, 3.14159265, 1e-28)] == [
+        "–",
+        "0",
+        "0",
+        "−1.5",
+        "3.14159",
+        "1e−28",
+    ]
+    assert [percent(x) for x in (None, 0.0, 1e-9, 0.12345, 1.0)] == [
+        "–",
+        "0\u202f%",
+        "≈ 0\u202f%",
+        "12.3\u202f%",
+        "100\u202f%",
+    ]
+    assert [size(n) for n in (0, 999, 12345, 2500000)] == [
+        "0\u202fB",
+        "999\u202fB",
+        "12.3\u202fkB",
+        "2.5\u202fMB",
+    ]
+
+
+# pictures and mathematics
+
+
+def test_pictures_hold_the_strokes_and_the_singularities(library, site):
+    for entry in library.entries:
+        name = entry["instance"]["file"].removesuffix(".instance.json")
+        instance = read_instance(library.folder / entry["instance"]["file"])
+        field = read_field(library.folder / f"{name}.field.json")
+        picture = ET.parse(site / "pictures" / f"{name}.svg").getroot()
+        strokes = [each.get("d").count("M") for each in picture if each.get("class") == "stroke"]
+        assert sum(strokes) == len(instance.theta)
+        drawn = ET.parse(site / "pictures" / f"{name}.field.svg").getroot()
+        crosses = {
+            each.get("class"): each.get("d").count("M") for each in drawn if each.get("class") in {"u", "v"}
+        }
+        assert crosses == {"u": instance.grid.size, "v": instance.grid.size}
+        index = field.singularities.index
+        dots = [each.get("class") for each in drawn if each.tag.endswith("circle")]
+        assert (dots.count("positive"), dots.count("negative")) == (sum(index > 0), sum(index < 0))
+        assert told(field).startswith(f"{len(index) or 'no'} singularit")
+
+
+@for_each("name", FORMULATIONS)
+def test_the_mathematics_has_every_line_of_the_declaration(name):
+    shown, declared = model(name, {}), declare(name)
+    assert len(shown.lines) == len(declared.objective) + len(declared.rows) + len(declared.variables)
+    assert [line.label for line in shown.lines if line.label] == [row.paper for row in declared.rows]
+    assert [line.role for line in shown.lines if line.role] == [
+        "minimise",
+        *(["subject to"] if declared.rows else []),
+        "where",
+    ]
+    for piece in (each for line in shown.lines for each in (*line.pieces, line.over) if each):
+        root = ET.fromstring(piece)
+        assert root.tag == f"{MATHML}math"
+        assert "\\" not in "".join(root.itertext())
+        assert "&" not in "".join(root.itertext())
+    fractions = sum(piece.count("<mfrac>") for line in shown.lines for piece in line.pieces)
+    assert fractions == len(re.findall(r"\\t?frac", shown.latex))
+
+
+# in a browser
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def address(site):
+    """Where a plain web server shows the site."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=site))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A headless Chromium; its logs are kept."""
+    from selenium import webdriver
+
+    driver = shutil.which("chromedriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser_program()
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=driver))
+    yield browser
+    browser.quit()
+
+
+@pytest.fixture
+def browser(chromium):
+    """The browser as a desktop in light mode, with a fresh page and empty logs."""
+    show(chromium)
+    chromium.get("about:blank")
+    for log in ("browser", "performance"):
+        chromium.get_log(log)
+    return chromium
+
+
+def show(browser, *, width=1280, height=900, scheme="light", media=""):
+    phone = width < 600
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": features})
+
+
+def press(browser, *keys):
+    from selenium.webdriver import ActionChains
+
+    ActionChains(browser).send_keys(*keys).perform()
+
+
+def choose(browser, name, option):
+    """Choose as a person does, without the list that a headless browser has no window for."""
+    script = (
+        "const [name, value] = arguments, field = document.querySelector(`[name=${name}]`); "
+        "field.value = value;"
+    )
+    browser.execute_script(
+        f"{script} field.dispatchEvent(new Event('input', {{ bubbles: true }}))", name, option
+    )
+    assert find(browser, f"[name={name}]").get_attribute("value") == option
+
+
+def find(browser, selector):
+    return browser.find_element("css selector", selector)
+
+
+def shown_rows(browser):
+    """Rows of the table that are seen: name, and what the numeric columns hold."""
+    script = """return [...document.querySelectorAll('#table tbody tr')].filter(row => row.offsetParent)
+      .map(row => [row.cells[0].innerText, ...[...row.cells].slice(6, 13).map(cell => cell.dataset.v)])"""
+    return browser.execute_script(script)
+
+
+def head(browser, title):
+    return find(browser, f"#table thead th:nth-child({COLUMNS.index(title) + 1})")
+
+
+COLUMNS = (
+    "Name",
+    "Sketch",
+    "Size",
+    "Formulation",
+    "Class",
+    "Type",
+    "Variables",
+    "Integer",
+    "Constraints",
+    "Nonzeros",
+    "Best objective",
+    "Best bound",
+    "Gap",
+    "Status",
+)
+
+
+def test_no_page_complains_or_asks_anything_of_another_place(browser, address):
+    for page in KINDS:
+        browser.get(f"{address}/{page}")
+        browser.execute_script(
+            "document.querySelectorAll('img').forEach(each => each.loading = 'eager'); scrollTo(0, 1e6)"
+        )
+        assert browser.execute_script(
+            "return [...document.images].every(each => each.complete ? each.naturalWidth : true)"
+        )
+    assert browser.get_log("browser") == []
+    events = [json.loads(each["message"])["message"] for each in browser.get_log("performance")]
+    asked = {
+        event["params"]["request"]["url"]
+        for event in events
+        if event["method"] == "Network.requestWillBeSent"
+    }
+    statuses = {
+        event["params"]["response"]["status"]
+        for event in events
+        if event["method"] == "Network.responseReceived"
+    }
+    assert {
+        f"{address}/{page}" for page in (*KINDS, "site.css", "site.js", f"pictures/{INSTANCE}.svg")
+    } <= asked
+    assert [url for url in asked if not url.startswith((f"{address}/", "data:", "about:"))] == []
+    assert statuses <= {200, 304}
+    assert browser.get_cookies() == []
+
+
+def test_a_click_on_a_head_sorts_by_value_and_what_is_missing_comes_last(browser, address, library):
+    browser.get(f"{address}/index.html")
+    assert [row[0] for row in shown_rows(browser)] == [entry["name"] for entry in library.entries]
+    for title, column in (("Nonzeros", 4), ("Best objective", 5), ("Best bound", 6)):
+        for order in ("ascending", "descending"):
+            find(head(browser, title), "button").click()
+            assert head(browser, title).get_attribute("aria-sort") == order
+            held = [row[column] for row in shown_rows(browser)]
+            known = [float(each) for each in held if each]
+            assert known == sorted(known, reverse=order == "descending")
+            assert all(not each for each in held[len(known) :])
+    assert len(known) < len(held)
+    others = [
+        each.get_attribute("aria-sort") for each in browser.find_elements("css selector", "#table thead th")
+    ]
+    assert others.count("none") == len(COLUMNS) - 1
+    find(head(browser, "Name"), "button").click()
+    names = [row[0] for row in shown_rows(browser)]
+    assert (
+        names.index("cf_mouse_n004_qp")
+        < names.index("cf_mouse_n006_milp")
+        < names.index("cf_rand_n004_s1_milp")
+    )
+
+
+def test_everything_works_from_the_keyboard(browser, address):
+    from selenium.webdriver import Keys
+
+    browser.get(f"{address}/index.html")
+    press(browser, Keys.TAB)
+    focused = browser.switch_to.active_element
+    assert focused.text == "Skip to the content"
+    assert focused.rect["y"] >= 0
+    press(browser, Keys.ENTER)
+    assert browser.switch_to.active_element.get_attribute("id") == "main"
+    seen = []
+    while "Variables" not in seen:
+        press(browser, Keys.TAB)
+        focused = browser.switch_to.active_element
+        style = "const s = getComputedStyle(arguments[0]); return s.outlineStyle + parseFloat(s.outlineWidth)"
+        assert browser.execute_script(style, focused) == "solid3"
+        seen.append(focused.get_attribute("name") or focused.text)
+        assert len(seen) < 60
+    assert {"q", "family", "status", "Clear", "Name"} <= set(seen)
+    press(browser, Keys.ENTER)
+    assert head(browser, "Variables").get_attribute("aria-sort") == "ascending"
+    press(browser, Keys.SPACE)
+    assert head(browser, "Variables").get_attribute("aria-sort") == "descending"
+    assert browser.switch_to.active_element.text == "Variables"
+    browser.execute_script("document.querySelector('select[name=family]').focus()")
+    press(browser, "rand")
+    assert find(browser, "#told").text == "6 of 12 entries"
+    browser.execute_script("document.querySelector('input[name=q]').focus()")
+    press(browser, "MILP n006")
+    assert [row[0] for row in shown_rows(browser)] == ["cf_rand_n006_s1_milp"]
+
+
+def test_filters_narrow_the_table_and_live_in_the_address(browser, address):
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    browser.get(f"{address}/index.html")
+    choose(browser, "class", "MILP")
+    choose(browser, "rung", "small")
+    assert {row[0] for row in shown_rows(browser)} == {"cf_mouse_n006_milp", "cf_rand_n006_s1_milp"}
+    find(head(browser, "Name"), "button").click()
+    find(head(browser, "Name"), "button").click()
+    find(browser, "input[name=q]").send_keys("mouse & <b>")
+    assert find(browser, "#told").text == "0 of 12 entries"
+    find(browser, "input[name=q]").clear()
+    find(browser, "input[name=q]").send_keys("MCC")
+    state, before = browser.current_url, shown_rows(browser)
+    assert urlsplit(state).fragment == "q=MCC&rung=small&class=MILP&sort=name&order=descending"
+    assert [row[0] for row in before] == ["cf_rand_n006_s1_milp", "cf_mouse_n006_milp"]
+    browser.get("about:blank")
+    browser.get(state)
+    assert shown_rows(browser) == before
+    assert head(browser, "Name").get_attribute("aria-sort") == "descending"
+    browser.execute_script("location.hash = 'family=nobody&status=optimal&sort=nothing&order=up'")
+    # The browser tells the page of a new address when it likes, not before the next line.
+    WebDriverWait(browser, 200).until(lambda _: find(browser, "#told").text == "4 of 12 entries")
+    assert {row[0].rpartition("_")[2] for row in shown_rows(browser)} == {"qp"}
+    browser.execute_script("location.hash = 'gallery'")
+    assert find(browser, "#told").text == "4 of 12 entries"
+    find(browser, "button[type=reset]").click()
+    assert find(browser, "#told").text == "12 of 12 entries"
+    assert len(shown_rows(browser)) == 12
+    browser.get("about:blank")
+    browser.get(f"{address}/index.html#entries")
+    assert find(browser, "#told").text == "12 of 12 entries"
+
+
+def test_it_works_from_a_folder_without_any_server(browser, site):
+    browser.get((site / "index.html").as_uri())
+    find(browser, "input[name=q]").send_keys("qp-fixed")
+    find(head(browser, "Variables"), "button").click()
+    held = [float(row[1]) for row in shown_rows(browser)]
+    assert len(held) == 4
+    assert held == sorted(held)
+    assert browser.current_url.endswith("index.html#q=qp-fixed&sort=variables")
+    find(browser, f"a[href='instance/{INSTANCE}.html']").click()
+    assert find(browser, "h1").text == INSTANCE
+    find(browser, f"a[href='../entry/{ENTRY}.html']").click()
+    assert find(browser, "h1").text == ENTRY
+    assert browser.get_log("browser") == []
+
+
+@for_each("width", [320, 390])
+@for_each("page", KINDS)
+def test_a_phone_never_scrolls_sideways(browser, address, page, width):
+    show(browser, width=width, height=844)
+    browser.get(f"{address}/{page}")
+    browser.execute_script("document.querySelectorAll('details').forEach(each => each.open = true)")
+    assert browser.execute_script("return [innerWidth, document.documentElement.scrollWidth]") == [
+        width,
+        width,
+    ]
+    wide = browser.execute_script(
+        "return [...document.querySelectorAll('main *')].filter(each => each.getBoundingClientRect().right "
+        "> innerWidth + 1"
+        " && !each.closest('.scroll, .model, pre, .hidden')).map(each => each.outerHTML.slice(0, 80))"
+    )
+    assert wide == []
+
+
+CONTRAST = """
+const channel = x => (x /= 255) <= .04045 ? x / 12.92 : ((x + .055) / 1.055) ** 2.4;
+const parse = text => text.match(/[\\d.]+/g).map(Number);
+const light = ([r, g, b]) => .2126 * channel(r) + .7152 * channel(g) + .0722 * channel(b);
+const behind = each => { for (; each; each = each.parentElement) {
+  const colour = parse(getComputedStyle(each).backgroundColor);
+  if (colour.length === 3 || colour[3] === 1) return colour; } return [255, 255, 255]; };
+const found = [];
+for (const each of document.querySelectorAll('body *')) {
+  if (![...each.childNodes].some(node => node.nodeType === 3 && node.data.trim())) continue;
+  if (!each.getClientRects().length) continue;
+  const [a, b] = [light(parse(getComputedStyle(each).color)), light(behind(each))];
+  found.push([(Math.max(a, b) + .05) / (Math.min(a, b) + .05), each.outerHTML.slice(0, 80)]);
+}
+return found.sort((a, b) => a[0] - b[0]);
+"""
+
+
+@pytest.mark.parametrize("page", KINDS)
+def test_text_has_contrast_in_light_and_in_dark_mode(browser, address, page):
+    grounds = []
+    for scheme in ("light", "dark"):
+        show(browser, scheme=scheme)
+        browser.get(f"{address}/{page}")
+        found = browser.execute_script(CONTRAST)
+        assert len(found) > 30
+        assert found[0][0] >= 4.5, found[0]
+        grounds.append(browser.execute_script("return getComputedStyle(document.body).backgroundColor"))
+    light, dark = (sum(map(int, re.findall(r"\d+", each))) for each in grounds)
+    assert light > 700
+    assert dark < 120
+
+
+def test_pictures_follow_dark_mode(browser, address):
+    from io import BytesIO
+
+    from PIL import Image, ImageStat
+
+    means = []
+    for scheme in ("light", "dark"):
+        show(browser, scheme=scheme)
+        browser.get(f"{address}/instance/{INSTANCE}.html")
+        picture = Image.open(BytesIO(find(browser, "img[src$='field.svg']").screenshot_as_png)).convert("L")
+        low, high = picture.getextrema()
+        assert high - low > 100
+        means.append(ImageStat.Stat(picture).mean[0])
+    assert means[0] > 180
+    assert means[1] < 90
+
+
+def test_without_javascript_the_table_is_complete(browser, address, library):
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        browser.get(f"{address}/index.html")
+        rows = browser.find_elements("css selector", "#table tbody tr")
+        assert len([row for row in rows if row.is_displayed()]) == len(library.entries)
+        assert not find(browser, "#filters").is_displayed()
+        assert browser.find_elements("css selector", "thead button") == []
+        assert head(browser, "Best objective").text == "Best objective"
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_the_formulation_is_rendered_as_mathematics(browser, address):
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    browser.get(f"{address}/entry/{ENTRY}.html")
+    boxes = browser.execute_script(
+        "return [...document.querySelectorAll('.model mfrac')].map(each => [...each.children].map(part => "
+        "part.getBoundingClientRect().top))"
+    )
+    assert len(boxes) >= 5
+    assert all(over < under for over, under in boxes)
+    find(browser, "summary").click()
+    assert find(browser, "details code").text.startswith("\\begin{aligned}")
+    find(browser, "details button").click()
+    WebDriverWait(browser, 5).until(lambda _: find(browser, "details button").text in {"Copied", "Selected"})
+
+
+def test_print_shows_whole_tables_and_no_controls(browser, address):
+    show(browser, media="print")
+    browser.get(f"{address}/index.html")
+    assert not find(browser, "#filters").is_displayed()
+    style = "const s = getComputedStyle(document.querySelector('.scroll')); return [s.overflowY, s.maxHeight]"
+    assert browser.execute_script(style) == ["visible", "none"]
+
+
+@pytest.mark.slow
+def test_a_thousand_rows_are_sorted_by_moving_each_once(browser, site, tmp_path):
+    large = Path(shutil.copytree(site, tmp_path / "large", ignore=shutil.ignore_patterns("files")))
+    start, rows, end = re.split(r"(?<=<tbody>\n)|(?=</tbody>)", (large / "index.html").read_text())
+    (large / "index.html").write_text(start + 84 * rows + end)
+    browser.get((large / "index.html").as_uri())
+    measured = browser.execute_script("""
+      const field = document.querySelector('[name=q]'), observer = new MutationObserver(() => {});
+      observer.observe(document.querySelector('tbody'), { childList: true });
+      document.querySelectorAll('thead button').forEach(button => button.click());
+      for (const text of ['c', 'cf', 'cf_m', 'milp']) {
+        field.value = text; field.dispatchEvent(new Event('input', { bubbles: true }));
+      }
+      const moved = observer.takeRecords().reduce((sum, each) => sum + each.addedNodes.length, 0);
+      return [moved, document.querySelector('#told').textContent];
+    """)
+    assert measured[1] == "336 of 1008 entries"
+    assert measured[0] == 14 * 1008, "a sort moves each row once"

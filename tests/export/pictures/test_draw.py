@@ -1,0 +1,243 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from crossfield.export.pictures import panels
+from crossfield.export.pictures.draw import KINDS, _caption, _on_grid, draw
+from crossfield.models.errors import InputError, OutputError
+from crossfield.models.field.field import CrossField, relabelled
+from crossfield.models.instance.instance import Instance
+from defusedxml import ElementTree
+from loops import for_each
+from PIL import Image
+
+MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
+
+
+def instance_of(mask, row, column, theta=0.0, **more):
+    return Instance("sample", mask, np.array([[row, column]]), np.array([theta]), np.array([1.0]), **more)
+
+
+def singular(size, index=0.25, x0=1.2, y0=0.4):
+    """A field with one singularity, right and above of the middle."""
+    instance = instance_of(np.ones((size, size)), 0, 0)
+    x, y = instance.grid.columns - (size - 1) / 2, (size - 1) / 2 - instance.grid.rows
+    alpha = index * np.arctan2(y - y0, x - x0)
+    alpha -= alpha[0]
+    return relabelled(instance, alpha, 0 * alpha, np.zeros(len(instance.grid.first), dtype=np.int32))
+
+
+def picture_of(path):
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def like(picture, colour, tolerance=12):
+    return (
+        np.abs(picture - np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])).max(axis=-1) <= tolerance
+    )
+
+
+def frame_of(picture):
+    """First and last row and column of the outline of a full mask."""
+    grey = like(picture, panels.BORDER, 40) & (np.ptp(picture, axis=-1) < 12)
+    sides = (np.flatnonzero(grey.sum(axis) > 0.3 * grey.sum(axis).max()) for axis in (1, 0))
+    return [side[at] for side in sides for at in (0, -1)]
+
+
+def place(found, picture):
+    """Middle of the found dots as (across, down), 0 to 1 within the outline."""
+    top, bottom, left, right = frame_of(picture)
+    y, x = np.nonzero(found[top : bottom + 1, left : right + 1])
+    return x.mean() / (right - left), y.mean() / (bottom - top)
+
+
+@for_each(
+    "kind, suffix",
+    [(kind, ".png") for kind in KINDS if kind != "overview"] + [("overview", ".svg"), ("energy", ".pdf")],
+)
+def test_every_kind_is_written_the_same_twice(tmp_path, kind, suffix):
+    field = singular(5)
+    first = draw(field, tmp_path / f"first{suffix}", kind=kind, title="A sketch")
+    assert first == tmp_path / f"first{suffix}"
+    data = first.read_bytes()
+    assert data.startswith(MAGIC[suffix])
+    with mpl.rc_context(
+        {"lines.linewidth": 9.0, "svg.hashsalt": "other", "font.size": 30.0, "savefig.bbox": "tight"}
+    ):
+        assert draw(field, tmp_path / f"second{suffix}", kind=kind, title="A sketch").read_bytes() == data
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"first{suffix}", f"second{suffix}"]
+
+
+def test_the_rest_of_matplotlib_is_left_alone(tmp_path):
+    before = dict(mpl.rcParams)
+    draw(singular(6), tmp_path / "a.png", kind="energy")
+    assert dict(mpl.rcParams) == before
+    code = "import sys, crossfield.export.pictures.draw; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    code = (
+        "import sys, numpy as np; from crossfield.export.pictures.draw import draw; "
+        "from crossfield.models.instance.instance import Instance;"
+        "i = Instance('a', np.ones((2, 2)), np.array([[0, 0]]), np.zeros(1), np.ones(1));"
+        "draw(i, sys.argv[1], kind='instance'); sys.exit('matplotlib.pyplot' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "b.png")], check=False).returncode == 0
+
+
+def test_row_0_is_at_the_top_and_strokes_lie_where_they_are(tmp_path):
+    path = draw(instance_of(np.ones((8, 8)), 2, 5), tmp_path / "a.png", kind="instance")
+    picture = picture_of(path)
+    across, down = place(like(picture, panels.STROKE), picture)
+    assert across == pytest.approx(5.5 / 8, abs=0.01)
+    assert down == pytest.approx(2.5 / 8, abs=0.01)
+
+
+def test_strokes_lean_counter_clockwise(tmp_path):
+    path = draw(instance_of(np.ones((3, 3)), 1, 1, theta=np.pi / 6), tmp_path / "a.png", kind="instance")
+    down, across = np.nonzero(like(picture_of(path), panels.STROKE))
+    slope = np.polyfit(across, -down, 1)[0]
+    assert np.arctan(slope) == pytest.approx(np.pi / 6, abs=0.05)
+
+
+def test_the_mask_is_white_and_the_rest_grey(tmp_path):
+    mask = np.zeros((10, 10))
+    mask[:, :4] = 1
+    picture = picture_of(draw(instance_of(mask, 5, 2), tmp_path / "a.png", kind="instance"))
+    grey = like(picture, panels.OUTSIDE, tolerance=2)
+    down, across = (np.flatnonzero(grey.sum(axis) > 0.8 * grey.sum(axis).max()) for axis in (1, 0))
+    assert np.ptp(across) / np.ptp(down) == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "kind, index, colour",
+    [
+        ("field", 0.25, panels.POSITIVE),
+        ("crosses", -0.25, panels.NEGATIVE),
+        ("angle", -0.25, panels.NEGATIVE),
+        ("energy", 0.25, panels.POSITIVE),
+    ],
+)
+def test_singularities_are_dots_in_their_place(tmp_path, kind, index, colour):
+    field = singular(12, index)
+    assert field.singularities.index.tolist() == [index]
+    expected = (field.singularities.column[0] + 1) / 12, (field.singularities.row[0] + 1) / 12
+    picture = picture_of(draw(field, tmp_path / "a.png", kind=kind))
+    assert place(like(picture, colour, 4), picture) == pytest.approx(expected, abs=0.01)
+
+
+def test_both_families_have_their_colours(tmp_path):
+    instance = instance_of(np.ones((9, 9)), 4, 4)
+    flat = np.zeros(81)
+    field = relabelled(instance, flat, flat, np.zeros(len(instance.grid.first), dtype=np.int32))
+    for kind in ("field", "crosses"):
+        picture = picture_of(draw(field, tmp_path / "a.png", kind=kind))[:1000]
+        level, upright = (like(picture, colour, 60) for colour in panels.FAMILIES)
+        assert level.sum(axis=1).max() > 3 * level.sum(axis=0).max()  # u is level, as the stroke is
+        assert upright.sum(axis=0).max() > 3 * upright.sum(axis=1).max()
+
+
+def test_degenerate_pixels_are_marked(tmp_path):
+    instance = instance_of(np.ones((10, 10)), 0, 0)
+    beta = np.where((instance.grid.rows >= 5) & (instance.grid.columns >= 5), np.pi / 4, 0.0)
+    field = CrossField(instance, 0 * beta, beta, np.zeros(len(instance.grid.first), dtype=np.int32))
+    picture = picture_of(draw(field, tmp_path / "a.png"))
+    across, down = place(like(picture, panels.COLLAPSED, 4), picture)
+    assert (across, down) == pytest.approx((0.75, 0.75), abs=0.02)
+
+
+def test_sketch_is_mapped_by_origin_and_pixel_size(tmp_path):
+    instance = instance_of(np.ones((4, 6)), 1, 1, pixel_size=2.5, origin=(10.0, 20.0))
+    middle_of_row_1_column_3 = (10.0 + 2.5 * 3.5, 20.0 + 2.5 * 1.5)
+    (line,) = _on_grid([[(10.0, 20.0), middle_of_row_1_column_3]], instance)
+    np.testing.assert_allclose(line, [[-0.5, 0.5], [3.0, -1.0]])
+    path = draw(instance, tmp_path / "a.png", kind="instance", sketch=[[(10.0, 27.5), (25.0, 27.5)]])
+    picture = picture_of(path)
+    _, down = place(like(picture, panels.FAINT, 3), picture)
+    assert down == pytest.approx(3 / 4, abs=0.01)
+
+
+def test_sketch_takes_the_place_of_stroke_marks(tmp_path):
+    field = singular(8)
+    plain, below = (
+        draw(field, tmp_path / f"{name}.png", kind="crosses", sketch=sketch).read_bytes()
+        for name, sketch in (("a", None), ("b", [[(0.0, 4.0), (8.0, 4.0)]]))
+    )
+    assert plain != below
+
+
+def test_caption_counts():
+    instance = instance_of(np.ones((2, 3)), 0, 0)
+    p = np.zeros(7, dtype=np.int32)
+    grid = instance.grid
+    p[grid.pair_number[1][1, 0]] = -2  # bottom side of the left block, walked forwards: index +1/2
+    field = CrossField(instance, np.zeros(6), np.zeros(6), p)
+    caption = _caption(panels.Picture(instance, field, (), 100.0), full=True)
+    energy = 2 * np.pi**2
+    assert caption == (
+        "3 × 2 pixels  ·  1 stroke pixel  ·  1 singularity (1 of +1/2)  ·  "
+        f"energy {energy:.4g} (2-norm), {2 * np.pi:.4g} (1-norm)  ·  gauge strokes"
+    )
+
+
+def test_titles_are_taken_as_they_are(tmp_path):
+    path = draw(singular(5), tmp_path / "a.svg", kind="crosses", title="5 $ & <b> \\frac " + "long " * 60)
+    assert ElementTree.parse(path).getroot().tag.endswith("svg")
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1)])
+@pytest.mark.parametrize("kind", ["overview", "energy"])
+def test_odd_shapes(tmp_path, shape, kind):
+    instance = instance_of(np.ones(shape), 0, 0, theta=0.3)
+    count = instance.grid.size
+    field = CrossField(
+        instance, np.full(count, 0.3), np.zeros(count), np.zeros(len(instance.grid.first), dtype=np.int32)
+    )
+    assert draw(field, tmp_path / "a.png", kind=kind).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", ["picture.jpg", "picture", "picture.png.txt"])
+def test_other_suffixes_are_named(tmp_path, name):
+    with pytest.raises(InputError, match=r"use one of \.png, \.svg, \.pdf") as caught:
+        draw(singular(4), tmp_path / name)
+    assert name in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_capital_suffix_is_fine(tmp_path):
+    assert draw(singular(4), tmp_path / "A.PNG", kind="energy").read_bytes().startswith(MAGIC[".png"])
+
+
+def test_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(OutputError, match="cannot be written") as caught:
+        draw(singular(4), tmp_path / "nowhere" / "a.png", kind="energy")
+    assert str(tmp_path / "nowhere" / "a.png") in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_kind_is_named(tmp_path):
+    with pytest.raises(InputError, match="no kind of picture 'colour'; choose one of instance, crosses"):
+        draw(singular(4), tmp_path / "a.png", kind="colour")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "instance"])
+def test_an_instance_alone_has_no_field(tmp_path, kind):
+    with pytest.raises(InputError, match="an instance without a field"):
+        draw(singular(4).instance, tmp_path / "a.png", kind=kind)
+
+
+@pytest.mark.parametrize(
+    "polyline", [[1.0, 2.0], [(1.0, np.nan)], [(1.0, 2.0, 3.0)], ["ab"], [(1.0, 2.0), (3.0,)]]
+)
+def test_malformed_sketch_is_named(tmp_path, polyline):
+    with pytest.raises(InputError, match="polyline 1 of the sketch"):
+        draw(singular(4), tmp_path / "a.png", sketch=[[(0.0, 0.0), (1.0, 1.0)], polyline])
+    assert not list(tmp_path.iterdir())
+
+
+def test_kinds_are_described_in_one_line():
+    for kind in KINDS.values():
+        assert kind.description
+        assert "\n" not in kind.description

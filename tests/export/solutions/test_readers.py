@@ -1,0 +1,737 @@
+import gzip
+import random
+import re
+import struct
+import tracemalloc
+from dataclasses import replace
+
+import highspy
+import numpy as np
+import places
+import pytest
+from crossfield.export.solutions.readers import ampl as ampl_sol
+from crossfield.export.solutions.readers.ampl import write_ampl_sol
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw
+from crossfield.export.solutions.readers.text import (
+    RawSolution,
+    Status,
+    named_numbers,
+    numbers,
+    values_for,
+    values_in_order,
+)
+from crossfield.models.errors import InputError, OutputError, SolutionError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+HERE = places.SOLUTIONS
+GOOD = sorted(HERE.glob("*.sol"))
+NAMES = np.array([b"x", b"y", b"b", b"u", b"one"], dtype="S15")
+OPTIMUM = [10, -9.7, 1, 0, 1]
+
+HIGHS = (
+    "Model status\n{status}\n\n# Primal solution values\n{primal}\nObjective 1\n# Columns {count}\n{lines}"
+)
+
+
+def highs(lines, *, status="Optimal", primal="Feasible", count=None):
+    text = "".join(f"{line}\n" for line in lines)
+    return HIGHS.format(
+        status=status, primal=primal, count=len(lines) if count is None else count, lines=text
+    ).encode()
+
+
+def ampl(
+    message="done",
+    *,
+    options=(1, 1, 0),
+    vbtol="",
+    rows=2,
+    duals=0,
+    values=(1.5, -2),
+    columns=None,
+    tail="objno 0 0\n",
+):
+    columns = len(values) if columns is None else columns
+    numbers_before = [len(options) + 2 * bool(vbtol), *options, rows, duals, columns, len(values)]
+    lines = [message, "", "Options", *numbers_before, *([vbtol] if vbtol else []), *[7] * duals, *values]
+    return ("\n".join(map(str, lines)) + "\n" + tail).encode()
+
+
+def named(**values):
+    names = np.array([name.encode() for name in values])
+    return RawSolution(
+        "highs", Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float)
+    )
+
+
+# what real solvers write
+
+
+@for_each(
+    "file, reader, status, values, rows",
+    [
+        ("highs-1.15.1_optimal_style0", "highs", "optimal-global", OPTIMUM, 2),
+        ("highs-1.15.1_optimal_style4", "highs", "optimal-global", [10, -9.7, 1, 1], None),
+        ("highs-1.15.1_qp_style0", "highs", "optimal-global", [0.3499999875, -0.0499999975], 1),
+        ("highs-1.15.1_qp_style4", "highs", "optimal-global", [0.3499999875, -0.0499999975], None),
+        ("highs-1.15.1_infeasible_style0", "highs", "infeasible", [], None),
+        ("highs-1.15.1_infeasible_style4", "highs", "infeasible", [], None),
+        ("highs-1.15.1_unbounded_style0", "highs", "unbounded", [0, 3], 1),
+        ("highs-1.15.1_time_with_point_style0", "highs", "limit-with-point", [0.5, 1.25, 0, 0, 1], 2),
+        ("highs-1.15.1_time_with_point_style4", "highs", "limit-with-point", [0.5, 1.25, 1], None),
+        ("highs-1.15.1_time_without_point_style0", "highs", "limit-without-point", [], None),
+        ("scip-10.0_optimal", "ampl-text", "optimal-global", OPTIMUM, 2),
+        ("scip-10.0_infeasible", "ampl-text", "infeasible", [], 3),
+        ("scip-10.0_unbounded", "ampl-text", "unbounded", [0, -100000, 1, 0, 0], 1),
+        ("scip-10.0_limit_with_point", "ampl-text", "limit-with-point", [5, 100000, 1, 0, 0], 2),
+        ("scip-10.0_limit_without_point", "ampl-text", "limit-without-point", [], 2),
+        ("asl-20190605_text", "ampl-text", "feasible", [0.1] * 5, 2),
+        ("asl-20190605_text_vbtol", "ampl-text", "feasible", [0.1] * 5, 2),
+        ("asl-20190605_text_without_options", "ampl-text", "feasible", [1] * 7, None),
+        ("asl-20190605_binary", "ampl-binary", "feasible", [0.1] * 5, 2),
+        ("asl-20190605_binary_vbtol", "ampl-binary", "feasible", [0.1] * 5, 2),
+        ("asl-20190605_binary_without_options", "ampl-binary", "feasible", [0.1] * 5, 2),
+    ],
+)
+def test_files_of_real_solvers(file, reader, status, values, rows):
+    raw = read_raw(HERE / f"{file}.sol")
+    assert (raw.reader, raw.status, raw.values.tolist(), raw.rows) == (reader, status, values, rows)
+    assert raw.has_point == bool(values)
+    assert (raw.names is None) == reader.startswith("ampl")
+    assert raw.omits_zeros == (reader == "highs" and "style4" in file and bool(values))
+
+
+def test_every_good_file_is_in_the_table_above_and_every_reader_is_used():
+    assert len(GOOD) == 21
+    assert {read_raw(path).reader for path in GOOD} == {"highs", "ampl-text", "ampl-binary"}
+
+
+def test_both_styles_of_highs_give_the_same_values_by_name():
+    for model in ("optimal", "time_with_point"):
+        dense, sparse = (read_raw(HERE / f"highs-1.15.1_{model}_style{style}.sol") for style in (0, 4))
+        assert dense.objective == sparse.objective
+        assert dense.message == sparse.message
+        np.testing.assert_array_equal(values_for(NAMES, dense).values, values_for(NAMES, sparse).values)
+
+
+def solved(rng, path):
+    model = highspy.Highs()
+    model.setOptionValue("output_flag", False)
+    columns = [
+        model.addVariable(lb=-5, ub=5, obj=cost, name=f"a_{i:03d}")
+        for i, cost in enumerate(rng.normal(size=60))
+    ]
+    for _ in range(30):
+        model.addConstr(
+            sum(
+                float(c) * columns[i]
+                for c, i in zip(rng.normal(size=4), rng.integers(60, size=4), strict=True)
+            )
+            <= 1
+        )
+    model.run()
+    for style in (0, 4):
+        model.writeSolution(str(path / f"{style}.sol"), style)
+    return np.array([name.encode() for name in model.getLp().col_names_]), model
+
+
+def test_what_highs_writes_now_is_what_it_found(tmp_path):
+    names, model = solved(np.random.default_rng(1), tmp_path)
+    for style in (0, 4):
+        raw = read_raw(tmp_path / f"{style}.sol")
+        values, missing, unknown = values_for(names, raw)
+        assert (raw.status, missing, unknown) == (Status.OPTIMAL_GLOBAL, 0, 0)
+        np.testing.assert_allclose(values, model.getSolution().col_value, rtol=1e-12, atol=1e-12)
+        assert raw.objective == pytest.approx(model.getInfo().objective_function_value, rel=1e-9)
+
+
+def test_files_are_told_by_content_and_may_be_packed(tmp_path):
+    for path in GOOD:
+        plain = read_raw(path)
+        for name, data in (("a.txt", path.read_bytes()), ("b.sol", gzip.compress(path.read_bytes()))):
+            (tmp_path / name).write_bytes(data)
+            raw = read_raw(tmp_path / name)
+            assert (raw.reader, raw.status, raw.message, raw.objective) == (
+                plain.reader,
+                plain.status,
+                plain.message,
+                plain.objective,
+            )
+            np.testing.assert_array_equal(raw.values, plain.values)
+
+
+@for_each("path", [path for path in GOOD if "binary" not in path.name])
+def test_windows_line_ends_change_nothing(path):
+    data = path.read_bytes()
+    one, other = parse_raw(data), parse_raw(data.replace(b"\n", b"\r\n"))
+    assert (one.status, one.message, one.rows, one.values.tolist()) == (
+        other.status,
+        other.message,
+        other.rows,
+        other.values.tolist(),
+    )
+
+
+# what they claim
+
+
+def test_the_vocabulary_of_claims():
+    with_point = {"optimal-global", "optimal-local", "feasible", "limit-with-point"}
+    assert {str(status) for status in Status} == with_point | {
+        "infeasible",
+        "unbounded",
+        "limit-without-point",
+        "no-point",
+        "error",
+        "unknown",
+    }
+    assert {str(status) for status in Status if status.promises_point} == with_point
+
+
+@pytest.mark.parametrize(
+    "words, primal, status",
+    [
+        ("Optimal", "Feasible", "optimal-global"),
+        ("Optimal", "Infeasible", "error"),
+        ("Solution limit reached", "Feasible", "limit-with-point"),
+        ("Interrupted by user", "Infeasible", "limit-without-point"),
+        ("Infeasible", "Infeasible", "infeasible"),
+        ("Solve error", "Feasible", "error"),
+        ("Words of a later version", "Feasible", "error"),
+    ],
+)
+def test_claims_of_highs(words, primal, status):
+    raw = parse_raw(highs(["a 1"], status=words, primal=primal))
+    assert (raw.status, raw.message, raw.values.tolist()) == (status, words, [1])
+
+
+@for_each(
+    "code, with_point, without_point",
+    [
+        (0, "optimal-local", None),
+        (99, "optimal-local", None),
+        (100, "feasible", "error"),
+        (199, "feasible", "error"),
+        (200, "infeasible", "infeasible"),
+        (299, "infeasible", "infeasible"),
+        (300, "unbounded", "unbounded"),
+        (399, "unbounded", "unbounded"),
+        (400, "limit-with-point", "limit-without-point"),
+        (449, "limit-with-point", "limit-without-point"),
+        (450, "limit-with-point", "limit-without-point"),
+        (470, "limit-without-point", "limit-without-point"),
+        (499, "limit-without-point", "limit-without-point"),
+        (500, "error", "error"),
+        (-1, "error", "error"),
+    ],
+)
+def test_solve_codes(code, with_point, without_point):
+    tail = f"objno 0 {code}\n"
+    assert parse_raw(ampl(tail=tail)).status == with_point
+    if without_point:
+        raw = parse_raw(ampl(tail=tail, values=(), columns=2))
+        assert (raw.status, raw.has_point) == (without_point, False)
+
+
+@for_each(
+    "message, status",
+    [
+        ("optimal solution found", "optimal-global"),
+        ("Ipopt 3.14.16: Optimal Solution Found", "optimal-local"),
+        ("\nbonmin: Optimal", "optimal-local"),
+        ("\n couenne: Optimal", "optimal-local"),
+        ("Knitro 13: Locally optimal or satisfactory solution.", "optimal-local"),
+        ("BARON 24.1: 1 iterations, optimal within tolerances.\nObjective 3", "optimal-global"),
+        ("CPLEX 22.1: locally optimal solution; optimal target 2", "optimal-local"),
+        ("Gurobi 11.0.0: optimal solution; objective 4", "optimal-global"),
+        ("Gurobi 11.0.0: solved; objective 4", "optimal-local"),
+        ("", "optimal-local"),
+    ],
+)
+def test_solved_is_a_proof_only_from_solvers_that_prove(message, status):
+    raw = parse_raw(ampl(message))
+    assert raw.status == status
+    assert raw.message == " ".join(message.split())
+
+
+def test_infeasible_or_unbounded_is_believed_from_its_words_alone():
+    text = {"tail": "objno 0 450\n", "values": (), "columns": 1}
+    assert parse_raw(ampl("infeasible or unbounded", **text)).status == "infeasible"
+    assert parse_raw(ampl("user interrupt", **text)).status == "limit-without-point"
+
+
+# layouts of AMPL files
+
+
+@for_each(
+    "tail", ["", "objno 0\n", "objno 0 403\n", "objno 0 403\nsuffix 0 1 4 0 0\nrc\n0 1\nkestrel_option x\n"]
+)
+@for_each("duals", [0, 2])
+@for_each("options, vbtol", [((1, 1, 0), ""), ((1, 3, 0), "1e-07"), ((), ""), ((1, 1, 0, 20020401), "")])
+def test_layouts_of_ampl_text(options, vbtol, duals, tail):
+    raw = parse_raw(ampl(options=options, vbtol=vbtol, duals=duals, tail=tail))
+    assert (raw.values.tolist(), raw.rows) == ([1.5, -2], 2)
+    assert raw.status == ("limit-with-point" if "403" in tail else "feasible")
+
+
+def test_text_right_up_to_options_and_no_message_at_all():
+    text = ampl("one\ntwo").replace(b"two\n\n", b"two\n")
+    assert parse_raw(text).message == "one two"
+    assert parse_raw(text[text.index(b"Options") :]).values.tolist() == [1.5, -2]
+
+
+def test_without_options_the_values_are_the_last_ones():
+    raw = parse_raw(b"\nminto: done\n\n7\n8\n1.5\n-2\nobjno 0 0\n")
+    assert (raw.rows, raw.message, raw.status) == (None, "minto: done", "optimal-local")
+    assert values_in_order(2, 2, raw).tolist() == [1.5, -2]
+    for columns, rows in ((3, 2), (4, 2), (2, 3)):
+        with pytest.raises(
+            SolutionError, match=f"of 4 values, the problem has {columns} columns and {rows} rows"
+        ):
+            values_in_order(columns, rows, raw)
+
+
+def test_values_in_order_belong_to_a_problem_of_the_same_size():
+    raw = read_raw(HERE / "scip-10.0_optimal.sol")
+    assert values_in_order(5, 2, raw).tolist() == OPTIMUM
+    for columns, rows in ((4, 2), (5, 3), (3, 2)):
+        with pytest.raises(
+            SolutionError, match=f"of 5 columns and 2 rows, the problem has {columns} columns and {rows} rows"
+        ):
+            values_in_order(columns, rows, raw)
+    with pytest.raises(SolutionError, match=r"no point in it .*infeasible"):
+        values_in_order(5, 3, read_raw(HERE / "scip-10.0_infeasible.sol"))
+
+
+# numbers
+
+
+@for_each(
+    "text, value",
+    [
+        ("0.9999999", 0.9999999),
+        ("-1e-12", -1e-12),
+        ("1e-17", 1e-17),
+        ("-0", 0.0),
+        ("-9.6999999999999993", -9.7),
+        ("1e+20", 1e20),
+        ("inf", np.inf),
+        ("Infinity", np.inf),
+        ("+inf", np.inf),
+        ("-infinity", -np.inf),
+        ("1.#INF", np.inf),
+        ("-1.#INF00", -np.inf),
+        ("1.0D+00", 1.0),
+        ("-2.5d-3", -0.0025),
+        (".5", 0.5),
+        ("5.", 5.0),
+        ("1.7976931348623157e308", 1.7976931348623157e308),
+        ("4.9e-324", 5e-324),
+    ],
+)
+def test_spellings_of_numbers(text, value):
+    assert parse_raw(highs([f"a {text}", "b 1"])).values.tolist() == [value, 1]
+    assert parse_raw(ampl(values=(1, text))).values.tolist() == [1, value]
+    objective = highs(["a 1"]).replace(b"Objective 1", f"Objective {text}".encode())
+    assert parse_raw(objective).objective == value
+
+
+@for_each(
+    "text", ["nan", "1_0", "0x10", "1,5", "--1", "1e", "1.5.3", "e5", "-", "1.#IND", "x" * 64, "1" * 64]
+)
+def test_what_is_not_a_number(text):
+    with pytest.raises(SolutionError, match=r"line 9: "):
+        parse_raw(highs(["a 1", f"b {text}", "c 1"]))
+    with pytest.raises(SolutionError, match=r"line 13: "):
+        parse_raw(ampl(values=(1, 2, text)).replace(b"done\n", b""))
+
+
+def test_two_faults_on_neighbouring_lines_do_not_make_up_for_each_other():
+    with pytest.raises(SolutionError, match="line 9: 3 words stand where 2 should"):
+        parse_raw(highs(["a 1", "b 2 c", "3"]))
+    with pytest.raises(SolutionError, match="line 12: 2 words stand where 1 should"):
+        parse_raw(ampl(values=("1 2", "")))
+
+
+def test_columns_of_text_larger_than_a_piece(monkeypatch):
+    rng = random.Random(5)
+    rows = [
+        ("n" * rng.randint(1, 15) + str(i), repr(rng.gauss(0, 1) * 10 ** rng.randint(-20, 20)))
+        for i in range(2000)
+    ]
+    data = "".join(f"{name} {value}\n" for name, value in rows).encode()
+    for size in (1, 30, 64, 1000, 4096, len(data) - 1, len(data), len(data) + 1):
+        monkeypatch.setattr("crossfield.export.solutions.readers.text._PIECE", size)
+        names, values = named_numbers(data, 0, len(data), 2)
+        assert names.tolist() == [name.encode() for name, _ in rows]
+        assert values.tolist() == [float(value) for _, value in rows]
+        column = "".join(f"{value}\n" for _, value in rows).encode()
+        assert numbers(b"7\n" + column, 2, len(column) + 2).tolist() == values.tolist()
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(allow_nan=False)))
+def test_numbers_come_back_bit_by_bit(values):
+    text = "".join(f"{value!r}\n" for value in values).encode()
+    assert numbers(text, 0, len(text)).tobytes() == np.array(values, dtype=float).tobytes()
+
+
+# by name
+
+
+def test_values_come_in_the_order_asked_for():
+    raw = named(a=1, b=2, c=3)
+    for order in ("abc", "cab", "ba"):
+        values, missing, unknown = values_for(np.array([name.encode() for name in order]), raw)
+        assert values.tolist() == [float("abc".index(name) + 1) for name in order]
+        assert (missing, unknown) == (0, 3 - len(order))
+
+
+def test_changing_the_mapped_values_leaves_the_file_alone():
+    raw = named(a=1, b=2)
+    values_for(raw.names, raw).values[0] = 9
+    assert raw.values.tolist() == [1, 2]
+
+
+def test_missing_names_are_zero_only_where_zeros_are_omitted():
+    dense, sparse = (parse_raw(data) for data in (highs(["x 1", "y 2"]), highs(["x 1 0", "y 2 1"], count=-2)))
+    values, missing, _ = values_for(NAMES, dense)
+    assert np.isnan(values).tolist() == [False, False, True, True, True]
+    assert missing == 3
+    values, missing, _ = values_for(NAMES, sparse)
+    assert values.tolist() == [1, 2, 0, 0, 0]
+    assert missing == 0
+
+
+def test_a_sparse_file_without_values_is_the_point_zero():
+    raw = parse_raw(highs([]))
+    assert raw.has_point
+    assert values_for(NAMES, raw) == (pytest.approx(np.zeros(5)), 0, 0)
+
+
+def test_columns_that_readers_of_models_add_are_no_strangers():
+    added = [
+        "ONE",
+        "Constant",
+        "Rgc1",
+        "MPS_Rgc1",
+        "nlobjvar",
+        "quadobjvar",
+        "qmatrixvar",
+        "objvar",
+        "GAMS_OBJECTIVE",
+    ]
+    raw = parse_raw(highs([f"{name} 1" for name in [*added, "x", "One", "objvars", "aRg"]]))
+    values, missing, unknown = values_for(np.array([b"x"]), raw)
+    assert (values.tolist(), missing, unknown) == ([1], 0, 3)
+
+
+def test_a_column_of_the_problem_may_bear_the_name_of_an_added_one():
+    raw = parse_raw(highs(["x 2", "ONE 1"]))
+    assert values_for(np.array([b"ONE", b"x"]), raw).values.tolist() == [1, 2]
+
+
+def test_a_name_with_two_values_is_refused():
+    same, other = (parse_raw(highs(["x 1", "y 2", f"x {again}"])) for again in ("1.0", "3"))
+    assert values_for(np.array([b"y", b"x"]), same).values.tolist() == [2, 1]
+    with pytest.raises(SolutionError, match=r"x has two values, 1\.0 and 3\.0"):
+        values_for(np.array([b"y", b"x"]), other)
+
+
+def test_no_mapping_without_point_or_names():
+    with pytest.raises(SolutionError, match=r"no point in it \(limit-without-point: Time limit reached\)"):
+        values_for(NAMES, read_raw(HERE / "highs-1.15.1_time_without_point_style0.sol"))
+    with pytest.raises(SolutionError, match="without names"):
+        values_for(NAMES, read_raw(HERE / "scip-10.0_optimal.sol"))
+
+
+# writing
+
+
+floats = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    values=st.lists(floats, min_size=1),
+    message=st.text(max_size=60),
+    rows=st.integers(0, 9),
+    code=st.integers(0, 600),
+)
+@pytest.mark.parametrize("binary", [False, True])
+def test_what_is_written_is_read_back(tmp_path_factory, binary, values, message, rows, code):
+    path = tmp_path_factory.getbasetemp() / "written.sol"
+    assert write_ampl_sol(path, message, np.array(values), rows, code, binary=binary) == path
+    raw = read_raw(path)
+    assert raw.values.tobytes() == np.array(values).tobytes()
+    assert (raw.rows, raw.reader) == (rows, "ampl-binary" if binary else "ampl-text")
+    if code > 99:
+        assert raw.status == parse_raw(ampl(tail=f"objno 0 {code}\n")).status
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_file_without_point_says_how_many_columns_there_are(tmp_path, binary):
+    path = write_ampl_sol(tmp_path / "a.sol", "no luck", np.empty(0), 3, 200, columns=7, binary=binary)
+    raw = read_raw(path)
+    assert (raw.status, raw.message, raw.rows, raw.has_point) == ("infeasible", "no luck", 3, False)
+    assert (struct.pack("<4i", 3, 0, 7, 0) if binary else b"\n3\n0\n7\n0\n") in path.read_bytes()
+
+
+def test_pyomo_reads_what_is_written(tmp_path):
+    other = pytest.importorskip(
+        "pyomo.contrib.solver.solvers.asl_sol_reader", reason="this Pyomo has no reader to compare with"
+    )
+    values = np.random.default_rng(3).normal(size=200_000) * 10.0 ** np.arange(-20, 20).repeat(5000)
+    values[:4] = 0, -0.0, 1, 1e17
+    path = write_ampl_sol(tmp_path / "a.sol", "Options\n\n two  lines", values, 12, 403)
+    with path.open() as stream:
+        theirs = other.parse_asl_sol_file(stream)
+    assert np.array(theirs.primals).tobytes() == values.tobytes()
+    assert (theirs.solve_code, theirs.duals, theirs.ampl_options) == (403, [], [1, 1, 0])
+    assert theirs.message.split() == ["Options.", "two", "lines"]
+    assert path.read_bytes().count(b".0\n") == 0
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in GOOD if path.name.startswith("scip")], ids=lambda path: path.stem
+)
+def test_pyomo_and_this_reader_agree_on_files_of_scip(path):
+    other = pytest.importorskip(
+        "pyomo.contrib.solver.solvers.asl_sol_reader", reason="this Pyomo has no reader to compare with"
+    )
+    with path.open() as stream:
+        theirs = other.parse_asl_sol_file(stream)
+    raw = read_raw(path)
+    assert (raw.values.tolist(), raw.message) == (theirs.primals, theirs.message)
+
+
+def test_binary_files_are_laid_out_as_the_ampl_solver_library_does(tmp_path):
+    real = (HERE / "asl-20190605_binary.sol").read_bytes()
+    duals = struct.pack("<I2dI", 16, -2.5, -2.5, 16)
+    without_duals = real.replace(struct.pack("<4i", 2, 2, 5, 5), struct.pack("<4i", 2, 0, 5, 5)).replace(
+        duals, bytes(8)
+    )
+    ours = write_ampl_sol(tmp_path / "a.sol", "", np.full(5, 0.1), 2, 403, binary=True).read_bytes()
+    assert ours == without_duals + struct.pack("<4i", 8, 0, 403, 8)
+
+
+def test_the_same_solution_gives_the_same_bytes(tmp_path):
+    one, two = (write_ampl_sol(tmp_path / name, "m", np.arange(9) / 7, 1, 0).read_bytes() for name in "ab")
+    assert one == two
+
+
+def test_values_that_are_not_finite_are_not_written(tmp_path):
+    for value in (np.nan, np.inf):
+        with pytest.raises(SolutionError, match=r"a\.sol: .*not finite"):
+            write_ampl_sol(tmp_path / "a.sol", "m", np.array([0, value]), 1, 0)
+    with pytest.raises(OutputError):
+        write_ampl_sol(tmp_path / "none" / "a.sol", "m", np.zeros(1), 1, 0)
+    assert not list(tmp_path.iterdir())
+
+
+# files that are no good
+
+FAULTS = {
+    "ampl_binary_cut": r"byte 93: the file is cut off",
+    "ampl_binary_length_too_large": r"byte 93: the file is cut off",
+    "ampl_code_is_a_word": r"line 17: 'objno 0 solved' is not",
+    "ampl_count_negative": r"line 10: -5 is not a count",
+    "ampl_count_too_large": r"line 11: 4000000000 numbers are announced, 6 whole lines follow",
+    "ampl_count_too_small": r"line 16: there are more numbers than announced",
+    "ampl_cut_in_the_values": r"line 11: 5 numbers are announced, 2 whole lines follow",
+    "ampl_solved_without_values": r"says solved and holds no values",
+    "ampl_some_values_only": r"line 11: .*3 values for 5 variables, where all or none",
+    "ampl_value_is_a_word": r"line 14: 'one' is not a number",
+    "empty": r"the file is empty",
+    "highs-1.15.1_optimal_style1": r"style 1 \(pretty\).*write_solution_style = 0",
+    "highs-1.15.1_optimal_style3": r"style 3 \(GLPK pretty\).*write_solution_style = 0",
+    "highs_count_is_a_word": r"line 7: '# Columns five' is not the number",
+    "highs_count_too_large": r"line 7: 999999999999 columns are announced, 5 whole lines follow",
+    "highs_count_too_small": r"line 7: 4 columns are announced, 5 whole lines follow",
+    "highs_cut_in_a_number": r"line 7: 4 columns are announced, 3 whole lines follow",
+    "highs_nul_byte": r"line 9: there is a byte that no text has",
+    "highs_optimal_without_point": r"line 5: the file says Optimal and holds no point",
+    "highs_sparse_without_index": r"line 10: 2 words stand where 3 should",
+    "highs_value_is_a_word": r"line 9: 'minus' is not a number",
+    "highs_value_is_nan": r"line 9: 'nan' is not a number",
+    "highs_value_missing": r"line 11: 1 words stand where 2 should",
+    "junk": r"no solution file of a known kind; give one of these: HiGHS",
+}
+
+
+@for_each("path", sorted((HERE / "bad").iterdir()))
+def test_bad_files_are_refused_with_file_place_and_remedy(path):
+    with pytest.raises(SolutionError, match=FAULTS[path.stem]) as caught:
+        read_raw(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert re.search(r"write|give|log", message)
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    "old, new, fault",
+    [
+        (struct.pack("<d", 0.1), struct.pack("<d", np.nan), "one of the values is not a number"),
+        (
+            struct.pack("<2i", 5, 5),
+            struct.pack("<2i", 6, 6),
+            "2 dual values and 6 values are announced, 2 and 5 follow",
+        ),
+        (struct.pack("<2i", 5, 5), struct.pack("<2i", -5, -5), "a count is negative"),
+        (struct.pack("<2i", 5, 5), struct.pack("<2i", 5, 4), "where all or none should be"),
+        (b"Options\x03", b"Options\x04", "the Options record of 39 bytes announces 4 options"),
+        (
+            struct.pack("<I2dI", 16, -2.5, -2.5, 16),
+            struct.pack("<I3iI", 12, 0, 0, 0, 12),
+            "12 bytes cannot hold dual values",
+        ),
+    ],
+)
+def test_faults_of_binary_files(old, new, fault):
+    data = (HERE / "asl-20190605_binary.sol").read_bytes()
+    assert old in data
+    with pytest.raises(SolutionError, match=rf"byte \d+: .*{fault}"):
+        parse_raw(data.replace(old, new, 1))
+
+
+def test_solve_codes_of_binary_files():
+    data = (HERE / "asl-20190605_binary.sol").read_bytes()
+    assert parse_raw(data + struct.pack("<4i", 8, 0, 403, 8)).status == "limit-with-point"
+    assert parse_raw(data + struct.pack("<3i", 4, 1, 4)).status == "feasible"
+    with pytest.raises(SolutionError, match="a record of 12 bytes stands where the solve code should"):
+        parse_raw(data + struct.pack("<5i", 12, 0, 0, 0, 12))
+
+
+def test_a_file_of_blanks_is_empty():
+    for data in (b"", b"\n", b" \r\n\t\n"):
+        with pytest.raises(SolutionError, match="the file is empty"):
+            parse_raw(data)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    for path in (tmp_path, tmp_path / "none.sol"):
+        with pytest.raises(InputError):
+            read_raw(path)
+    packed = gzip.compress(GOOD[0].read_bytes())
+    for name, data in (
+        ("cut.gz", packed[:-9]),
+        ("damaged.gz", packed[:20] + b"x" + packed[21:]),
+        ("head.gz", packed[:2]),
+    ):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(SolutionError, match="damaged or cut off"):
+            read_raw(tmp_path / name)
+
+
+@for_each("path", GOOD)
+def test_a_file_cut_anywhere_never_gives_another_point_or_a_stronger_claim(path):
+    data = path.read_bytes()
+    whole = parse_raw(data)
+    if (
+        whole.rows is None and whole.names is None
+    ):  # without counts only the size of the problem tells that values are missing
+        whole = replace(whole, values=values_in_order(5, 2, whole))
+    for end in range(len(data)):
+        try:
+            raw = parse_raw(data[:end])
+            if raw.rows is None and raw.names is None:
+                raw = replace(raw, values=values_in_order(5, 2, raw))
+        except SolutionError:
+            continue
+        assert raw.values.tolist() == whole.values.tolist()
+        assert raw.status in {whole.status, Status.FEASIBLE, Status.NO_POINT}
+
+
+def test_huge_announced_counts_take_no_memory():
+    huge = [
+        highs(["a 1"], count=999_999_999_999),
+        highs(["a 1 0"], count=-999_999_999_999),
+        ampl().replace(b"2\n0\n2\n2\n", b"2\n0\n999999999999\n999999999999\n"),
+        ampl().replace(b"Options\n3\n", b"Options\n999999999999\n"),
+        (HERE / "asl-20190605_binary.sol")
+        .read_bytes()
+        .replace(struct.pack("<2i", 5, 5), struct.pack("<2i", 2**31 - 1, 2**31 - 1)),
+        (HERE / "asl-20190605_binary.sol")
+        .read_bytes()
+        .replace(b"Options\x03\0\0\0", b"Options\xff\xff\xff\x7f"),
+    ]
+    tracemalloc.start()
+    for data in huge:
+        with pytest.raises(SolutionError):
+            parse_raw(data)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1 << 20
+
+
+def test_one_long_line_does_not_widen_all_names():
+    with pytest.raises(SolutionError, match="line 8: a word is longer than 63"):
+        parse_raw(highs(["n" * 100_000 + " 1", *[f"a{i} 1" for i in range(1000)]]))
+
+
+def attempt(data):
+    try:
+        raw = parse_raw(data)
+    except SolutionError:
+        return
+    assert not np.isnan(raw.values).any()
+    assert raw.names is None or len(raw.names) == len(raw.values)
+    assert raw.status in set(Status)
+    assert raw.has_point or not raw.values.size
+
+
+heads = st.sampled_from([b"", b"Model status\n", b"\nOptions\n", ampl_sol._MAGIC, highs([]), ampl(values=())])
+
+
+@settings(deadline=None, max_examples=400)
+@given(
+    heads,
+    st.one_of(st.binary(max_size=300), st.text("0123456789.-+eE# \nabRows", max_size=300).map(str.encode)),
+)
+def test_random_bytes_are_refused_or_read(head, tail):
+    attempt(head + tail)
+
+
+PARTS = st.one_of(
+    st.binary(max_size=6),
+    st.sampled_from([b"", b"\n", b" ", b"-", b"9" * 30, b"nan", b"\n\n", b"Options\n", b"# Rows 1\n"]),
+)
+
+
+@settings(deadline=None, max_examples=600)
+@given(
+    st.sampled_from(GOOD),
+    st.lists(st.tuples(st.integers(0, 400), st.integers(0, 8), PARTS), min_size=1, max_size=4),
+)
+def test_damaged_files_are_refused_or_read(path, damages):
+    data = path.read_bytes()
+    for start, length, part in damages:
+        at = start % len(data) if data else 0
+        data = data[:at] + part + data[at + length :]
+    attempt(data)
+
+
+@for_each(
+    "part",
+    [
+        b"\n",
+        b" ",
+        b"1",
+        b"1 ",
+        b"Options",
+        b"Options\n",
+        b"Options ",
+        b"objno ",
+        b"\t\n",
+        b"a\n",
+        b"-",
+        b"\0",
+        b"1.#INF",
+    ],
+)
+@for_each("head", [b"", b"Model status\n", b"\nOptions\n", b"m\n\n"])
+def test_long_repetitions_take_no_long_time(head, part):
+    attempt(head + part * (300_000 // len(part)))

@@ -1,0 +1,163 @@
+"""A solution belongs to one problem: files, solvers and manifests mean the same one, and readers see when they do not."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import crossfield as cf
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.solutions.readers.gams_csv import parse as parse_csv
+from crossfield.export.solutions.readers.registry import read_raw
+from crossfield.models.errors import SolutionError
+from crossfield.models.search.improvement import first_field
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """A sample whose greedy field is improved by other jumps: they are not the same data."""
+    instance = cf.sample("ring", 8)
+    assert (cf.greedy(instance).p != first_field(instance).p).any()
+    return instance
+
+
+@pytest.fixture(scope="module")
+def solved(ring, tmp_path_factory):
+    """Folders of what `export` wrote and of what `solve` left, of the same instance by the same words."""
+    folder = tmp_path_factory.mktemp("ring")
+    path = str(cf.write_instance(ring, folder / "ring.json"))
+    assert invoke(["export", path, "-f", "qp-fixed", "-o", str(folder / "files"), "-q"]) == 0
+    assert invoke(["solve", path, "--formulation", "qp-fixed", "-o", str(folder / "solved"), "-q"]) == 0
+    return folder
+
+
+def only(folder: Path, pattern: str) -> Path:
+    (found,) = folder.glob(pattern)
+    return found
+
+
+def read(solution: Path, manifest: Path, field: Path) -> int:
+    return invoke(["read", str(solution), "--manifest", str(manifest), "-o", str(field), "-q"])
+
+
+def test_export_and_solve_fix_the_same_jumps(solved, ring, tmp_path):
+    solution = only(solved / "solved", "*.ipopt.sol")
+    manifest = only(solved / "files", "*.manifest.json")
+    assert read(solution, manifest, tmp_path / "field.npz") == 0
+    energy = cf.read_field(tmp_path / "field.npz").energy().total
+    assert energy == pytest.approx(cf.read_field(only(solved / "solved", "*.field.npz")).energy().total)
+    assert cf.read_manifest(manifest).problem().jumps.tolist() == first_field(ring).p.tolist()
+
+
+def test_solve_leaves_the_manifest_that_reads_its_solution(solved, tmp_path):
+    manifest = cf.read_manifest(only(solved / "solved", "*.manifest.json"))
+    assert read(only(solved / "solved", "*.ipopt.sol"), manifest.path, tmp_path / "field.npz") == 0
+    assert {file["name"].rpartition(".")[2] for file in manifest.document["files"]} == {"nl", "row", "col"}
+    assert (manifest.folder / manifest.document["instance"]["file"]).is_file()
+
+
+def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
+    """A manifest in the folder goes on listing the other files of the same problem; those of another problem go from it."""
+    shutil.copytree(solved / "files", tmp_path / "both")
+    instance = only(tmp_path / "both", "*.instance.json")
+
+    def listed():
+        manifest = cf.read_manifest(only(tmp_path / "both", "*.manifest.json"))
+        return sorted(Path(file["name"]).suffix for file in manifest.document["files"])
+
+    arguments = ["solve", str(instance), "--formulation", "qp-fixed", "-o", str(tmp_path / "both"), "-q"]
+    assert invoke(arguments) == 0
+    assert listed() == [".col", ".gms", ".lp", ".mps", ".nl", ".row"]
+    greedy = cf.write_field(cf.greedy(cf.read_instance(instance)), tmp_path / "greedy.npz")
+    assert invoke([*arguments, "--start", str(greedy)]) == 0
+    assert listed() == [".col", ".nl", ".row"]
+
+
+def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
+    """The case that gave a field of energy 15.5 for an optimum of 1e-6: columns are named alike, the fixed jumps differ."""
+    other = cf.write_problem(cf.formulate(ring, "qp-fixed", p=cf.greedy(ring).p), tmp_path / "files", ["nl"])
+    assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
+    assert "solution of another problem" in capsys.readouterr().err
+    assert not (tmp_path / "field.npz").exists()
+
+
+def by_gurobi(model: Path, solution: Path) -> None:
+    gurobipy = pytest.importorskip("gurobipy", exc_type=ImportError)
+    with (
+        gurobipy.Env(params={"OutputFlag": 0}) as environment,
+        gurobipy.read(str(model), environment) as read,
+    ):
+        read.optimize()
+        read.write(str(solution))
+
+
+def by_xpress(model: Path, solution: Path) -> None:
+    xpress = pytest.importorskip("xpress", exc_type=ImportError)
+    problem = xpress.problem()
+    problem.controls.outputlog = 0
+    problem.readProb(str(model))
+    problem.optimize()
+    problem.writeSlxSol(str(solution))
+
+
+def by_glpk(model: Path, solution: Path) -> None:
+    if shutil.which("glpsol") is None:
+        pytest.skip("glpsol is not installed; Debian has it in glpk-utils")
+    kind = "--freemps" if model.suffix == ".mps" else "--lp"
+    command = ["glpsol", kind, str(model), "-w", str(solution)]
+    subprocess.run(command, capture_output=True, check=True)
+
+
+@pytest.mark.parametrize(
+    "solver, formats, suffix",
+    [(by_gurobi, ["mps", "lp"], ".sol"), (by_xpress, ["mps"], ".slx"), (by_glpk, ["mps", "lp"], ".sol")],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_solvers_repeat_the_stamp(solver, formats, suffix, tmp_path):
+    """Where a solver has a place for a problem's name, its solution says of which problem it is."""
+    mask = [[True, True]]
+    one, other = (
+        cf.formulate(cf.Instance("two", mask, [[0, 0]], [theta], [1.0]), "milp-mccormick")
+        for theta in (0.5, 0.6)
+    )
+    for name in formats:
+        model, solution = tmp_path / f"a.{name}", tmp_path / f"a{name}{suffix}"
+        cf.write(one, model)
+        solver(model, solution)
+        assert read_raw(solution).stamp == one.stamp
+        assert cf.read_solution(solution, one).objective is not None
+        with pytest.raises(SolutionError, match="of another problem"):
+            cf.read_solution(solution, other)
+
+
+def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):
+    """Both layouts write it; a file that an older model wrote has no such line and is read all the same."""
+    problem = cf.formulate(ring, "milp-mccormick")
+    for dialect in ("indexed", "scalar"):
+        model = tmp_path / f"{dialect}.gms"
+        cf.write(problem, model, dialect=dialect)
+        assert f"put 'problem,{problem.stamp}' /;" in model.read_text()
+    old = b"model_status,1\nsolver_status,1\nobjective, 2.0\nx, 1.0\n"
+    new = old.replace(b"objective", f"problem,{problem.stamp}\nobjective".encode())
+    (tmp_path / "new.csv").write_bytes(new)
+    assert parse_csv(old).objective == parse_csv(new).objective == 2.0
+    assert read_raw(tmp_path / "new.csv").stamp == problem.stamp
+
+
+def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
+    """Also in files that hold the problem with products lifted: they are of the same problem."""
+    problem = cf.formulate(ring, "minlp-quartic")
+    manifest = cf.write_problem(problem, tmp_path, ["mps"])
+    stamp = f"sha256_{manifest.document['sha256'][:12]}"
+    held = cf.write(problem, tmp_path / "a.mps").problem
+    assert problem.stamp == held.stamp == stamp
+    assert f"NAME {ring.name}_{stamp} FREE\n" in (tmp_path / "a.mps").read_text()
+
+
+def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):
+    """The jumps of the second stage are those of the MILP: only a manifest of its own can read its solution."""
+    cf.two_stage(ring, tmp_path, limits=cf.Limits(5.0))
+    manifest = cf.read_manifest(only(tmp_path, "*.qp-fixed.manifest.json"))
+    solution = cf.read_solution(only(tmp_path, "*.qp-fixed.ipopt.sol"), manifest.problem())
+    assert solution.violation.worst < 1e-6
+    assert solution.objective < 1e-5  # with other jumps it is 15

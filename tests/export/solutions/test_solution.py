@@ -1,0 +1,210 @@
+"""From solution files to checked points: names, positions, lifted products, rounding, and recomputed claims."""
+
+import numpy as np
+import pytest
+from cases import make_field, make_instance
+from crossfield.export.formats.nl import Layout
+from crossfield.export.solutions.readers.ampl import write_ampl_sol
+from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solutions.solution import ROUND, Solution, read_solution
+from crossfield.export.writing.names import column_names
+from crossfield.models.errors import SolutionError
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate, lifted
+from loops import for_each
+
+LIFTED = ("minlp-quartic", "minlp-cubic")
+
+
+@pytest.fixture
+def field():
+    return make_field(make_instance("full"))
+
+
+def problem_of(field, name, **options):
+    return formulate(field.instance, name, p=field.p if FORMULATIONS[name].fixed else None, **options)
+
+
+def names_of(problem):
+    return [bytes(row).rstrip(b"\0").decode() for row in column_names(problem)]
+
+
+def by_name(path, names, values, *, objective=1.0, status="Optimal"):
+    """A HiGHS solution file with these columns."""
+    lines = "".join(f"{name} {value!r}\n" for name, value in zip(names, map(float, values), strict=True))
+    path.write_text(
+        f"Model status\n{status}\n\n# Primal solution values\nFeasible\nObjective {objective!r}\n# Columns {len(names)}\n{lines}# Rows 0\n"
+    )
+    return path
+
+
+def by_position(path, problem, point, *, binary=False):
+    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.row_count, 0, binary=binary)
+
+
+@for_each("name", FORMULATIONS)
+@for_each("kind", ["names", "text", "binary"])
+def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
+    problem = problem_of(field, name)
+    point = problem.point(field)
+    path = tmp_path / "x.sol"
+    if kind == "names":
+        shuffled = np.random.default_rng(1).permutation(len(point))
+        by_name(path, np.array(names_of(problem))[shuffled], point[shuffled])
+    else:
+        by_position(path, problem, point, binary=kind == "binary")
+    solution = read_solution(path, problem)
+    assert solution.point.tolist() == point.tolist()
+    assert solution.objective == problem.objective_value(point)
+    assert solution.violation.worst < 1e-12
+    assert (solution.rounded, solution.unknown) == (0.0, 0)
+    assert solution.field.p.tolist() == field.p.tolist()
+    assert solution.field.alpha.tolist() == field.alpha.tolist()
+
+
+@pytest.mark.parametrize("name", LIFTED)
+def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path, field, name):
+    problem = problem_of(field, name)
+    held = lifted(problem)
+    path = by_name(tmp_path / "x.sol", names_of(held), held.point(field))
+    solution = read_solution(path, problem)
+    assert solution.problem.columns == held.columns == problem.columns + len(field.p)
+    assert solution.unknown == 0
+    assert solution.objective == pytest.approx(problem.objective_value(problem.point(field)), rel=1e-12)
+    assert solution.field.p.tolist() == field.p.tolist()
+
+
+def test_a_cheated_product_shows_as_a_violation(tmp_path, field):
+    held = lifted(problem_of(field, "minlp-quartic"))
+    point = held.point(field)
+    cheated = held.blocks["z"].columns
+    point[cheated] += 0.25
+    solution = read_solution(
+        by_name(tmp_path / "x.sol", names_of(held), point), problem_of(field, "minlp-quartic")
+    )
+    assert solution.violation.rows == pytest.approx(0.25)
+    assert solution.violation.worst_family in {"c27", "c28"}
+
+
+def test_the_claimed_objective_is_kept_beside_the_recomputed_one(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    path = by_name(tmp_path / "x.sol", names_of(problem), problem.point(field), objective=0.125)
+    solution = read_solution(path, problem)
+    assert solution.reported == 0.125
+    assert solution.objective == pytest.approx(field.energy(1).total, rel=1e-12)
+    assert solution.objective > 1
+
+
+def test_a_violated_row_is_found_and_named(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    point = problem.point(field)
+    gap = np.abs(field.residual_a)
+    at = int(np.argmax(gap))
+    point[problem.blocks["s"].offset + at] -= 0.5
+    solution = read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
+    assert solution.violation.rows == pytest.approx(0.5)
+    assert solution.violation.worst_family in {"c14", "c15"}
+
+
+def test_a_violated_bound_is_found(tmp_path, field):
+    problem = problem_of(field, "qp-fixed")
+    point = problem.point(field)
+    point[0] = problem.upper[0] + 0.125
+    solution = read_solution(by_position(tmp_path / "x.sol", problem, point), problem)
+    assert solution.violation.bounds == pytest.approx(0.125)
+    assert solution.violation.worst == solution.violation.bounds
+
+
+def test_integers_near_a_whole_number_are_rounded_and_others_kept(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    point = problem.point(field)
+    first = problem.blocks["p1"].offset
+    near, far = point.copy(), point.copy()
+    near[first] += 0.4 * ROUND
+    far[first] += 0.125
+    rounded = read_solution(by_name(tmp_path / "near.sol", names_of(problem), near), problem)
+    assert rounded.point[first] == point[first]
+    assert rounded.rounded == pytest.approx(0.4 * ROUND, rel=1e-6)
+    assert rounded.violation.integrality == 0
+    kept = read_solution(by_name(tmp_path / "far.sol", names_of(problem), far), problem)
+    assert kept.point[first] == far[first]
+    assert kept.violation.integrality == pytest.approx(0.125)
+    assert kept.field.p.tolist() == field.p.tolist()
+
+
+def test_continuous_columns_are_never_rounded(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    point = problem.point(field)
+    at = problem.blocks["beta"].offset
+    point[at] = 0.4 * ROUND
+    solution = read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
+    assert solution.point[at] == 0.4 * ROUND
+
+
+def test_with_the_printed_facet_p_is_believed_and_z_is_not(tmp_path):
+    """z may not fit p1 beta there: the objective of the file is lower than the energy of its field."""
+    field = make_field(make_instance("full"))
+    problem = problem_of(field, "milp-mccormick", facet="printed")
+    point = problem.point(field)
+    even = (field.p & 1) == 0
+    beta = field.beta
+    grid = field.instance.grid
+    z = np.clip((beta[grid.first] - beta[grid.second]) / 2, -np.pi / 4, 0)
+    blocks = problem.blocks
+    point[blocks["z"].columns][even] = z[even]
+    point[blocks["t"].columns][even] = np.abs(beta[grid.first] - 2 * z - beta[grid.second])[even]
+    solution = read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
+    assert solution.violation.worst < 1e-12
+    assert solution.field.p.tolist() == field.p.tolist()
+    assert solution.objective < solution.field.energy(1).total - 0.1
+
+
+def test_columns_that_solvers_add_are_not_counted_as_unknown(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    names = [*names_of(problem), "ONE", "objvar", "stranger"]
+    values = [*problem.point(field), 1.0, 5.0, 7.0]
+    assert read_solution(by_name(tmp_path / "x.sol", names, values), problem).unknown == 1
+
+
+def test_a_missing_column_is_an_error(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    names, values = names_of(problem)[:-1], problem.point(field)[:-1]
+    with pytest.raises(
+        SolutionError, match=rf"x.sol: 1 of {problem.columns} columns of milp-mccormick are missing"
+    ):
+        read_solution(by_name(tmp_path / "x.sol", names, values), problem)
+
+
+def test_the_order_of_another_formulation_is_not_taken(tmp_path, field):
+    path = by_position(
+        tmp_path / "x.sol", problem_of(field, "qp-fixed"), problem_of(field, "qp-fixed").point(field)
+    )
+    with pytest.raises(SolutionError, match=r"x\.sol: the file is of"):
+        read_solution(path, problem_of(field, "milp-mccormick"))
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf])
+def test_infinite_values_are_an_error(tmp_path, field, value):
+    problem = problem_of(field, "milp-mccormick")
+    point = problem.point(field)
+    point[0] = value
+    with pytest.raises(SolutionError, match=r"x\.sol: .* not finite"):
+        read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
+
+
+def test_a_file_without_a_point_has_no_field(tmp_path, field):
+    problem = problem_of(field, "milp-mccormick")
+    path = tmp_path / "x.sol"
+    write_ampl_sol(path, "no room", np.zeros(0), problem.row_count, 220, columns=problem.columns)
+    solution = read_solution(path, problem)
+    assert (solution.point, solution.objective, solution.violation) == (None, None, None)
+    assert solution.status == Status.INFEASIBLE
+    with pytest.raises(SolutionError, match=r"no point in the solution \(infeasible\): no room"):
+        _ = solution.field
+
+
+def test_claims_of_a_solver_are_kept_apart_from_what_is_recomputed(field):
+    problem = problem_of(field, "qp-fixed")
+    solution = Solution(problem, problem.point(field), Status.FEASIBLE, "", "by hand", reported=-1.0)
+    assert (solution.reported, solution.bound) == (-1.0, None)
+    assert solution.objective == pytest.approx(field.energy(2).total)

@@ -1,0 +1,423 @@
+"""What is claimed of an answer is what its point bears out: relaxations, cut and damaged files, codes of failure, foreign values."""
+
+import codecs
+import gzip
+import inspect
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import crossfield as cf
+import highspy
+import numpy as np
+import pytest
+from answers import FILES, GOOD, STATUS_ALONE, TINY, WITH_POINT, problem, problem_of
+from cases import make_field, make_instance
+from crossfield.export.cli.app import invoke, read_command
+from crossfield.export.formats.nl import Layout
+from crossfield.export.formats.registry import write
+from crossfield.export.library.documents import check_point
+from crossfield.export.solutions.contradictions import TOLERANCE
+from crossfield.export.solutions.readers.ampl import write_ampl_sol
+from crossfield.export.solutions.readers.registry import parse_raw, read_raw
+from crossfield.export.solutions.readers.text import ADDED_COLUMNS, Status
+from crossfield.export.solutions.solution import LARGEST, Solution, read_solution
+from crossfield.models.errors import InstanceError, SolutionError
+from crossfield.models.formulations.problem import formulate
+
+MILP = "milp-mccormick"
+needs_glpk = pytest.mark.skipif(shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def skew(tmp_path_factory):
+    """A folder with the MILP of a sample in LP, MPS and as an AMPL model, its instance and manifest."""
+    folder = tmp_path_factory.mktemp("skew")
+    arguments = ["export", "skew", "--size", "4", "-f", MILP, "--format", "lp", "--format", "mps", "--format", "mod"]  # fmt: skip
+    assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
+    return folder
+
+
+@pytest.fixture
+def reading(skew, tmp_path, capsys):
+    """Runs `read` on a file: exit code, facts, complaint, and whether a field was written."""
+
+    def run(solution, *options):
+        output = tmp_path / "field.npz"
+        output.unlink(missing_ok=True)
+        manifest = skew / f"skew.{MILP}.manifest.json"
+        arguments = ["read", str(solution), "--manifest", str(manifest), "-o", str(output), "--json"]
+        code = invoke([*arguments, *options])
+        out, err = capsys.readouterr()
+        assert "should not happen" not in err
+        assert err.count("\n") <= 1
+        return code, json.loads(out) if out else {}, err, output.exists()
+
+    return run
+
+
+def relaxed_by_highs(skew, path):
+    model = highspy.Highs()
+    model.setOptionValue("output_flag", False)
+    model.readModel(str(skew / f"skew.{MILP}.mps"))
+    model.setOptionValue("solve_relaxation", True)
+    model.run()
+    model.writeSolution(str(path), 0)
+    return path
+
+
+def by_names(problem, values):
+    """A plain list of names and values."""
+    from cases import names_of
+    from crossfield.export.writing.names import column_names
+
+    pairs = zip(names_of(column_names(problem)), map(float, values), strict=True)
+    return "".join(f"{name} {value!r}\n" for name, value in pairs)
+
+
+@pytest.fixture(scope="module")
+def milp():
+    field = make_field(make_instance("full"))
+    found = formulate(field.instance, MILP)
+    return found, found.point(field)
+
+
+# claims against the point
+
+
+def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
+    assert inspect.signature(read_command).parameters["tolerance"].default == TOLERANCE
+    path = relaxed_by_highs(skew, tmp_path / "relaxed.sol")
+    assert read_raw(path).status == "optimal-global"
+    code, facts, complaint, written = reading(path)
+    assert (code, written) == (1, False)
+    assert (facts["status"], facts["claimed"]) == ("unknown", "optimal-global")
+    assert facts["worst_violation"] > 0.3
+    assert re.search(
+        r"relaxed\.sol: says optimal-global, but its point breaks integrality by 0\.3", complaint
+    )
+    assert "--tolerance" in complaint
+    code, facts, complaint, written = reading(path, "--tolerance", "0.5")
+    assert (code, written, complaint) == (0, True, "")
+    assert (facts["status"], facts["contradictions"]) == ("optimal-global", [])
+
+
+@needs_glpk
+def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp_path):
+    relaxed, whole = tmp_path / "relaxed.sol", tmp_path / "whole.sol"
+    stem = f"skew.{MILP}"
+    for arguments in (["--lp", f"{stem}.lp", "--nomip", "-w", relaxed], ["-m", f"{stem}.mod", "-d", f"{stem}.dat", "-w", whole]):  # fmt: skip
+        subprocess.run(["glpsol", *map(str, arguments)], cwd=skew, check=True, capture_output=True)
+    code, facts, _, written = reading(relaxed)
+    assert (code, facts["status"], written) == (1, "unknown", False)
+    code, facts, complaint, written = reading(whole)
+    assert (code, complaint, written) == (0, "", True)
+    assert facts["status"] == "optimal-global"
+    assert facts["worst_violation"] < 1e-9
+    assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], abs=1e-9)
+
+
+@needs_glpk
+def test_the_columns_of_a_model_have_glpks_order_also_with_pixels_apart(tmp_path):
+    """`parts` has a pixel without neighbours: its alpha, if it has no stroke, is no column of GLPK's."""
+    for number, shape in enumerate(("parts", "hole", "pixel")):
+        problem = formulate(make_instance(shape), MILP)
+        write(problem, tmp_path / f"{number}.mod")
+        command = ["glpsol", "-m", f"{number}.mod", "-d", f"{number}.dat", "-w", "answer"]
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+        solution = read_solution(tmp_path / "answer", problem)
+        assert (solution.status, solution.contradictions) == ("optimal-global", ())
+
+
+def test_claims_fall_to_objective_bound_and_violation(milp):
+    problem, point = milp
+    objective = problem.objective_value(point)
+
+    def of(claimed=Status.OPTIMAL_GLOBAL, at=point, **claims):
+        return Solution(problem, at, claimed, "", "by hand", **claims)
+
+    assert of(reported=objective, bound=objective).status == "optimal-global"
+    assert of(reported=objective * (1 + 0.5 * TOLERANCE), bound=objective - 1).status == "optimal-global"
+    (why,) = of(reported=objective + 0.01).contradictions
+    assert why.startswith("it tells the objective")
+    (why,) = of(bound=objective + 0.01).contradictions
+    assert why.startswith("the dual bound")
+    assert of(reported=np.inf).status == of(reported=np.nan).status == "unknown"
+    off = point.copy()
+    off[problem.blocks["beta"].offset] += 3e-4
+    assert of(at=off).status == "unknown"
+    assert of(at=off, tolerance=1e-3).status == "optimal-global"
+    assert of(Status.INFEASIBLE).contradictions == ("its point is feasible",)
+    assert of(Status.INFEASIBLE, at=off).status == "infeasible"
+    assert of(Status.ERROR).status == "error"
+
+
+def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
+    document = json.loads((TINY / "gurobi-13.0.3_milp_optimal.json").read_text())
+    path = tmp_path / "x.json"
+    path.write_text(json.dumps(document))
+    assert read_solution(path, problem("milp")).status == "optimal-global"
+    document["SolutionInfo"]["ObjBound"] = 0.9
+    path.write_text(json.dumps(document))
+    found = read_solution(path, problem("milp"))
+    assert (found.status, found.claimed, found.bound) == ("unknown", "optimal-global", 0.9)
+
+
+@pytest.mark.parametrize("code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")])  # fmt: skip
+def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, tmp_path, code, status):
+    instance = cf.read_instance(skew / "skew.instance.json")
+    held = formulate(instance, MILP)
+    point = held.point(cf.greedy(instance))
+    bad = point.copy()
+    bad[: len(instance.theta)] += 1
+    for values in (point, bad):
+        path = tmp_path / "x.sol"
+        write_ampl_sol(path, "some words", values[Layout(held).order], held.row_count, code)
+        exit_code, facts, complaint, written = reading(path)
+        assert (exit_code, written) == (1, False)
+        assert facts["claimed"] == status
+        wrong = code == 200 and values is point
+        assert facts["status"] == ("unknown" if wrong else status)
+        assert ("its point is feasible" if wrong else "no answer") in complaint
+
+
+# values
+
+
+def test_values_that_no_column_can_have_are_refused(skew, reading, tmp_path):
+    instance = cf.read_instance(skew / "skew.instance.json")
+    held = formulate(instance, MILP)
+    point = held.point(cf.greedy(instance))
+    for block, value in (("p2", 4294967296.0), ("p2", 1e308), ("alpha", 1e300), ("s", -1.1 * LARGEST)):
+        wrong = point.copy()
+        wrong[held.blocks[block].offset] = value
+        (tmp_path / "x.sol").write_text(by_names(held, wrong))
+        code, facts, complaint, written = reading(tmp_path / "x.sol", "--tolerance", "inf")
+        assert (code, facts, written) == (1, {}, False)
+        assert f"{block}_00_01" in complaint
+        assert f"has the value {value:g}" in complaint
+    wrong[held.blocks["s"].offset] = LARGEST
+    (tmp_path / "x.sol").write_text(by_names(held, wrong))
+    assert reading(tmp_path / "x.sol", "--tolerance", "inf")[0] == 0
+
+
+def test_jumps_do_not_wrap_around(milp):
+    problem, point = milp
+    wrong = point.copy()
+    wrong[problem.blocks["p2"].offset] = 4294967296.0
+    with pytest.raises(InstanceError, match="32 bits"):
+        problem.field(wrong)
+
+
+# cut and damaged files
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """For each reader the content of an answer that a real solver wrote, and its problem; where zeros may be left out also without them."""
+    found = {}
+    for path in GOOD:
+        reader, status = FILES[path.name]
+        if (
+            status in WITH_POINT
+            and reader not in STATUS_ALONE
+            and problem_of(path) in {"milp", "qp", "quartic"}
+        ):
+            found.setdefault(reader, (path.read_bytes(), problem(problem_of(path))))
+    data, milp = found["cbc"]
+    found["cbc without zeros"] = (re.sub(rb"(?m)^ +\d+ \S+ +0 .*\n", b"", data), milp)
+    found["cplex without zeros"] = ((TINY / "cplex-22.2.0.1_milp_optimal_nonzero.sol").read_bytes(), milp)
+    folder = tmp_path_factory.mktemp("answers")
+    write(milp, folder / "m.mps")
+    model = highspy.Highs()
+    model.setOptionValue("output_flag", False)
+    model.readModel(str(folder / "m.mps"))
+    model.run()
+    for style in (0, 4):
+        model.writeSolution(str(folder / "x.sol"), style)
+        found[f"highs {style}"] = ((folder / "x.sol").read_bytes(), milp)
+    point = read_solution(folder / "x.sol", milp).point[Layout(milp).order]
+    for binary in (False, True):
+        path = write_ampl_sol(
+            folder / "a.sol", "optimal solution found", point, milp.row_count, 0, binary=binary
+        )
+        found[f"ampl binary={binary}"] = (path.read_bytes(), milp)
+    return found
+
+
+def bears_out(solution):
+    """Whether a status that promises a point is what the point shows, by numbers that are not the package's own judgement."""
+    if not solution.status.promises_point or solution.point is None:
+        return True
+    off = solution.violation
+    return (
+        off.rows <= 2 * np.pi * TOLERANCE
+        and max(off.bounds, off.integrality) <= TOLERANCE
+        and (
+            solution.reported is None
+            or abs(solution.reported - solution.objective) <= 1.1 * TOLERANCE * max(1, solution.objective)
+        )
+    )
+
+
+def attempt(path, data, of):
+    """The solution in damaged content; None where it is refused. Any other error than the package's own is a failure."""
+    path.write_bytes(data)
+    try:
+        return read_solution(path, of)
+    except SolutionError:
+        return None
+
+
+def test_a_cut_file_keeps_no_claim_that_its_point_does_not_bear_out(answers, tmp_path):
+    for name, (data, of) in answers.items():
+        whole = attempt(tmp_path / "x", data, of)
+        assert whole.status.promises_point
+        ends = [found.end() for found in re.finditer(rb"\n", data)]
+        for end in sorted({*ends[:-1:2], *range(0, len(data) - 1, 199)}):
+            found = attempt(tmp_path / "x", data[:end], of)
+            assert found is None or bears_out(found), (name, end)
+            if found is not None and found.point is not None and found.status != "unknown":
+                assert found.objective == pytest.approx(whole.objective, abs=1e-6)
+
+
+def test_a_file_cut_down_to_its_head_says_nothing(answers, tmp_path):
+    for name in ("cbc without zeros", "scip", "miplib"):
+        data, of = answers[name]
+        lines = data.splitlines(keepends=True)
+        for kept in (3, 10, len(lines) // 2):
+            found = attempt(tmp_path / "x", b"".join(lines[:kept]), of)
+            assert found.status == "unknown"
+            assert found.contradictions
+
+
+def test_files_of_a_status_alone_are_told_to_be_cut():
+    """A listing that is cut may lack the solve that counts."""
+    for path in (each for each in GOOD if FILES[each.name][0] in STATUS_ALONE and "error" not in each.name):
+        data = path.read_bytes()
+        end = len(data) - 1 if path.name.endswith("_tim.lst") else data.index(b"\n**** FILE SUMMARY")
+        for length in (end, end - 1, end - 10):
+            with pytest.raises(SolutionError, match=r"cut off|no solution file|not the number of a status"):
+                parse_raw(data[:length])
+
+
+def damages(data):
+    """Ways in which a file comes to harm: lines twice, out of order or longer, values replaced, ends of lines, marks."""
+    lines = data.splitlines(keepends=True)
+    for at in range(0, len(lines), max(1, len(lines) // 5)):
+        yield b"".join([*lines[: at + 1], *lines[at:]])
+        yield b"".join([*lines[:at], *lines[at + 1 :]])
+        yield b"".join([*lines[at:], *lines[:at]])
+        yield b"".join([*lines[:at], lines[at].rstrip() + b" 7\n", *lines[at + 1 :]])
+        yield b"".join([*lines[:at], lines[at].replace(b".", b","), *lines[at + 1 :]])
+    found = list(re.finditer(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?", data))
+    for place, value in zip(
+        found[:: max(1, len(found) // 10)],
+        [b"1e300", b"nan", b"-0", b"0x1p3", b"4294967296", b"1e999", b"-1e-300", b"1e5", b"", b"\xff\xfe"]
+        * 10,
+        strict=False,
+    ):
+        yield data[: place.start()] + value + data[place.end() :]
+
+
+def test_damaged_answers_are_refused_or_told_as_they_are(answers, tmp_path):
+    for name, (data, of) in answers.items():
+        for number, damaged in enumerate(damages(data)):
+            found = attempt(tmp_path / "x", damaged, of)
+            assert found is None or bears_out(found), (name, number)
+
+
+def test_a_repeated_line_of_cbc_drops_no_columns(tmp_path):
+    lines = (TINY / "cbc-2.10.8_milp_optimal.sol").read_bytes().splitlines(keepends=True)
+    for at in range(1, len(lines)):
+        path = tmp_path / "x.sol"
+        path.write_bytes(b"".join([*lines[: at + 1], *lines[at:]]))
+        with pytest.raises(
+            SolutionError, match=r"x\.sol: the column \w+ stands before the numbers start again"
+        ):
+            read_solution(path, problem("milp"))
+
+
+# marks, names and words
+
+
+def test_a_byte_order_mark_changes_nothing(skew, tmp_path):
+    for file in GOOD:
+        data = file.read_bytes()
+        plain = parse_raw(data)
+        for marked in (codecs.BOM_UTF8 + data, codecs.BOM_UTF16_LE + data.decode().encode("utf-16-le")):
+            raw = parse_raw(marked)
+            assert (raw.reader, raw.status, raw.message) == (plain.reader, plain.status, plain.message)
+            assert raw.values.tolist() == plain.values.tolist()
+    with pytest.raises(SolutionError, match="UTF-16 is damaged or cut off"):
+        parse_raw(codecs.BOM_UTF16_LE + b"x")
+    for name in ("skew.instance.json", f"skew.{MILP}.manifest.json"):
+        (tmp_path / name).write_bytes(codecs.BOM_UTF8 + (skew / name).read_bytes())
+    again = cf.read_manifest(tmp_path / f"skew.{MILP}.manifest.json").problem()
+    assert again.sha256 == cf.read_manifest(skew / f"skew.{MILP}.manifest.json").problem().sha256
+
+
+def test_columns_that_programs_add_stand_in_one_table():
+    """The standalone checker has the same patterns, once each."""
+    ours = {part for patterns in ADDED_COLUMNS.values() for part in patterns.split("|")}
+    assert set(check_point.ADDED.pattern.split("|")) - ours == set()
+    names = ("ONE", "objconstvar", "nlobjvar", "~r_0", "Rgc1", "MPS_Rgc1", "Constant", "objvar")
+    assert all(check_point.ADDED.fullmatch(name) for name in names)
+    assert not any(check_point.ADDED.fullmatch(name) for name in ("alpha_00_00", "x", "Constant1"))
+
+
+def test_the_column_that_scip_adds_for_a_constant_is_known(tmp_path):
+    pyscipopt = pytest.importorskip("pyscipopt")
+    of = problem("qp")
+    write(of, tmp_path / "m.osil")
+    model = pyscipopt.Model()
+    model.hideOutput()
+    model.readProblem(str(tmp_path / "m.osil"))
+    model.optimize()
+    model.writeBestSol(str(tmp_path / "x.sol"))
+    assert b"objconstvar" in (tmp_path / "x.sol").read_bytes()
+    found = read_solution(tmp_path / "x.sol", of)
+    assert (found.unknown, found.status) == (0, "feasible")
+
+
+def test_a_file_of_scip_without_a_point_says_what_it_knows():
+    def of(words):
+        return parse_raw(words + b"no solution available\n").status
+
+    assert of(b"") == of(b"solution status: unknown\n") == Status.NO_POINT
+    assert of(b"solution status: infeasible\n") == Status.INFEASIBLE
+    assert of(b"solution status: time limit reached\n") == Status.LIMIT_WITHOUT_POINT
+
+
+# the standalone checker
+
+
+def test_the_checker_takes_no_empty_file_and_no_wrong_objective(tmp_path, capsys):
+    of = problem("milp")
+    write(of, tmp_path / "m.mps")
+    model, path = str(tmp_path / "m.mps"), tmp_path / "p.sol"
+
+    def code(text):
+        path.write_bytes(text)
+        return check_point.main([model, str(path)])
+
+    for empty in (
+        b"",
+        b"\n \n",
+        b"# Solution for model obj\n",
+        b"solution status: unknown\n",
+        gzip.compress(b""),
+    ):
+        assert code(empty) == 2
+        assert "holds no point" in capsys.readouterr().err
+    good = (TINY / "gurobi-13.0.3_milp_optimal.sol").read_bytes()
+    assert code(good) == 0
+    assert code(codecs.BOM_UTF8 + good) == 0
+    capsys.readouterr()
+    wrong = re.sub(rb"(?m)^(# Objective value = ).*$", rb"\g<1>0.25", good)
+    assert wrong != good
+    assert code(wrong) == 1
+    assert "NOT the objective that the file claims" in capsys.readouterr().out
+    assert Path(check_point.__file__).read_text().count("NOT the objective") == 1

@@ -1,0 +1,527 @@
+"""Local solvers: right optima, limits, starts, interrupts, and refusals by name."""
+
+import itertools
+import re
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from functools import cache
+from pathlib import Path
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.tables import tables
+from crossfield.export.formats.nl import Layout
+from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solvers_table import DRIVEN
+from crossfield.export.solving.local import solver_for
+from crossfield.export.solving.run import plan
+from crossfield.models.errors import (
+    InputError,
+    MissingSolverError,
+    SolverError,
+    UnsupportedBySolverError,
+)
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from loops import for_each
+from scipy.optimize import linprog, lsq_linear
+
+with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pythons
+    import casadi as ca
+
+SOLVED = {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+TWO_NORM = ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact")
+
+
+def one_pixel(gauge, w_beta):
+    mask, theta = np.ones((1, 1), dtype=bool), np.array([2 * np.pi / 3])
+    return cf.Instance("pixel", mask, np.array([[0, 0]]), theta, np.ones(1), gauge=gauge, w_beta=w_beta)
+
+
+def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, w_beta=1e-2):
+    rng = np.random.default_rng(seed)
+    mask = np.ones((height, width), dtype=bool)
+    pixels = np.argwhere(rng.random(mask.shape) < strokes)
+    theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.2, 1, len(pixels))
+    return cf.Instance(f"random_{seed}", mask, pixels, theta, w, gauge=gauge, w_beta=w_beta)
+
+
+def formulated(instance, name, *, relax=False):
+    recipe = FORMULATIONS[name]
+    return cf.formulate(
+        instance, name, p=cf.greedy(instance).p if recipe.fixed else None, relax=relax or None
+    )
+
+
+def residual_rows(instance, p):
+    """Matrix and right side of all residuals A, B, R, beta at fixed jumps, and the weight of each: written out by hand."""
+    grid = instance.grid
+    rows, sides, weights = [], [], []
+    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
+        a, b = np.zeros((2, 2 * grid.size))
+        a[i], a[j] = 1, -1
+        b[grid.size + i], b[grid.size + j] = 1 - 2 * (jump % 2), -1
+        rows, sides, weights = [*rows, a, b], [*sides, -np.pi / 2 * jump, 0.0], [*weights, 2.0, 2.0]
+    for at, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
+        r = np.zeros(2 * grid.size)
+        r[at] = r[grid.size + at] = 1
+        rows, sides, weights = [*rows, r], [*sides, theta], [*weights, instance.w_strokes * w]
+    for at in range(grid.size):
+        r = np.zeros(2 * grid.size)
+        r[grid.size + at] = 1
+        rows, sides, weights = [*rows, r], [*sides, 0.0], [*weights, instance.w_beta]
+    return np.array(rows), np.array(sides), np.array(weights)
+
+
+def bounds(instance):
+    quarter = np.full(instance.grid.size, np.pi / 4)
+    return np.concatenate([instance.alpha_lower, -quarter]), np.concatenate([instance.alpha_upper, quarter])
+
+
+def least_squares(instance, p):
+    rows, sides, weights = residual_rows(instance, p)
+    root = np.sqrt(weights)
+    found = lsq_linear(rows * root[:, None], sides * root, bounds(instance), method="bvls", tol=1e-14)
+    return 2 * found.cost
+
+
+def least_deviations(instance, p):
+    rows, sides, weights = residual_rows(instance, p)
+    count, columns = rows.shape
+    lower, upper = bounds(instance)
+    identity = np.eye(count)
+    found = linprog(
+        np.concatenate([np.zeros(columns), weights]),
+        A_ub=np.block([[rows, -identity], [-rows, -identity]]),
+        b_ub=np.concatenate([sides, -sides]),
+        bounds=[*zip(lower, upper, strict=True), *[(0, None)] * count],
+        method="highs-ds",
+    )
+    return found.fun
+
+
+def by_enumeration(instance, inner):
+    """The optimum over all jumps, each with its convex problem in the angles."""
+    ranges = (range(lo, hi + 1) for lo, hi in zip(instance.p_min, instance.p_max, strict=True))
+    return min(inner(instance, p) for p in itertools.product(*ranges))
+
+
+# Right optima
+
+
+@pytest.mark.parametrize("solver", ["highs", "ipopt", "bonmin"])
+@pytest.mark.parametrize("gauge", ["box", "strokes"])
+def test_one_pixel_has_the_optimum_of_the_hand_calculation(solver, gauge):
+    """A stroke at 120 degrees: in the box alpha = pi/2, and beta minimises (pi/2 + beta - theta)^2 + w_beta beta^2."""
+    w_beta = 1e-2
+    problem = cf.formulate(one_pixel(gauge, w_beta), "qp-fixed", p=np.zeros(0, int))
+    solution = cf.solve(problem, solver)
+    misfit = np.pi / 6
+    alpha, beta = (np.pi / 2, misfit / (1 + w_beta)) if gauge == "box" else (2 * np.pi / 3, 0.0)
+    least = misfit**2 * w_beta / (1 + w_beta) if gauge == "box" else 0.0
+    assert solution.status in SOLVED
+    assert solution.objective == pytest.approx(least, abs=2e-8)
+    assert solution.field.alpha[0] + solution.field.beta[0] == pytest.approx(alpha + beta, abs=1e-4)
+    assert solution.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
+
+
+def test_one_pixel_with_the_weight_of_the_paper():
+    solution = cf.solve(cf.formulate(one_pixel("box", 1e-6), "qp-fixed", p=np.zeros(0, int)), "ipopt")
+    assert solution.field.alpha[0] == pytest.approx(np.pi / 2, abs=1e-4)
+    assert solution.field.beta[0] == pytest.approx(np.pi / 6, abs=1e-4)
+
+
+@pytest.mark.parametrize("solver", ["highs", "ipopt", "bonmin"])
+def test_one_pixel_in_the_1_norm(solver):
+    solution = cf.solve(cf.formulate(one_pixel("box", 1e-2), "milp-mccormick"), solver)
+    assert solution.objective == pytest.approx(1e-2 * np.pi / 6, abs=1e-7)
+    assert solution.field.beta[0] == pytest.approx(np.pi / 6, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "name,solver", [("milp-mccormick", "highs"), ("milp-mccormick", "bonmin"), ("miqp-exact", "bonmin")]
+)
+def test_two_pixels_with_exchanged_lines_meet_with_jump_one(name, solver):
+    """Strokes at b and pi/2 - b, each on line u: one cross in two labels, (0, b) and (pi/2, -b)."""
+    b = 0.3
+    mask, pixels = np.ones((1, 2), dtype=bool), np.array([[0, 0], [0, 1]])
+    instance = cf.Instance(
+        "pair", mask, pixels, np.array([b, np.pi / 2 - b]), np.ones(2), gauge="box", w_beta=0
+    )
+    solution = cf.solve(cf.formulate(instance, name), solver)
+    assert solution.objective == pytest.approx(0, abs=1e-6)
+    assert solution.field.p.tolist() == [1]
+    assert solution.field.alpha == pytest.approx([0, np.pi / 2], abs=2e-3)
+    assert solution.field.beta == pytest.approx([b, -b], abs=2e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("gauge", ["box", "strokes"])
+def test_the_milp_has_the_optimum_of_the_enumeration(seed, gauge):
+    instance = random_instance(2, 2, seed, gauge=gauge)
+    expected = by_enumeration(instance, least_deviations)
+    assert expected > 1e-3
+    solution = cf.solve(cf.formulate(instance, "milp-mccormick"), "highs")
+    assert solution.status == Status.OPTIMAL_GLOBAL
+    assert solution.objective == pytest.approx(expected, abs=2e-6)
+    assert solution.reported == pytest.approx(solution.objective, abs=1e-9)
+    assert solution.bound <= solution.objective + 1e-9
+    assert solution.field.energy(1).total == pytest.approx(expected, abs=2e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("gauge", ["box", "strokes"])
+def test_the_exact_miqp_has_the_optimum_of_the_enumeration(seed, gauge):
+    instance = random_instance(2, 2, seed, gauge=gauge)
+    expected = by_enumeration(instance, least_squares)
+    assert expected > 1e-3
+    solution = cf.solve(cf.formulate(instance, "miqp-exact"), "bonmin")
+    assert solution.objective == pytest.approx(expected, abs=2e-5)
+    assert solution.field.energy(2).total == pytest.approx(expected, abs=2e-5)
+    assert solution.violation.worst < 1e-6
+
+
+def test_bonmin_and_highs_agree_on_a_milp():
+    problem = cf.formulate(random_instance(2, 3, 5), "milp-mccormick")
+    assert cf.solve(problem, "bonmin").objective == pytest.approx(
+        cf.solve(problem, "highs").objective, abs=2e-5
+    )
+
+
+def test_three_solvers_agree_on_a_qp():
+    instance = random_instance(5, 6, 6)
+    problem = formulated(instance, "qp-fixed")
+    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in DRIVEN]
+    assert found == pytest.approx([least_squares(instance, cf.greedy(instance).p)] * 3, abs=1e-6)
+
+
+# The table of solvers and classes
+
+
+SMALL = random_instance(2, 2, 1, strokes=1.0)
+
+
+@pytest.fixture
+def small():
+    return SMALL
+
+
+def split(label):
+    return label.removesuffix(", relaxed"), label.endswith(", relaxed")
+
+
+PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in DRIVEN]
+DONE = [(label, solver) for label, solver, answer in PAIRS if answer == "yes"]
+REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer != "yes"]
+
+
+@cache
+def solution_of(label, solver):
+    name, relax = split(label)
+    start = cf.greedy(SMALL)
+    return cf.solve(formulated(SMALL, name, relax=relax), solver, start=start, limits=cf.Limits(250))
+
+
+@pytest.mark.parametrize("label,solver", DONE)
+def test_every_pair_of_the_table_is_solved(label, solver):
+    solution = solution_of(label, solver)
+    problem = solution.problem
+    assert solution.status in SOLVED
+    assert solution.violation.worst < 1e-6
+    assert solution.objective <= problem.objective_value(problem.point(cf.greedy(SMALL))) + 1e-6
+    if problem.convex:
+        everyone = [solution_of(label, other).objective for label_, other in DONE if label_ == label]
+        assert everyone == pytest.approx([solution.objective] * len(everyone), abs=2e-5)
+
+
+@for_each("label,solver,reason", REFUSED)
+def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, reason):
+    name, relax = split(label)
+    folder = tmp_path / "out"
+    with pytest.raises(UnsupportedBySolverError) as caught:
+        cf.solve(formulated(small, name, relax=relax), solver, folder)
+    assert reason in str(caught.value)
+    assert name in str(caught.value)
+    assert solver in str(caught.value)
+    assert not folder.exists()
+
+
+def test_the_table_is_not_trivial():
+    assert len(DONE) > 15
+    assert len(REFUSED) > 15
+    assert {solver for _, solver in DONE} == set(DRIVEN)
+
+
+def test_the_preferred_solver_fits_the_class(small):
+    preferred = {
+        "milp-mccormick": "highs",
+        "qp-fixed": "ipopt",
+        "miqp-exact": "bonmin",
+        "miqp-mccormick": "bonmin",
+    }
+    for name, solver in preferred.items():
+        assert solver_for(formulated(small, name)).name == solver
+    assert solver_for(formulated(small, "miqcp-bilinear", relax=True)).name == "ipopt"
+    for name in ("minlp-parity", "minlp-cubic", "miqcp-bilinear"):
+        with pytest.raises(UnsupportedBySolverError, match="crossfield list"):
+            solver_for(formulated(small, name))
+    with pytest.raises(InputError, match="choose one of highs, ipopt, bonmin"):
+        solver_for(formulated(small, "qp-fixed"), "HiGHS")
+
+
+def test_a_missing_package_is_a_named_error(small, monkeypatch):
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(MissingSolverError, match="ipopt needs the Python package casadi"):
+        solver_for(formulated(small, "qp-fixed"))
+    assert solver_for(formulated(small, "milp-mccormick")).name == "highs"
+
+
+# Integers dropped or fixed
+
+
+@pytest.mark.parametrize("name", TWO_NORM)
+def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
+    start = cf.greedy(small)
+    expected = least_squares(small, start.p)
+    solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
+    assert solution.objective == pytest.approx(expected, abs=1e-6)
+    assert solution.field.p.tolist() == start.p.tolist()
+
+
+@pytest.mark.parametrize("name", ["miqcp-bilinear-l1", "milp-mccormick"])
+def test_with_integers_fixed_ipopt_finds_what_the_lp_finds(small, name):
+    start = cf.greedy(small)
+    expected = least_deviations(small, start.p)
+    solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
+    assert solution.objective == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["milp-mccormick", "miqp-exact", "miqp-mccormick"])
+def test_a_convex_relaxation_bounds_the_optimum(name):
+    relaxed = solution_of(f"{name}, relaxed", "ipopt").objective
+    solved = solution_of(name, "bonmin").objective
+    assert relaxed <= solved + 1e-6
+    assert relaxed < 0.9 * solved  # the facets alone do not say much
+
+
+# Limits, gaps, threads, starts
+
+
+@pytest.fixture(scope="module")
+def hard():
+    """An instance that no solver here proves in seconds."""
+    return cf.sample("mouse", 10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name,solver", [("milp-mccormick", "highs"), ("miqp-exact", "bonmin"), ("milp-mccormick", "bonmin")]
+)
+def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
+    """No solver proves it in hours, and all take the start at once: three seconds or thirty make no difference."""
+    problem, start = cf.formulate(hard, name), cf.greedy(hard)
+    solution = cf.solve(problem, solver, start=start, limits=cf.Limits(3))
+    assert solution.status == Status.LIMIT_WITH_POINT
+    assert solution.objective <= problem.objective_value(problem.point(start)) + 1e-9
+    assert solution.violation.worst < 1e-6
+    assert not solution.interrupted
+
+
+def test_without_a_start_and_time_there_is_no_point(tmp_path):
+    instance = cf.sample("mouse", 30)
+    (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
+    solution = cf.solve(cf.formulate(instance, "milp-mccormick"), "highs", tmp_path, limits=cf.Limits(1e-6))
+    assert (solution.point, solution.status) == (None, Status.LIMIT_WITHOUT_POINT)
+    assert "yesterday" not in (tmp_path / "mouse.milp-mccormick.highs.sol").read_text()
+
+
+def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
+    cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
+    log = (tmp_path / "mouse.milp-mccormick.highs.log").read_text()
+    claimed = re.search(r"MIP start solution is feasible, objective value is (\S+)", log)
+    assert float(claimed[1]) == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact", "minlp-cubic"])
+def test_the_start_is_in_the_nl_file(tmp_path, small, name):
+    problem, start = formulated(small, name), cf.greedy(small)
+    cf.write(problem, tmp_path / "model.nl", start=start)
+    builder = ca.NlpBuilder()
+    builder.import_nl(str(tmp_path / "model.nl"))
+    assert np.array(builder.x_init).ravel().tolist() == problem.point(start)[Layout(problem).order].tolist()
+
+
+def test_bonmin_keeps_a_start_that_is_the_optimum(small):
+    problem = cf.formulate(small, "miqp-exact")
+    best = cf.solve(problem, "bonmin").field
+    fitted = cf.fit_angles(best).field
+    again = cf.solve(problem, "bonmin", start=fitted)
+    assert again.status == Status.OPTIMAL_LOCAL
+    assert again.objective == pytest.approx(fitted.energy(2).total, abs=1e-7)
+
+
+def test_bonmin_improves_a_start_that_is_not(small):
+    problem = cf.formulate(small, "miqp-exact")
+    flat = cf.CrossField(small, small.alpha_lower, np.zeros(4), np.clip(0, small.p_min, small.p_max))
+    found = cf.solve(problem, "bonmin", start=flat)
+    assert found.objective == pytest.approx(by_enumeration(small, least_squares), abs=2e-5)
+    assert found.objective < flat.energy(2).total - 1e-3
+
+
+def test_a_wide_gap_ends_the_search_early(hard):
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
+    solution = cf.solve(problem, "highs", start=start, limits=cf.Limits(300, gap=0.97))
+    assert solution.status == Status.OPTIMAL_GLOBAL
+    assert solution.bound < 0.9 * solution.objective
+    assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
+
+
+def test_threads_may_change_from_solve_to_solve(tmp_path, small):
+    problem = cf.formulate(small, "milp-mccormick")
+    found = [
+        cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=threads)).objective
+        for threads in (1, 2, 1, 0)
+    ]
+    assert found == pytest.approx([found[0]] * 4, abs=1e-7)
+    cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=1))
+    assert "threads" in (tmp_path / "random_1.milp-mccormick.highs.log").read_text().lower()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"seconds": 0},
+        {"seconds": float("nan")},
+        {"seconds": float("inf")},
+        {"gap": -1},
+        {"threads": -1},
+        {"threads": 100000},
+    ],
+)
+def test_impossible_limits_are_refused(given):
+    with pytest.raises(InputError, match="cannot be"):
+        cf.Limits(**given)
+
+
+def test_what_is_solved_is_the_file(tmp_path, small):
+    """Another bound in the file would show: the solvers see nothing else."""
+    problem = formulated(small, "qp-fixed")
+    solution = cf.solve(problem, "ipopt", tmp_path)
+    stem = tmp_path / "random_1.qp-fixed"
+    left = {path for path in tmp_path.iterdir() if "instance" not in path.name}
+    assert {path.name.removeprefix(stem.name) for path in left} == {
+        ".nl", ".row", ".col", ".manifest.json", ".ipopt.sol", ".ipopt.log",
+    }  # fmt: skip
+    again = cf.read_solution(f"{stem}.ipopt.sol", problem)
+    assert again.point.tolist() == solution.point.tolist()
+
+
+# What goes wrong
+
+
+def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, monkeypatch):
+    problem = formulated(small, "qp-fixed")
+    cf.solve(problem, "ipopt", tmp_path)
+    answer = tmp_path / "random_1.qp-fixed.ipopt.sol"
+    assert answer.exists()
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
+    monkeypatch.setenv("PYTHONPATH", str(broken))
+    with pytest.raises(
+        SolverError, match=r"ipopt left no answer \(exit code 1\): ImportError: libgfortran is gone"
+    ):
+        cf.solve(problem, "ipopt", tmp_path)
+    assert not answer.exists()
+
+
+def test_files_where_the_user_happens_to_be_are_not_run(tmp_path, small, monkeypatch):
+    for name in ("casadi.py", "crossfield.py", "numpy.py"):
+        (tmp_path / name).write_text("raise SystemExit('taken for a library')")
+    monkeypatch.chdir(tmp_path)
+    assert cf.solve(formulated(small, "qp-fixed"), "ipopt").status == Status.OPTIMAL_LOCAL
+
+
+# Ctrl-C, as a signal to a real command line
+
+
+def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
+    """Start a command line, wait until its log has the words, interrupt, and give exit code, output and complaints."""
+    command = [sys.executable, "-m", "crossfield", *map(str, arguments), "-o", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while not any(re.search(words, path.read_text(), re.MULTILINE) for path in folder.rglob(log)):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.05)
+        process.send_signal(number)
+        out, err = process.communicate()
+    return process.returncode, out, err
+
+
+CTRL_C = {
+    "highs": ["solve", "mouse", "-f", "milp-mccormick"],
+    "ipopt": ["solve", "mouse", "-f", "miqcp-bilinear", "--relax", "--size", "64"],
+    "bonmin": ["solve", "mouse", "-f", "miqp-exact", "--size", "12"],
+}
+AT_WORK = {"highs": "MIP start solution is feasible", "ipopt": "^iter +objective", "bonmin": "NLP0014I"}
+"""What stands in the log of each once it solves."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", CTRL_C)
+def test_ctrl_c_keeps_the_best_point(tmp_path, solver):
+    name = CTRL_C[solver][3]
+    code, out, err = interrupted(tmp_path, f"*.{solver}.log", [*CTRL_C[solver], "--json"], AT_WORK[solver])
+    assert (code, err) == (0, "crossfield: interrupted; the best point so far was kept\n")
+    field = cf.read_field(tmp_path / f"mouse.{name}.field.npz")
+    assert '"interrupted": true' in out
+    assert f'"energy_2_norm": {field.energy(2).total!r}' in out
+    if solver != "ipopt":
+        assert (
+            field.energy(1 if solver == "highs" else 2).total
+            <= cf.greedy(field.instance).energy(1 if solver == "highs" else 2).total + 1e-9
+        )
+    assert not list(tmp_path.rglob("*.part"))
+
+
+@pytest.mark.slow
+def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
+    code, out, err = interrupted(
+        tmp_path, "*.highs.log", ["run", "mouse", "--size", "14", "--time-limit", "10"], AT_WORK["highs"]
+    )
+    assert code == 0
+    assert "MILP: interrupted; its best field so far was kept" in err
+    assert "two-stage" in out
+    assert "interrupted: two-stage; the report says what there is" in err
+    assert (tmp_path / "report.json").exists()
+
+
+@pytest.mark.slow
+def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
+    code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], "}$")
+    assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
+    assert err == "crossfield: interrupted; files that stand are whole\n"
+    assert not list(tmp_path.rglob("*.part"))
+    assert not (tmp_path / "report.json").exists()
+    cf.read_instance(tmp_path / "models" / "mouse.instance.json")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", ["highs", "bonmin"])
+def test_when_asked_to_end_it_ends_with_its_child(tmp_path, solver):
+    code, out, err = interrupted(
+        tmp_path, f"*.{solver}.log", CTRL_C[solver], AT_WORK[solver], number=signal.SIGTERM
+    )
+    assert (code, out, err) == (128 + signal.SIGTERM, "", "")
+    mine = [path for path in Path("/proc").glob("[0-9]*/cmdline") if str(tmp_path) in _command_line(path)]
+    assert mine == []
+
+
+def _command_line(path):
+    try:
+        return path.read_text()
+    except OSError:
+        return ""

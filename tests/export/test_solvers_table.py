@@ -1,0 +1,96 @@
+"""Facts of solvers stand once: in the table, from which everything else is made."""
+
+from __future__ import annotations
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import crossfield as cf
+import pytest
+from cases import make_instance
+from crossfield.export.bundle.manifest import read_manifest, write_all
+from crossfield.export.bundle.starts import LAYOUTS, STARTS
+from crossfield.export.cli.tables import tables
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.solvers_table import DRIVEN, PROGRAMS, SOLVERS, Refusal, Solver, StartFile, takes
+from crossfield.models.formulations.catalogue import FORMULATIONS
+
+ROOT = Path(cf.__file__).parent
+TOY = Solver(
+    "toy", "Toy", ("lp",), "cbc", {"quadratic rows": Refusal("read", "Toy reads no products, at no price")}
+)
+
+
+def sources(*parts: str) -> dict[str, str]:
+    files = (path for part in parts for path in (ROOT / part).rglob("*.py"))
+    return {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files}
+
+
+def test_what_the_table_names_is_there():
+    for solver in SOLVERS.values():
+        assert solver.formats[0] in PROGRAMS[solver.program].formats
+        assert set(solver.formats) <= set(FORMATS)
+        assert (solver.proves == "global") == all(each.stage != "local" for each in solver.refusals.values())
+        assert solver.start is None or solver.start.layout in LAYOUTS
+    for solver in DRIVEN.values():
+        driver = (ROOT / "export" / "solving" / f"{solver.driver}.py").read_text()
+        assert "\ndef run(job: Job) -> RunEnd:" in driver
+        if solver.window is not None:
+            instance = make_instance("hole")
+            assert takes(cf.formulate(instance, solver.window.formulation), solver.name).answer == "yes"
+    for program in PROGRAMS.values():
+        module = (ROOT / "export" / "verify" / "programs" / f"{program.name}.py").read_text()
+        wanted = {
+            "version": True,
+            "read": program.algebra,
+            "evaluate": program.behaviour,
+            "solve": program.solvers,
+        }
+        for function, needed in wanted.items():
+            assert not needed or re.search(rf"^def {function}\(", module, re.MULTILINE), program.name
+    assert {layout for start in STARTS.values() for layout in [start.layout]} == set(LAYOUTS)
+
+
+def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`list`, the manifest and the table of programs tell of it, and nothing else was touched."""
+    monkeypatch.setitem(SOLVERS, "toy", TOY)
+    columns, rows = tables()["externals"]
+    assert "toy" in columns
+    answers = {row["formulation"]: row["toy"] for row in rows}
+    assert set(answers) == set(FORMULATIONS)
+    assert answers["milp-mccormick"] == "yes"
+    assert "Toy reads no products" in answers["miqcp-bilinear"]
+    write_all(make_instance("hole"), tmp_path, ["milp-mccormick"], ["lp"])
+    (manifest,) = tmp_path.glob("*.manifest.json")
+    assert read_manifest(manifest).document["solvers"]["toy"]["format"] == "lp"
+    assert PROGRAMS["cbc"].solvers == ("cbc", "toy")
+
+
+def test_a_solver_that_is_driven_here_is_one_entry_and_a_driver(monkeypatch: pytest.MonkeyPatch):
+    """Under another name HiGHS solves, for the driver reads the table alone."""
+    twin = Solver(
+        "twin", "Twin", ("lp",), "highs", driver="highs", start=StartFile("highs", ".sol", "as HiGHS does")
+    )
+    monkeypatch.setitem(SOLVERS, "twin", twin)
+    monkeypatch.setitem(DRIVEN, "twin", twin)
+    problem = cf.formulate(make_instance("hole"), "milp-mccormick", relax=True)
+    assert cf.solve(problem, "twin").objective == pytest.approx(
+        cf.solve(problem, "highs").objective, abs=1e-7
+    )
+
+
+def test_a_program_that_is_not_here_says_how_to_get_it():
+    absent = Solver("absent", "Absent", ("lp",), "highs", package="no_such_package")
+    assert find_spec("no_such_package") is None
+    assert absent.missing == "pip install no_such_package"
+    assert DRIVEN["highs"].missing == ""
+
+
+@pytest.mark.parametrize(
+    "call,place",
+    [(r"highspy\.Highs\(\)", "export/solving/highs.py"), (r"NlpBuilder\(\)", "export/solving/nl_model.py")],
+)
+def test_one_driver_of_highs_and_one_loader_of_nl(call: str, place: str):
+    found = [name for name, text in sources("export", "models").items() for _ in re.findall(call, text)]
+    assert found == [place]

@@ -1,0 +1,413 @@
+"""Every consumer that is here reads, evaluates and solves what we write; a wrong file, a crash and a hang are noticed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import MASKS, make_field, make_instance
+from crossfield.export.bundle.manifest import read_manifest, write_all
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.solutions.readers.text import RawSolution
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
+from crossfield.export.verify.programs import worker as consumer_worker
+from crossfield.export.verify.programs.reading import load
+from crossfield.export.verify.programs.worker import Worker
+from crossfield.export.verify.verify import Verdict, Verification, same, verify
+from crossfield.models.errors import InputError
+from crossfield.models.field.file import write_field
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate
+from crossfield.models.instance.file import write_instance
+from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.samples import sample
+from loops import for_each
+
+pytestmark = pytest.mark.oracles
+
+SECONDS = 0.3
+needing = pytest.mark.needs
+each_solver = pytest.mark.parametrize(
+    "solver",
+    [
+        pytest.param(name, marks=[needing(solver.program), *([needing(name)] if solver.package else [])])
+        for name, solver in SOLVERS.items()
+    ],
+)
+
+
+def each_of(consumers: Iterable[str]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize(
+        "consumer", [pytest.param(name, marks=needing(name)) for name in consumers]
+    )
+
+
+def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Instance:
+    rng = np.random.default_rng(seed)
+    pixels = np.argwhere(np.ones((height, width), bool))[: max(1, 2 * height * width // 3)]
+    theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
+    return Instance(name, np.ones((height, width), bool), pixels, theta, w, w_beta=1e-3)
+
+
+INSTANCES: dict[str, Callable[[], Instance]] = {
+    "1 x 3": lambda: on_grid(1, 3),
+    "3 x 3 with a hole": lambda: make_instance("hole"),
+    "a sample": lambda: sample("skew", 5),
+}
+RELAXED = "1 x 3, relaxed"
+LARGER = [name if name == "1 x 3" else pytest.param(name, marks=pytest.mark.slow) for name in INSTANCES]
+PROVEN = ("miqcp-bilinear-l1", "miqp-mccormick", "milp-mccormick", "qp-fixed", "miqp-exact")
+"""What every solver that takes it proves at once."""
+
+
+@pytest.fixture(scope="session")
+def verified(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Verification]:
+    """The verification of all files of an instance, solves included, by name of the instance."""
+    done: dict[str, Verification] = {}
+
+    def verification(name: str) -> Verification:
+        if name not in done:
+            folder, instance = tmp_path_factory.mktemp("export"), INSTANCES[name.removesuffix(", relaxed")]()
+            write_all(
+                instance, folder, start=make_field(instance), options={"relax": name == RELAXED or None}
+            )
+            done[name] = verify(folder, seconds=SECONDS)
+        return done[name]
+
+    return verification
+
+
+@pytest.mark.parametrize("instance", LARGER)
+@each_of(PROGRAMS)
+def test_every_file_means_the_problem(verified: Callable[[str], Verification], consumer: str, instance: str):
+    """Each file of the consumer's formats is read and agrees, or is refused for a reason of the table."""
+    entry, verification = PROGRAMS[consumer], verified(instance)
+    read = {f.file: f.verdict for f in verification.findings if f.consumer == consumer and f.step == "read"}
+    files = [path.name for path in verification.folder.iterdir() if path.suffix[1:] in entry.formats]
+    assert sorted(read) == sorted(files)
+    refused = {name for name in files if refuses(verification.folder / name, consumer)}
+    assert {name for name, verdict in read.items() if verdict == Verdict.REFUSED} == refused
+    assert {verdict for name, verdict in read.items() if name not in refused} == {Verdict.AGREES}
+
+
+def refuses(path: Path, solver: str) -> bool:
+    problem = read_manifest(path.with_suffix(".manifest.json")).problem()
+    held = carried(problem, FORMATS[path.suffix[1:]])
+    return solver in SOLVERS and SOLVERS[solver].refusal(held, "read") is not None
+
+
+@pytest.mark.parametrize("instance", LARGER)
+@each_solver
+def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):
+    found = [f for f in verified(instance).findings if f.consumer == solver and f.step == "solve"]
+    assert found
+    assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.LIMIT, Verdict.REFUSED, Verdict.NOT_TRIED}
+    assert all(f.reason for f in found if f.verdict != Verdict.AGREES)
+    for finding in (f for f in found if f.verdict == Verdict.AGREES):
+        others = [f for f in verified(instance).findings if f.group == finding.group and f.proven]
+        assert all(same(finding.objective, other.objective) for other in others)
+
+
+def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
+    """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
+    write_all(on_grid(1, 2), tmp_path, PROVEN, start=make_field(on_grid(1, 2)))
+    found = [f for f in verify(tmp_path, seconds=250).findings if f.step == "solve"]
+    assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
+    present = {name for name, solver in SOLVERS.items() if not solver.missing}
+    assert {f.consumer for f in found if f.verdict == Verdict.AGREES} == present
+
+
+def test_the_result_lies_in_the_folder(verified: Callable[[str], Verification]):
+    found = verified("1 x 3")
+    assert found.ok
+    document = json.loads((found.folder / "verify.json").read_text(), parse_constant=pytest.fail)
+    assert document == json.loads(json.dumps(found.document()))
+    assert document["ok"] is True
+    assert set(document["versions"]) | set(document["absent"]) == set(PROGRAMS)
+    assert all(re.search(r"\d+\.\d+", words) for words in document["versions"].values())
+    assert len(document["findings"]) == len(found.findings)
+
+
+def test_options_and_packed_files(tmp_path: Path):
+    """Printed facet, box, 1-norms, binary .nl, scalar GAMS, .gz."""
+    instance = make_instance("hole", "box")
+    chosen = {"facet": "printed", "stroke_norm": 1, "beta_norm": 1}
+    names = ["miqp-mccormick", "milp-mccormick", "miqcp-bilinear"]
+    dialects = {"nl": "binary", "gms": "scalar"}
+    write_all(instance, tmp_path / "options", names, options=chosen, dialects=dialects, compress=True)
+    found = verify(tmp_path / "options")
+    assert found.bad == []
+    assert {f.consumer for f in found.findings if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
+
+
+def test_lonely_columns(tmp_path: Path):
+    """A pixel without stroke and neighbour: its alpha stands in no term."""
+    write_all(make_instance("parts"), tmp_path, ["milp-mccormick", "minlp-quartic"])
+    assert verify(tmp_path).bad == []
+
+
+# what is wrong is noticed
+
+WRONG = {
+    "bound": ("milp-mccormick", "mps", r" UP BND1 alpha_00_00 \S+", " UP BND1 alpha_00_00 1.5"),
+    "cost": ("milp-mccormick", "mps", r" s_00_00_r obj 2", " s_00_00_r obj 2.0000000001"),
+    "whole": ("milp-mccormick", "mps", r" MARKER\d+ 'MARKER' 'INT\w+'\n", ""),
+    "sense": ("milp-mccormick", "lp", r"(c14_00_00_r:.*) >= ", r"\1 <= "),
+    "sign": ("milp-mccormick", "lp", r"(c15_00_00_r:.* )\+ 1 alpha", r"\1- 1 alpha"),
+    "name": ("milp-mccormick", "lp", r"\bz_00_00_r\b", "zz_00_00_r"),
+    "half": ("miqp-exact", "lp", r"4 d_00_00_r \^2", "2 d_00_00_r ^2"),
+    "constant": ("miqp-exact", "lp", r"obj(\w*): \+ \S+ ONE", r"obj\1: + 1 ONE"),
+    "double": ("miqp-exact", "mps", r" d_00_00_r d_00_00_r 4", " d_00_00_r d_00_00_r 8"),
+    "product": ("miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"),
+    "number": ("minlp-quartic", "nl", r"\nn1\.5707963267948966\n", "\nn1.571\n"),
+    "limit": ("miqp-exact", "nl", r"\nr\n4 0\n", "\nr\n4 1\n"),
+    "groups": ("milp-mccormick", "nl", r"^((?:.*\n){6}) (\d+) (\d+) 0 0 0\n", r"\1 0 0 0 0 0\n"),
+    "square": ("minlp-cubic", "gms", r"\+ 2\*", "+ 2.001*"),
+    "greater": ("miqp-exact", "gms", r"=l=", "=g="),
+}  # fmt: skip
+"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere where it is a name)."""
+
+
+@pytest.fixture(scope="session")
+def spoiled(tmp_path_factory: pytest.TempPathFactory) -> Verification:
+    """The verification of a folder in which every file has one thing wrong, with manifests that match."""
+    folder = tmp_path_factory.mktemp("spoiled")
+    for name, (formulation, kind, pattern, replacement) in WRONG.items():
+        instance = replace(on_grid(2, 3), name=name)
+        (manifest,) = write_all(instance, folder, [formulation], [kind])
+        path = folder / f"{name}.{formulation}.{kind}"
+        text = path.read_text()
+        wrong = re.sub(
+            pattern, replacement, text, count=0 if name in {"name", "whole"} else 1, flags=re.MULTILINE
+        )
+        assert wrong != text, name
+        forge(manifest.path, path, wrong.encode())
+    return verify(folder)
+
+
+def forge(manifest: Path, path: Path, data: bytes) -> None:
+    """Change a file and what its manifest says of it."""
+    import hashlib
+
+    old = hashlib.sha256(path.read_bytes()).hexdigest()
+    path.write_bytes(data)
+    manifest.write_text(manifest.read_text().replace(old, hashlib.sha256(data).hexdigest()))
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_file_is_noticed_by_every_consumer(spoiled: Verification, name: str):
+    formulation, kind, *_ = WRONG[name]
+    found = {f.consumer: f for f in spoiled.findings if f.problem == f"{name} {formulation}"}
+    expected = {entry.name for entry in PROGRAMS.values() if kind in entry.formats and entry.present}
+    assert set(found) == expected
+    blind = blind_to(name)
+    for consumer, finding in found.items():
+        if finding.verdict == Verdict.REFUSED or consumer in blind:
+            continue
+        bad = {Verdict.DIFFERS, Verdict.FAILED} | ({Verdict.NOT_TRIED} if consumer == "cbc" else set())
+        assert finding.verdict in bad, (
+            consumer,
+            finding,
+        )  # CBC's export may leave out what its presolve removes
+        assert finding.reason
+
+
+def blind_to(name: str) -> set[str]:
+    """Consumers that tell too few digits to notice: CBC exports some ten."""
+    return {"cost": {"cbc"}}.get(name, set())
+
+
+def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
+    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp", "mps"])
+    path = tmp_path / "small.qp-fixed.lp"
+    path.write_bytes(path.read_bytes() + b"\n")
+    (tmp_path / "small.qp-fixed.mps").unlink()
+    found = verify(tmp_path)
+    assert [f.file for f in found.bad] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
+    assert all("export again" in f.reason for f in found.findings)
+    assert not found.ok
+
+
+@needing("scip")
+def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
+    """An understated count of nonlinear variables in a header takes SCIP's process down; the next file is read all the same."""
+    for name in ("crash", "well"):
+        write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
+    path = tmp_path / "crash.miqcp-bilinear.nl"
+    lines = path.read_text().splitlines(keepends=True)
+    lines[4] = " 0 0 0\n"
+    forge(tmp_path / "crash.miqcp-bilinear.manifest.json", path, "".join(lines).encode())
+    found = {f.problem.split()[0]: f for f in verify(tmp_path, consumers=["scip"]).findings}
+    assert found["crash"].verdict in {Verdict.FAILED, Verdict.DIFFERS}
+    assert found["well"].verdict == Verdict.AGREES
+
+
+def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A consumer's process that is killed, and one that does not answer: both are answers, and the next task gets a new child."""
+    with Worker("highs", tmp_path / "highs") as worker:
+        assert re.match(r"\d+\.", worker.ask({"step": "version"}, 250)["words"])
+        for dead_before_it_is_asked in (False, True):
+            child = worker._child
+            assert child is not None
+            child.kill()
+            if dead_before_it_is_asked:
+                child.wait()
+            assert "SIGKILL" in worker.ask({"step": "version"}, 250)["words"]
+            assert worker.ask({"step": "version"}, 250)["kind"] == "done"
+        monkeypatch.setattr(consumer_worker, "GRACE", 0.0)
+        late = worker.ask({"step": "version"}, 1e-6)
+        assert late["kind"] == "failed"
+        assert "took longer" in late["words"]
+        monkeypatch.undo()
+        assert worker.ask({"step": "version"}, 250)["kind"] == "done"
+
+
+def test_absent_consumers_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
+    monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
+    found = verify(tmp_path, consumers=["highs", "xpress"])
+    assert found.absent == {"xpress": "pip install xpress"}
+    assert {f.consumer for f in found.findings} == {"highs"}
+    assert found.ok
+
+
+def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
+    assert invoke(["verify", str(tmp_path), "--solve", "-c", "highs", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"] is True
+    assert invoke(["verify", str(tmp_path), "-c", "highs"]) == 0
+    assert "verify.json" in capsys.readouterr().out
+    path = tmp_path / "small.qp-fixed.lp"
+    forge(
+        tmp_path / "small.qp-fixed.manifest.json",
+        path,
+        path.read_bytes().replace(b"<= +1.5", b"<= 1.6").replace(b"<= 1.57", b"<= 1.58"),
+    )
+    assert invoke(["verify", str(tmp_path), "-c", "highs", "-q"]) == 1
+    assert "small.qp-fixed.lp: highs: differs: upper" in capsys.readouterr().err
+    assert invoke(["verify", str(tmp_path), "-c", "nobody"]) == 1
+    assert invoke(["verify", str(tmp_path / "absent")]) == 1
+
+
+def test_a_start_on_export(tmp_path: Path):
+    """`export --start` leaves the files of starting points beside the models."""
+    field = make_field(on_grid(2, 3))
+    write_instance(field.instance, tmp_path / "a.json")
+    write_field(field, tmp_path / "field.npz")
+    given = ["export", str(tmp_path / "a.json"), "-o", str(tmp_path / "out"), "-f", "miqp-exact", "-q"]
+    assert invoke([*given, "--start", str(tmp_path / "field.npz")]) == 0
+    starts = {path.name for path in (tmp_path / "out").iterdir() if path.suffix in {".mst", ".sol", ".slx"}}
+    assert starts == {
+        f"small.miqp-exact.{end}" for end in ("gurobi.mst", "cplex.mst", "scip.sol", "xpress.slx")
+    }
+
+
+def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
+    with pytest.raises(InputError, match="crossfield export"):
+        verify(tmp_path)
+
+
+@each_of(["gurobi", "cplex", "xpress", "gams"])
+def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, consumer: str):
+    """A size that no free edition takes; whoever has a licence sees it solved, or the time limit."""
+    MASKS.setdefault("wide", ["#" * 16] * 16)
+    write_all(make_instance("wide"), tmp_path, ["miqp-mccormick"], ["lp", "gms"])
+    found = verify(tmp_path, seconds=0.1, consumers=[consumer])
+    assert found.ok
+    sized = [f for f in found.findings if "the free edition takes" in f.reason]
+    assert all(
+        f.verdict == Verdict.NOT_TRIED and re.match(r"\d+ columns and \d+ rows", f.reason) for f in sized
+    )
+    assert sized or any(f.step == "solve" for f in found.findings)
+
+
+@needing("xpress")
+def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
+    from crossfield.export.verify.programs import xpress
+
+    write_all(sample("skew", 5), tmp_path, ["minlp-quartic"], ["lp"])
+    (path,) = tmp_path.glob("*.lp")
+    found = xpress.solve(path, 0.02, "xpress")
+    columns = [name.decode() for name in found.names]
+    assert len(found.values) == len(columns)
+    assert columns in ([], xpress.read(path).columns)
+
+
+# the table of capabilities is true
+
+
+@pytest.fixture(scope="session")
+def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Worker]]:
+    """A child process of each consumer."""
+    folder = tmp_path_factory.mktemp("workers")
+    with ExitStack() as stack:
+        yield {name: stack.enter_context(Worker(name, folder / name)) for name in PROGRAMS}
+
+
+CLAIMS = [
+    (kind, name)
+    for kind in ("whole", "relaxed")
+    for name in FORMULATIONS
+    if kind == "whole" or "relax" in FORMULATIONS[name].settable
+]
+
+
+@pytest.mark.slow
+@each_solver
+@for_each("kind, name", CLAIMS)
+def test_claims_are_true(
+    verified: Callable[[str], Verification],
+    workers: dict[str, Worker],
+    tmp_path: Path,
+    solver: str,
+    kind: str,
+    name: str,
+):
+    """Who takes a problem is not contradicted; who does not, refuses the file or gives no proven optimum of it."""
+    verification = verified("1 x 3" if kind == "whole" else RELAXED)
+    problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
+    taking = takes(problem, solver)
+    found = [f for f in verification.findings if f.problem == f"small {name}" and f.step == "solve"]
+    mine = [f for f in found if f.consumer == solver]
+    if taking.answer == "yes":
+        assert {f.verdict for f in mine} & {Verdict.AGREES, Verdict.LIMIT, Verdict.NOT_TRIED}
+    elif taking.answer == "no" and (path := verification.folder / f"small.{name}.{taking.format}").exists():
+        optimum = min(f.objective for f in found if f.objective is not None)
+        assert not proves(workers[SOLVERS[solver].program], path, solver, optimum, tmp_path / "result.npz")
+
+
+def proves(worker: Worker, path: Path, solver: str, optimum: float, result: Path) -> bool:
+    """Whether the solver, asked all the same, gives the optimum and calls it one."""
+    task = {"step": "solve", "path": str(path), "solver": solver, "seconds": 1, "result": str(result)}
+    if worker.ask(task, 1)["kind"] != "done":
+        return False
+    outcome = load(RawSolution, result)
+    if not outcome.status.startswith("optimal") or outcome.objective is None:
+        return False
+    return same(outcome.objective, optimum)
+
+
+def test_reasons_have_a_remedy_or_name_the_limit():
+    for entry in SOLVERS.values():
+        for refusal in entry.refusals.values():
+            assert len(refusal.reason) > 20
+            assert "\n" not in refusal.reason
+
+
+def test_takes_says_which_format():
+    instance = on_grid(2, 3)
+    assert takes(formulate(instance, "milp-mccormick"), "gurobi") == ("yes", "mps", "")
+    assert takes(formulate(instance, "minlp-parity"), "scip")[:2] == ("yes", "nl")
+    assert takes(formulate(instance, "minlp-parity"), "gurobi").answer == "no"
+    assert "minlp-quartic" in takes(formulate(instance, "minlp-parity"), "gurobi").reason
+    assert takes(formulate(instance, "miqcp-bilinear"), "cplex").answer == "no"
+    assert "5002" in takes(formulate(instance, "miqcp-bilinear"), "cplex").reason
+    assert takes(formulate(instance, "minlp-quartic"), "bonmin")[:2] == ("local", "nl")
+    assert takes(formulate(instance, "miqp-exact"), "highs").answer == "no"

@@ -1,0 +1,81 @@
+"""The canonical form says what the files have: its columns, kinds, limits and orders are those that stand in them."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import numpy as np
+import places
+from cases import LOW_DEGREE, make_field, make_instance, make_problem, problem_of
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.writing.canonical import Canonical
+from crossfield.models.formulations.problem import with_rest_fixed
+from loops import for_each
+
+EXPORT = places.ROOT / "export"
+
+
+def lines_of(form: Canonical, name: str) -> list[str]:
+    text = b"".join(FORMATS[name].generate(form, [], None, "")).decode()
+    return text.splitlines()
+
+
+def named(form: Canonical, file: str) -> list[str]:
+    """Names of columns in the order that the form gives a file."""
+    names = [name.decode() for name in form.column_names] + ["ONE"]
+    return [names[column] for column in form.order(file)]
+
+
+@for_each("label", LOW_DEGREE)
+def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
+    form = Canonical(carried(problem_of(label), FORMATS["lp"]))
+    lp, mps = lines_of(form, "lp"), lines_of(form, "mps")
+    limits = lp[lp.index("Bounds") + 1 :]
+    assert [m[1] for line in limits if (m := re.search(r"<= (\w+) <=", line))] == named(form, "lp")
+    assert [m[1] for line in mps if (m := re.fullmatch(r" (\w+) obj \S+", line))] == named(form, "mps")
+    assert form.column_count == len(form.order("lp")) == form.problem.columns + form.has_one
+
+
+def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
+    """All formats go by this rule, but .nl, whose header counts integers within [0, 1]: what is fixed at 0 or 1 too."""
+    problem = make_problem("milp-mccormick", make_instance())
+    field, free = make_field(problem.instance), np.zeros(problem.instance.grid.size, bool)
+    free[:2] = True
+    partly = Canonical(with_rest_fixed(problem, field, free))
+    form = Canonical(problem)
+    p1 = form.problem.blocks["p1"]
+    assert form.kind(p1) == "binary"
+    assert partly.kind(partly.problem.blocks["p1"]) == "integer"
+    assert 0 < partly.binary[p1.columns].sum() < partly.layout.binary[p1.columns].sum() == p1.count
+    keywords = {"lp": "Generals", "bar": "INTEGER_VARIABLES"}
+    for name, keyword in keywords.items():
+        line = lines_of(partly, name)
+        assert any(each.strip().startswith("p1_") for each in line[line.index(keyword) :])
+    assert "Binaries" not in lines_of(partly, "lp")
+    assert "Binaries" in lines_of(form, "lp")
+
+
+def test_no_rule_of_the_form_stands_anywhere_else():
+    """Who is binary, whether there is ONE, and the order of columns are decided in one place."""
+    rules = re.compile(
+        r"(lower >= 0|lower == 0).*(upper <= 1|upper == 1)|merged_objective\(0\)|glpk_order\(|Layout\(self"
+    )
+    found = {
+        path.relative_to(EXPORT).as_posix()
+        for path in EXPORT.rglob("*.py")
+        if rules.search(path.read_text(encoding="utf-8"))
+    }
+    assert found <= {"writing/canonical.py", "writing/nl_layout.py", "writing/glpk_order.py"}
+
+
+def test_a_writer_imports_nothing_of_another_but_its_language():
+    """gams_scalar is the language of scalar GAMS and BARON; everything else that writers share stands in export/writing."""
+    found = {
+        (path.name, node.module)
+        for path in (EXPORT / "formats").glob("*.py")
+        if path.name != "registry.py"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module
+    }
+    assert {module for _, module in found} <= {"gams_scalar", "indexed"}

@@ -1,0 +1,301 @@
+"""Blocks of records: parts by hand, numbers that survive, and no seam between blocks in any format."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from cases import make_field, make_instance, make_problem, points_of
+from crossfield.export.formats import gams_indexed, lp, mps, nl
+from crossfield.export.formats import gams_scalar as gams
+from crossfield.export.formats.registry import write
+from crossfield.export.writing import records
+from crossfield.export.writing.canonical import Canonical
+from crossfield.export.writing.records import (
+    Decimals,
+    OnlyWhere,
+    Raw,
+    Tagged,
+    Words,
+    bounds,
+    check_coefficients,
+    digits,
+    number,
+    numbers,
+    render,
+    signed,
+    table,
+    words,
+)
+from crossfield.models.errors import UnsupportedByFormatError
+from crossfield.models.instance.instance import Instance
+from hypothesis import given
+from hypothesis import strategies as st
+from loops import for_each
+
+NASTY = [
+    0.0, -0.0, 1.0, -1.0, 3.0, 0.1, 0.1 + 0.2, 1 / 3, -2 / 3, math.pi, math.pi / 2, 1e-6, 1e-9, -1e-9, 5e-324, 2.2250738585072014e-308,
+    1.7976931348623157e308, 1e15, 1e15 - 1, 999999999999999.9, 1e16, 1e22, 1e23, -1e22, 2.0**53, 123456789012345680.0, 0.30000000000000004, 1e-5, 0.0001,
+]  # fmt: skip
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def text(parts, count, **options) -> bytes:
+    return b"".join(render(parts, count, **options))
+
+
+# numbers
+
+
+@for_each("value", NASTY)
+def test_numbers_survive(value):
+    assert float(number(value)) == value
+    assert not number(value).startswith("-0") or value != 0
+    sign, rest = words(value, signed).decode().split(" ")
+    assert sign in "+-"
+    assert not rest.startswith(("+", "-"))
+    assert float(sign + rest) == value
+
+
+@given(FINITE)
+def test_any_number_survives_and_none_is_longer_than_needed(value):
+    assert float(number(value)) == value
+    assert len(number(value)) <= len(repr(value))
+    assert float(words(value, signed).replace(b" ", b"")) == value
+
+
+def test_numbers_look_as_people_write_them():
+    given = [0.0, -0.0, 3.0, -2.0, 0.5, 1e-6, 1e22, 1e14]
+    assert [number(value) for value in given] == [
+        "0",
+        "0",
+        "3",
+        "-2",
+        "0.5",
+        "1e-06",
+        "1e+22",
+        "100000000000000",
+    ]
+    assert signed(np.array(given[:4])).tolist() == [b"+ 0", b"+ 0", b"+ 3", b"- 2"]
+    assert number(np.float64(0.1)) == "0.1"
+    assert number(np.int32(7)) == "7"
+
+
+@given(st.lists(FINITE, min_size=1, max_size=30))
+def test_words_are_the_numbers_of_an_array(values):
+    found = words(np.array(values))
+    lines = text([found, b"\n"], len(values)).decode().splitlines()
+    assert [float(line) for line in lines] == values
+    assert lines == [number(value + 0.0) for value in values]
+    assert words(values[0]) == number(values[0]).encode()
+
+
+def test_words_of_nothing():
+    assert text([words(np.zeros(0)), b"\n"], 0) == b""
+    assert words(-0.0, signed) == b"+ 0"
+
+
+# parts by hand
+
+
+def test_words_are_taken_by_code():
+    names = Words(table([b"a", b"long", b"mid"]), None)
+    assert names.width == 4
+    assert text([names, b";"], 3) == b"a;long;mid;"
+    picked = names.at(np.array([2, 0, 2, 1]))
+    assert text([b"<", picked, b">"], 4) == b"<mid><a><mid><long>"
+    assert text([picked.at(np.array([3, 1])), b" "], 2) == b"long a "
+
+
+def test_decimals_have_no_leading_zeros():
+    values = np.array([0, 7, 10, 99, 100, 2147483647])
+    assert text([Decimals(values), b"\n"], 6) == b"0\n7\n10\n99\n100\n2147483647\n"
+    assert Decimals(values).width == 10
+    assert Decimals(np.zeros(0, int)).width == 1
+    assert bytes(digits(np.array([7, 123]), 4)) == b"00070123"
+
+
+@given(st.lists(st.integers(0, 2**31 - 1), min_size=1, max_size=30))
+def test_any_decimals(values):
+    assert text([Decimals(np.array(values, dtype=np.int32)), b" "], len(values)).split() == [
+        str(value).encode() for value in values
+    ]
+
+
+def test_raw_values_keep_their_zero_bytes():
+    parts = [b"x", Raw(np.array([1, 0, 256], dtype="<i4")), Raw(np.array([0.5, -0.0, 1e300], dtype="<f8"))]
+    expected = b"".join(b"x" + struct.pack("<id", i, d) for i, d in [(1, 0.5), (0, -0.0), (256, 1e300)])
+    assert text(parts, 3, padded=False) == expected
+
+
+def test_no_records_and_no_parts():
+    assert text([b"x"], 0) == b""
+    assert text([], 3) == b""
+
+
+def test_any_numbers_at_once_are_the_numbers_one_by_one():
+    values = np.array([*NASTY, math.inf])
+    assert [found.decode() for found in numbers(values)] == [number(value) for value in values]
+    assert [found.decode() for found in bounds(np.array([-math.inf, -1.5, math.inf]))] == [
+        "-inf",
+        "-1.5",
+        "+inf",
+    ]
+
+
+@given(
+    st.lists(st.integers(-60, 60), min_size=1, max_size=20), st.sampled_from([0.0, 1e14, 1e16, 2.0**60, 0.25])
+)
+def test_whole_numbers_close_together_are_words_too(steps, first):
+    """They are numbered without sorting, where that is exact."""
+    values = first + np.array(steps, dtype=float)
+    assert text([words(values), b" "], len(values)).decode().split() == [number(value) for value in values]
+
+
+def test_a_tag_stands_before_every_word():
+    key = Words(table([b"_1", b"_2", b"_3"]), None)
+    name = Tagged(b"alpha", key)
+    assert name.width == 7
+    assert (
+        text([name, b"=", Tagged(b"p", key.at(np.array([2, 0, 1]))), b";"], 3)
+        == b"alpha_1=p_3;alpha_2=p_1;alpha_3=p_2;"
+    )
+    assert text([name.at(np.array([2])), b"!"], 1) == b"alpha_3!"
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 7, 100])
+def test_pieces_that_some_records_have(block, monkeypatch):
+    """Also in the block after one that lacked them: what was blanked comes back."""
+    monkeypatch.setattr(records, "BLOCK", block)
+    present = np.array([True, False, False, True, True, False, True])
+    key = Words(table([b"%d" % value for value in range(7)]), None)
+    parts = [b"<", key, OnlyWhere(present, [b" and ", key, b"!"]), b">", OnlyWhere(~present, [b"?"])]
+    expected = [f"<{at} and {at}!>" if there else f"<{at}>?" for at, there in enumerate(present)]
+    assert text(parts, 7).decode() == "".join(expected)
+
+
+@given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=40), st.booleans())
+def test_any_records_lack_any_pieces(present, whole):
+    """Neighbours, the first and the last piece, all of them; with words of several lengths between. whole: nothing is always there."""
+    count = len(present)
+    key = Words(table([b"%d" % 7**at for at in range(count)]), None)
+    first, second, third, last = np.array(present).T
+    middle = [] if whole else [b"-", key]
+    parts = [
+        OnlyWhere(first, [b"(", key]),
+        OnlyWhere(second, [Tagged(b"t", key), b","]),
+        *middle,
+        OnlyWhere(third, [b"!"]),
+        OnlyWhere(last, [key.at(np.arange(count)[::-1]), b";"]),
+    ]
+    expected = b"".join(
+        b"(%d" % 7**at * a
+        + b"t%d," % 7**at * b
+        + b"-%d" % 7**at * (not whole)
+        + b"!" * c
+        + b"%d;" % 7 ** (count - 1 - at) * d
+        for at, (a, b, c, d) in enumerate(present)
+    )
+    assert text(parts, count) == expected
+
+
+@pytest.mark.parametrize("first", [0, 7, 95, 9_990, 99_999_990])
+def test_numbers_grow_a_digit_within_a_block_and_between_blocks(first, monkeypatch):
+    values = np.arange(first, first + 20, dtype=np.int32)
+    for block in (1, 3, 10, 100):
+        monkeypatch.setattr(records, "BLOCK", block)
+        chunks = list(render([b"v", Decimals(values), b" ", Decimals(values[::-1]), b"\n"], 20))
+        assert b"".join(chunks) == b"".join(
+            b"v%d %d\n" % pair for pair in zip(values, values[::-1], strict=True)
+        )
+
+
+# blocks
+
+
+@for_each("count", [0, 1, 3, 4, 5, 7, 8, 9])
+def test_a_block_leaves_no_seam(count, monkeypatch):
+    monkeypatch.setattr(records, "BLOCK", 4)
+    values = np.arange(count) ** 5
+    chunks = list(render([b"n", Decimals(values), b"\n"], count))
+    assert len(chunks) == -(-count // 4)
+    assert b"".join(chunks) == b"".join(b"n%d\n" % value for value in values)
+    raw = list(render([Raw(values.astype("<i8"))], count, padded=False))
+    assert b"".join(raw) == values.astype("<i8").tobytes()
+
+
+WRITERS = {
+    "lp": lambda problem, _: lp.generate(Canonical(problem), ["head"]),
+    "mps": lambda problem, _: mps.generate(Canonical(problem), ["head"]),
+    "nl text": lambda problem, start: nl.generate(Canonical(problem), start=start),
+    "nl binary": lambda problem, start: nl.generate(Canonical(problem), binary=True, start=start),
+    "gms scalar": lambda problem, start: gams.generate(Canonical(problem), ["head"], start=start),
+    "gms indexed": lambda problem, start: gams_indexed.generate(Canonical(problem), ["head"], start=start),
+}
+
+
+@for_each("writer", WRITERS)
+@for_each("name", ["miqcp-bilinear", "milp-mccormick", "qp-fixed"])
+def test_blocks_leave_no_seam_in_any_format(name, writer, monkeypatch):
+    """Lines of 3, 4, 5, 7, 8 and 9 pixels: families of k * 4 - 1, k * 4 and k * 4 + 1 records, and one pixel with no pairs."""
+    for count in (1, 3, 4, 5, 7, 8, 9):
+        instance = Instance(
+            "line", np.ones((1, count), bool), np.array([[0, 0]]), np.array([2.5]), np.array([0.5])
+        )
+        problem = make_problem(name, instance)
+        start = problem.point(make_field(instance))
+        expected = b"".join(WRITERS[writer](problem, start))
+        for block in (1, 4):
+            with monkeypatch.context() as patch:
+                patch.setattr(records, "BLOCK", block)
+                assert b"".join(WRITERS[writer](problem, start)) == expected
+
+
+# coefficients that readers drop
+
+
+@pytest.mark.parametrize("value", [9.9e-10, -1e-12, 5e-324, 1e15, -1e20, math.inf, math.nan])
+def test_extreme_coefficients_are_refused(value):
+    with pytest.raises(
+        UnsupportedByFormatError, match=r"row family c14 has the coefficient .*: make .*w_strokes or w_beta"
+    ):
+        check_coefficients(np.array([1.0, value]), "row family c14")
+    with pytest.raises(UnsupportedByFormatError):
+        check_coefficients(value, "the objective")
+
+
+def test_ordinary_coefficients_pass():
+    check_coefficients(np.array([0.0, -0.0, 1e-9, -1e-9, 9.99e14, math.pi]), "the objective")
+    check_coefficients(np.zeros(0), "the objective")
+
+
+@for_each("suffix", ["lp", "mps"])
+@for_each(
+    "name, weights",
+    [
+        ("milp-mccormick", {"w_beta": 5e-10}),
+        ("milp-mccormick", {"w_strokes": 1e-11}),
+        ("qp-fixed", {"w_strokes": 1e-11}),
+    ],
+)
+def test_extreme_weights_are_refused(name, weights, suffix, tmp_path):
+    with pytest.raises(UnsupportedByFormatError, match="the objective has the coefficient"):
+        write(make_problem(name, make_instance(**weights)), tmp_path / f"x.{suffix}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_small_weight_that_is_added_to_others_is_no_coefficient(tmp_path):
+    write(make_problem("qp-fixed", make_instance(w_beta=5e-10)), tmp_path / "x.lp")
+    assert " + 8.000000001 beta_00_01 ^2\n" in (tmp_path / "x.lp").read_text()
+
+
+def test_points_of_any_size_are_starting_points():
+    """Starting values are no coefficients: none is refused, each survives."""
+    problem = make_problem("qp-fixed", make_instance("row"))
+    point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
+    lines = b"".join(nl.generate(Canonical(problem), start=point)).decode().splitlines()
+    at = lines.index(f"x{problem.columns}")
+    found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.columns]]
+    np.testing.assert_array_equal(found, point[nl.Layout(problem).order])

@@ -1,0 +1,346 @@
+"""Field files: there and back, byte for byte, and one named line for every kind of damage."""
+
+import json
+import zipfile
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossfield.models.array_archive import pack_arrays
+from crossfield.models.errors import CrossfieldError, InputError, InstanceError, OutputError
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.file import read_field, write_field
+from crossfield.models.field.jumps import best_jumps
+from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+# The file is written anew in every example, so sharing the folder is harmless.
+settings.register_profile("files", suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+files = settings.get_profile("files")
+MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
+
+
+@pytest.fixture
+def instance():
+    return Instance(
+        name="sample",
+        mask=MASK,
+        stroke_pixels=[[0, 0], [1, 1], [2, 2]],
+        theta=[0.1, 1 / 3, 2.9],
+        w=[1.0, 0.1, 2 / 3],
+        w_strokes=0.5,
+        w_beta=1e-7,
+        gauge="box",
+        source='a "quoted" sketch.svg, Größe',
+        pixel_size=2.5,
+        origin=(-1.25, 1e-3),
+    )
+
+
+@pytest.fixture
+def field(instance):
+    return random_field(instance, 1)
+
+
+def random_field(instance, seed):
+    rng = np.random.default_rng(seed)
+    alpha = rng.uniform(-7, 7, instance.grid.size)
+    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
+    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
+
+
+def same_instance(one, other):
+    return one.sha256 == other.sha256 and (one.mask == other.mask).all() and (one.theta == other.theta).all()
+
+
+def same_field(one, other):
+    angles = (one.alpha == other.alpha).all() and (one.beta == other.beta).all()
+    return angles and (one.p == other.p).all() and same_instance(one.instance, other.instance)
+
+
+def refused(read, path, message, error=InstanceError):
+    with pytest.raises(error) as caught:
+        read(path)
+    text = str(caught.value)
+    assert text.startswith(str(path))
+    assert message in text
+    assert "\n" not in text
+
+
+def change(key, value):
+    return lambda document: document | {key: value}
+
+
+def without(key):
+    return lambda document: {k: v for k, v in document.items() if k != key}
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_field_comes_back_and_gives_the_same_bytes(field, tmp_path, suffix):
+    first = write_field(field, tmp_path / f"one.{suffix}")
+    back = read_field(first)
+    assert same_field(field, back)
+    second = write_field(back, tmp_path / f"two.{suffix}")
+    assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_field_of_one_pixel_comes_back(tmp_path, suffix):
+    field = CrossField(Instance("one", [[True]], [[0, 0]], [1.0], [1.0]), [0.9], [-0.0], [])
+    assert same_field(field, read_field(write_field(field, tmp_path / f"one.{suffix}")))
+
+
+def test_json_states_each_jump_beside_its_pixel(tmp_path):
+    instance = Instance("small", [[1, 1], [1, 0]], [[0, 0]], [1.0], [1.0])
+    field = CrossField(instance, [0.1, 0.2, 0.3], [0, 0.5, 0], [-1, 2])
+    document = json.loads(write_field(field, tmp_path / "small.json").read_text())
+    assert document["pixels"] == [
+        [0, 0, 0.1, 0.0, None, -1],
+        [0, 1, 0.2, 0.5, None, None],
+        [1, 0, 0.3, 0.0, 2, None],
+    ]
+
+
+def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
+    for name in ("field.txt", "field", "field.obj"):
+        with pytest.raises(
+            InputError, match=r"cannot be written as .*; choose one of \.npz, \.json, \.rawfield"
+        ):
+            write_field(field, tmp_path / name)
+    refused(
+        read_field,
+        tmp_path / "a.rawfield",
+        "cannot be read as '.rawfield'; choose one of .npz, .json",
+        InputError,
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_file_is_named(tmp_path):
+    refused(read_field, tmp_path / "none.npz", "cannot be read: no such file", InputError)
+
+
+def test_folder_that_is_not_there_is_named(field, tmp_path):
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_field(field, tmp_path / "none" / "field.npz")
+
+
+def pixel(number, column, value):
+    def edit(document):
+        document["pixels"][number][column] = value
+        return document
+
+    return edit
+
+
+@for_each(
+    "edit,message",
+    [
+        (change("format", "crossfield-instance"), '"format" must be "crossfield-field"'),
+        (change("version", 2), "has version 2"),
+        (change("extra", 1), "$: Additional properties"),
+        (without("instance"), "'instance' is a required property"),
+        (without("pixels"), "'pixels' is a required property"),
+        (change("pixels", []), "$.pixels"),
+        (change("pixels", [[0, 0, 0, 0, None, None]]), "has 1 pixels, but its mask has 7"),
+        (
+            lambda d: d | {"instance": d["instance"] | {"gauge": "x"}},
+            "its instance: $.gauge: 'x' is not one of",
+        ),
+        (lambda d: d | {"instance": d["instance"] | {"version": 0}}, "its instance: has version 0"),
+        (change("instance", 3), "$.instance: 3 is not of type 'object'"),
+        (pixel(3, 1, 2), "$.pixels[3]: is [1, 2], but the mask has [1, 0] there"),
+        (pixel(0, 2, None), "$.pixels[0][2]"),
+        (pixel(0, 2, float("nan")), "alpha holds a value that is not finite"),
+        (pixel(0, 3, float("-inf")), "beta holds a value that is not finite"),
+        (pixel(0, 3, 10**400), "beyond the range of doubles"),
+        (
+            pixel(0, 4, 1),
+            "$.pixels[0]: a jump belongs where the mask has the upper neighbour, null elsewhere",
+        ),
+        (pixel(0, 5, None), "$.pixels[0]: a jump belongs where the mask has the right neighbour"),
+        (pixel(0, 5, 0.5), "$.pixels[0][5]"),
+        (pixel(0, 5, 10**400), "$.pixels[0][5]"),
+        (lambda _: 1, '"format" must be'),
+    ],
+)
+def test_field_json_that_breaks_the_rules_is_named_with_its_place(field, tmp_path, edit, message):
+    path = write_field(field, tmp_path / "broken.json")
+    path.write_text(json.dumps(edit(json.loads(path.read_text()))))
+    refused(read_field, path, message)
+
+
+@for_each(
+    "name,array,message",
+    [
+        ("alpha", np.zeros(3), "alpha has shape (3,), but the grid of sample needs (7,)"),
+        ("beta", np.full(7, np.nan), "beta holds a value that is not finite"),
+        ("p", np.full(7, 0.5), "p holds something other than whole numbers"),
+        ("p", None, "holds no array 'p'"),
+        ("instance_w", None, "its instance: holds no array 'w'"),
+        ("instance_theta", np.full(3, np.inf), "its instance: stroke pixel [0, 0]: theta"),
+        ("head", np.frombuffer(b'{"format": "crossfield-field", "version": 2}', np.uint8), "has version 2"),
+        (
+            "head",
+            np.frombuffer(b'{"format": "other", "version": 1}', np.uint8),
+            '"format" must be "crossfield-field"',
+        ),
+    ],
+)
+def test_field_npz_that_breaks_the_rules_is_named(field, tmp_path, name, array, message):
+    path = write_field(field, tmp_path / "broken.npz")
+    entries = dict(np.load(path)) | {name: array}
+    path.write_bytes(pack_arrays({key: value for key, value in entries.items() if value is not None}))
+    refused(read_field, path, message)
+
+
+def test_instance_is_no_field_and_field_no_instance(instance, field, tmp_path):
+    for suffix in ("json", "npz"):
+        refused(read_field, write_instance(instance, tmp_path / f"i.{suffix}"), "")
+        refused(read_instance, write_field(field, tmp_path / f"f.{suffix}"), "")
+
+
+# The mesh field, read back by a little parser of its own
+
+
+def numbers(lines, lead=""):
+    return np.array([line.removeprefix(lead).split() for line in lines if line.startswith(lead)], dtype=float)
+
+
+def read_rawfield(path):
+    head, *rows = path.read_text().splitlines()
+    degree, faces = map(int, head.split())
+    vectors = numbers(rows).reshape(faces, degree, 3)
+    lines = path.with_suffix(".obj").read_text().splitlines()
+    return vectors, numbers(lines, "v "), numbers(lines, "f ").astype(int) - 1
+
+
+def test_rawfield_lists_u_v_and_their_opposites_counter_clockwise(field, tmp_path):
+    vectors, _, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
+    assert vectors.shape == (2 * 7, 4, 3)
+    assert len(triangles) == 2 * 7
+    assert (vectors[..., 2] == 0).all()
+    assert (vectors[::2] == vectors[1::2]).all()
+    assert (vectors[::2, 0, :2] == field.u).all()
+    assert (vectors[::2, 1, :2] == field.v).all()
+    assert (vectors[:, 2:] == -vectors[:, :2]).all()
+    following = np.roll(vectors, -1, axis=1)
+    turn = vectors[..., 0] * following[..., 1] - vectors[..., 1] * following[..., 0]
+    assert (turn > 0).all()
+
+
+def test_mesh_covers_the_mask_in_sketch_coordinates_with_y_up(field, tmp_path):
+    _, vertices, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
+    corner = vertices[triangles]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+    assert area == pytest.approx(np.full(14, 2.5**2 / 2))
+    grid, centre = field.instance.grid, corner.reshape(7, 6, 3)
+    middle = (centre.min(axis=1) + centre.max(axis=1)) / 2
+    assert middle[:, 0] == pytest.approx(-1.25 + 2.5 * (grid.columns + 0.5))
+    assert middle[:, 1] == pytest.approx(-(1e-3 + 2.5 * (grid.rows + 0.5)))
+    assert set(triangles.ravel()) == set(range(len(vertices)))
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(files)
+def test_mesh_is_a_manifold_on_any_mask(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(1, 6, 2)) < 0.6
+    mask[0, 0] = True
+    field = random_field(Instance("random", mask, [[0, 0]], [0.0], [1.0]), seed)
+    _, vertices, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
+    edges = [(t[k], t[(k + 1) % 3]) for t in triangles.tolist() for k in range(3)]
+    assert len(set(edges)) == len(edges)
+    # Round every vertex the triangles form one fan: as many triangles, linked by shared edges, as there are.
+    for vertex in range(len(vertices)):
+        fan = [set(t) - {vertex} for t in triangles.tolist() if vertex in t]
+        reached = fan.pop()
+        while linked := [rim for rim in fan if rim & reached]:
+            reached |= linked[0]
+            fan.remove(linked[0])
+        assert not fan
+    # Neighbours share an edge: inner edges are the diagonals and one for every pair.
+    inner = sum((b, a) in set(edges) for a, b in edges) // 2
+    assert inner == field.instance.grid.size + len(field.instance.grid.first)
+
+
+def test_rawfield_is_the_same_twice(field, tmp_path):
+    for name in ("one", "two"):
+        write_field(field, tmp_path / f"{name}.rawfield")
+    for suffix in (".rawfield", ".obj"):
+        assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
+
+
+# Whatever the bytes
+
+
+def only_named_errors(read, path):
+    with suppress(CrossfieldError):
+        read(path)
+
+
+@given(data=st.binary(max_size=300) | st.binary(max_size=300).map(lambda tail: b"PK\x03\x04" + tail))
+@settings(files)
+def test_random_bytes_give_named_errors(tmp_path, data):
+    for read, name in ((read_instance, "x.json"), (read_field, "x.json"), (read_field, "x.npz")):
+        (tmp_path / name).write_bytes(data)
+        only_named_errors(read, tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+@given(data=st.data())
+@settings(files, max_examples=120)
+def test_mutated_files_give_named_errors(instance, field, tmp_path, suffix, data):
+    for write, read, thing in ((write_instance, read_instance, instance), (write_field, read_field, field)):
+        path = write(thing, tmp_path / f"mutated.{suffix}")
+        content = bytearray(path.read_bytes())
+        for _ in range(data.draw(st.integers(1, 4))):
+            at = data.draw(st.integers(0, len(content) - 1))
+            content[at : at + data.draw(st.integers(0, 8))] = data.draw(st.binary(max_size=8))
+        path.write_bytes(
+            content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content
+        )
+        only_named_errors(read, path)
+
+
+@given(
+    name=st.sampled_from(["head", "theta", "mask", "stroke_pixels", "w", "origin"]),
+    junk=st.binary(max_size=200),
+    whole=st.booleans(),
+)
+@settings(files, max_examples=100)
+def test_junk_in_one_array_gives_named_errors(instance, tmp_path, name, junk, whole):
+    path = write_instance(instance, tmp_path / "junk.npz")
+    with zipfile.ZipFile(path) as archive:
+        entries = {member: archive.read(member) for member in archive.namelist()}
+    entries[f"{name}.npy"] = junk if whole else entries[f"{name}.npy"][:10] + junk
+    with zipfile.ZipFile(path, "w") as archive:
+        for member, content in entries.items():
+            archive.writestr(member, content)
+    only_named_errors(read_instance, path)
+
+
+def test_every_truncation_of_an_npz_is_refused(field, tmp_path):
+    path = write_field(field, tmp_path / "cut.npz")
+    content = path.read_bytes()
+    for length in range(0, len(content), 7):
+        path.write_bytes(content[:length])
+        with pytest.raises(InstanceError):
+            read_field(path)
+
+
+@given(seed=st.integers(0, 2**32 - 1), suffix=st.sampled_from(["json", "npz"]))
+@settings(files)
+def test_any_field_comes_back(tmp_path, seed, suffix):
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(1, 8, 2)) < 0.7
+    mask[0, 0] = True
+    at = np.argwhere(mask)
+    instance = Instance("random", mask, at, rng.uniform(-HALF, HALF, len(at)), 1 - rng.random(len(at)))
+    field = random_field(replace(instance, origin=tuple(rng.normal(size=2))), seed)
+    assert same_field(field, read_field(write_field(field, tmp_path / f"f.{suffix}")))

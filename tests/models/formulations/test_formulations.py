@@ -1,0 +1,395 @@
+"""The mathematics of the formulations: the paper's formulas, their equivalence,
+and optima that are known by hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+import sympy as sp
+from cases import MASKS, make_field, make_instance
+from crossfield.export.solving.job import Limits
+from crossfield.export.solving.local import solve
+from crossfield.models.errors import FormulationError
+from crossfield.models.field.field import CrossField
+from crossfield.models.formulations import symbols as n
+from crossfield.models.formulations.catalogue import CUBIC, FORMULATIONS, PARITY, QUARTIC, declare
+from crossfield.models.formulations.problem import formulate, with_integers_fixed
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from loops import for_each
+from scipy.optimize import linprog, lsq_linear
+
+pytestmark = pytest.mark.numeric
+
+SQUARES = ["minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed"]
+MIXED = ["miqcp-bilinear", "miqp-mccormick"]
+ABSOLUTE = ["miqcp-bilinear-l1", "milp-mccormick"]
+GAUGES = ["strokes", "box"]
+
+
+def objective_at(name, field, **options):
+    problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None, **options)
+    point = problem.point(field)
+    assert problem.violation(point).worst < 1e-12
+    return problem.objective_value(point)
+
+
+# formulas
+
+
+def test_9_is_8_expanded_for_a_binary_p1():
+    a, b, x, y, p1, p2 = n.alpha_i, n.alpha_j, n.beta_i, n.beta_j, n.p1, n.p2
+    pi = sp.pi
+    printed = 2 * (
+        a**2 + b**2 - 2 * a * b + pi * a * p1 - pi * b * p1 + 2 * pi * a * p2 - 2 * pi * b * p2
+        + (pi / 2) ** 2 * p1 + pi**2 * p1 * p2 + pi**2 * p2**2 + x**2 + y**2 - 2 * x * y + 4 * x * y * p1
+    )  # fmt: skip
+    assert sp.expand(CUBIC - printed) == 0
+    for parity in (0, 1):
+        assert sp.expand((QUARTIC - printed).subs(p1, parity)) == 0
+    assert sp.expand(QUARTIC - printed) != 0  # it takes the binary
+    assert sp.Poly(QUARTIC, x, p1).total_degree() == 4
+    assert sp.Poly(CUBIC, a, b, x, y, p1, p2).total_degree() == 3
+
+
+def test_parity_is_8_for_whole_jumps():
+    half = sp.Symbol("half", integer=True)
+    for parity in (0, 1):
+        jump = {n.p: 2 * half + parity}
+        split = {n.p1: parity, n.p2: half}
+        assert sp.expand(sp.simplify(PARITY.subs(jump)) - QUARTIC.subs(split)) == 0
+
+
+def test_hull_facets_force_the_product_and_the_printed_one_does_not():
+    """By (26)-(29) at a binary p1 the interval left to z is the product; as printed,
+    p1 = 0 leaves one open.
+    """
+    for facet in ("hull", "printed"):
+        rows = [
+            f
+            for f in declare("milp-mccormick", facet=facet).rows
+            if n.z in f.expression.free_symbols and n.t not in f.expression.free_symbols
+        ]
+        for p1, beta in product((0, 1), np.linspace(-QUARTER, QUARTER, 7)):
+            low, high = -QUARTER, QUARTER  # the bounds of z
+            for family in rows:
+                end = float(sp.solve(family.body.subs({n.p1: p1, n.beta_i: beta}), n.z)[0])
+                low, high = (max(low, end), high) if family.sense == ">=" else (low, min(high, end))
+            if facet == "hull" or p1 == 1:
+                assert (low, high) == pytest.approx((p1 * beta, p1 * beta), abs=1e-15)
+            else:
+                assert low == pytest.approx(max(beta, 0) - QUARTER, abs=1e-15)
+                assert high == pytest.approx(0, abs=1e-15)
+
+
+@for_each("name", FORMULATIONS)
+def test_every_formulation_has_its_class(name):
+    field = make_field(make_instance())
+    problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
+    expected = {
+        "minlp-parity": ("MINLP", False, 99, 0),
+        "minlp-quartic": ("MINLP", False, 4, 1),
+        "minlp-cubic": ("MINLP", False, 3, 1),
+        "miqcp-bilinear": ("MIQCP", False, 2, 2),
+        "miqcp-bilinear-l1": ("MIQCP", False, 1, 2),
+        "miqp-mccormick": ("MIQP", True, 2, 1),
+        "milp-mccormick": ("MILP", True, 1, 1),
+        "qp-fixed": ("QP", True, 2, 0),
+        "miqp-exact": ("MIQP", True, 2, 1),
+    }[name]
+    assert (problem.problem_class, problem.convex, problem.objective_degree, problem.row_degree) == expected
+    if name != "qp-fixed":
+        relaxed = formulate(field.instance, name, relax=True)
+        assert relaxed.problem_class == expected[0].removeprefix("MI").replace("NLP", "NLP")
+        assert not relaxed.integer.any()
+        pinned = with_integers_fixed(problem, field)
+        assert not pinned.integer.any()
+        assert pinned.problem_class == relaxed.problem_class
+
+
+# values
+
+
+@for_each("gauge", GAUGES)
+@for_each("shape", MASKS)
+def test_objectives_are_the_energies_of_the_field(shape, gauge):
+    for seed in range(4):
+        field = make_field(make_instance(shape, gauge, seed), seed)
+        squares, absolute = field.energy(2), field.energy(1)
+        for name in SQUARES:
+            assert objective_at(name, field) == pytest.approx(squares.total, rel=1e-9)
+        for name in MIXED:
+            mixed = absolute.smooth + squares.strokes + squares.beta
+            assert objective_at(name, field) == pytest.approx(mixed, rel=1e-9)
+            assert objective_at(name, field, stroke_norm=1) == pytest.approx(
+                mixed - squares.strokes + absolute.strokes, rel=1e-9
+            )
+            assert objective_at(name, field, beta_norm=1) == pytest.approx(
+                mixed - squares.beta + absolute.beta, rel=1e-9
+            )
+        for name in ABSOLUTE:
+            assert objective_at(name, field) == pytest.approx(absolute.total, rel=1e-9)
+            assert objective_at(name, field, relax=True) == pytest.approx(absolute.total, rel=1e-9)
+        assert objective_at("milp-mccormick", field, facet="printed") == pytest.approx(
+            absolute.total, rel=1e-9
+        )
+
+
+def test_two_pixels_by_hand():
+    """(0, b) and (pi/2, -b) are two labels of one cross: p = +1 takes the first to the second."""
+    instance = Instance("two", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1))
+    assert (instance.grid.first.tolist(), instance.grid.second.tolist()) == ([0], [1])
+    field = CrossField(instance, np.array([0, HALF]), np.array([0.3, -0.3]), np.array([1]))
+    other = replace(field, p=np.array([0]))
+    for name in (*SQUARES, *MIXED, *ABSOLUTE):
+        norm = 1 if name in ABSOLUTE else 2
+        assert objective_at(name, field) == pytest.approx(field.energy(norm).beta, rel=1e-12)
+        smooth = 2 * (HALF**2 + 0.6**2) if name in SQUARES else 2 * (HALF + 0.6)
+        assert objective_at(name, other) == pytest.approx(smooth + field.energy(norm).beta, rel=1e-12)
+
+
+# optima
+
+
+def one_pixel(gauge, w_beta):
+    theta = np.array([2 * np.pi / 3])
+    return Instance(
+        "one", np.ones((1, 1), bool), np.array([[0, 0]]), theta, np.ones(1), w_beta=w_beta, gauge=gauge
+    )
+
+
+@pytest.mark.parametrize("solver", ["highs", "ipopt"])
+@pytest.mark.parametrize("gauge, alpha, beta", [("box", HALF, np.pi / 6), ("strokes", 2 * np.pi / 3, 0.0)])
+def test_one_pixel_solved(gauge, alpha, beta, solver):
+    """A stroke at 120 degrees: the box ends at 90, so that the skew makes up for the rest,
+    less what its weight takes.
+    """
+    weight = 1e-2
+    found = solve(formulate(one_pixel(gauge, weight), "qp-fixed", p=[]), solver)
+    assert found.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
+    assert found.field.beta[0] == pytest.approx(beta / (1 + weight), abs=1e-4)
+    assert found.objective == pytest.approx(weight / (1 + weight) * beta**2, abs=1e-7)
+    assert solve(formulate(one_pixel(gauge, 1e-6), "qp-fixed", p=[]), solver).objective == pytest.approx(
+        1e-6 * beta**2, abs=1e-7
+    )
+
+
+def test_two_pixels_solved():
+    """With the jump +1 as data the two labels of one cross are found; the first one is held by its stroke."""
+    instance = Instance(
+        "two", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.3, HALF + 0.3]), np.ones(2)
+    )
+    found = solve(formulate(instance, "qp-fixed", p=[1]), "ipopt")
+    assert found.field.energy().total < 1e-6
+    assert found.field.alpha[1] - found.field.alpha[0] == pytest.approx(HALF, abs=1e-4)
+    assert solve(formulate(instance, "qp-fixed", p=[0]), "ipopt").field.energy().total > 0.1
+
+
+@pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
+def test_parallel_strokes_and_two_families_cost_nothing(degrees):
+    """Strokes of one direction, or of two at any angle, are met by one constant cross;
+    the hint of skew costs w_beta.
+    """
+    pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
+    theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
+    instance = Instance("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))
+    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(seconds=250))
+    assert found.status == "optimal-global"
+    assert found.objective < 9 * 1e-6 * QUARTER + 1e-9
+    assert found.field.energy(1).total == pytest.approx(found.objective, abs=1e-7)
+
+
+def sketch(gauge="strokes", seed=4):
+    """A random instance of 3 x 3 pixels whose optimum is found in a second."""
+    rng = np.random.default_rng(seed)
+    pixels = np.array([[0, 0], [1, 2], [2, 1]])
+    theta = rng.uniform(0, np.pi, 3)
+    return Instance(
+        "sketch", np.ones((3, 3), bool), pixels, theta, rng.uniform(0.3, 1, 3), w_beta=1e-3, gauge=gauge
+    )
+
+
+def optimum(instance, name="milp-mccormick", **options):
+    found = solve(formulate(instance, name, **options), "highs", limits=Limits(seconds=250, gap=0))
+    assert found.status == "optimal-global"
+    return found.objective
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_optimum_does_not_depend_on_the_axes(seed):
+    instance = sketch(seed=seed)
+    best = optimum(instance)
+    assert best > 1e-3
+    for moved in (instance.turned(), instance.mirrored(), instance.transposed()):
+        assert optimum(moved) == pytest.approx(best, rel=1e-6, abs=1e-7)
+    assert optimum(instance.with_gauge("box")) >= best - 1e-7
+
+
+def test_the_box_forces_skew_and_depends_on_the_axes():
+    """Strokes at 120 degrees everywhere: free of cost, unless the box holds alpha below 90 degrees."""
+    pixels = np.argwhere(np.ones((2, 2)))
+    instance = Instance(
+        "steep", np.ones((2, 2), bool), pixels, np.full(4, np.radians(120)), np.ones(4), w_beta=1e-2
+    )
+    assert optimum(instance) == pytest.approx(0, abs=1e-9)
+    boxed = instance.with_gauge("box")
+    assert optimum(boxed) == pytest.approx(4 * 1e-2 * np.radians(30), rel=1e-6)
+    assert optimum(boxed.turned()) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("gauge", GAUGES)
+def test_printed_facet_is_a_relaxation(gauge, seed):
+    instance = sketch(gauge, seed)
+    assert optimum(instance, facet="printed") <= optimum(instance) + 1e-7
+
+
+def test_printed_facet_loses_something():
+    gaps = [optimum(sketch(seed=seed)) - optimum(sketch(seed=seed), facet="printed") for seed in range(4, 8)]
+    assert max(gaps) > 1e-3
+
+
+# a second implementation: all jumps one after the other, by SciPy
+
+
+def corner(gauge):
+    """Three pixels with three strokes that no constant cross meets."""
+    pixels, theta = np.array([[0, 0], [1, 0], [1, 1]]), np.array([0.2, 1.1, 2.1])
+    return Instance(
+        "corner",
+        np.array([[True, False], [True, True]]),
+        pixels,
+        theta,
+        np.array([1, 0.9, 0.6]),
+        w_beta=1e-2,
+        gauge=gauge,
+    )
+
+
+def every_field_of_jumps(instance):
+    return product(
+        *(
+            range(low, high + 1)
+            for low, high in zip(instance.p_min.tolist(), instance.p_max.tolist(), strict=True)
+        )
+    )
+
+
+def square_optimum(instance, p):
+    """Least (8) + (5) + (6) over the angles in their bounds, as bounded least squares written by hand."""
+    grid, count = instance.grid, instance.grid.size
+    rows, right = [], []
+    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
+        a, b = np.zeros(2 * count), np.zeros(2 * count)
+        a[i], a[j] = 1, -1
+        b[count + i], b[count + j] = (-1) ** jump, -1
+        rows += [np.sqrt(2) * a, np.sqrt(2) * b]
+        right += [-np.sqrt(2) * HALF * jump, 0]
+    for i, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
+        r = np.zeros(2 * count)
+        r[i] = r[count + i] = 1
+        weight = np.sqrt(instance.w_strokes * w)
+        rows.append(weight * r)
+        right.append(weight * theta)
+    rows += list(np.sqrt(instance.w_beta) * np.eye(2 * count)[count:])
+    right += [0.0] * count
+    low = np.concatenate([instance.alpha_lower, np.full(count, -QUARTER)])
+    high = np.concatenate([instance.alpha_upper, np.full(count, QUARTER)])
+    return 2 * lsq_linear(np.array(rows), np.array(right), (low, high), tol=1e-14).cost
+
+
+def absolute_optimum(instance, p):
+    """Least sum of absolute residuals for given jumps, as an LP written by hand: |r| = r+ + r-."""
+    grid, count = instance.grid, instance.grid.size
+    rows, right, cost = [], [], []
+    for i, j, jump in zip(grid.first, grid.second, p, strict=True):
+        for first, second, sign, constant in (
+            (i, j, 1, HALF * jump),
+            (count + i, count + j, (-1) ** jump, 0),
+        ):
+            row = np.zeros(2 * count)
+            row[first], row[second] = sign, -1
+            rows.append(row)
+            right.append(-constant)
+            cost.append(2)
+    for i, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
+        row = np.zeros(2 * count)
+        row[i] = row[count + i] = 1
+        rows.append(row)
+        right.append(theta)
+        cost.append(instance.w_strokes * w)
+    rows += list(np.eye(2 * count)[count:])
+    right += [0.0] * count
+    cost += [instance.w_beta] * count
+    size = len(rows)
+    bounds = [
+        *zip(instance.alpha_lower, instance.alpha_upper, strict=True),
+        *[(-QUARTER, QUARTER)] * count,
+        *[(0, None)] * 2 * size,
+    ]
+    equations = np.hstack([np.array(rows), -np.eye(size), np.eye(size)])
+    return linprog([0] * 2 * count + cost + cost, A_eq=equations, b_eq=right, bounds=bounds).fun
+
+
+@pytest.mark.parametrize("gauge", GAUGES)
+def test_milp_against_every_jump(gauge):
+    instance = corner(gauge)
+    best = min(absolute_optimum(instance, p) for p in every_field_of_jumps(instance))
+    assert best > 1e-2
+    assert optimum(instance) == pytest.approx(best, abs=1e-7)
+    assert optimum(instance.turned()) == pytest.approx(best, abs=1e-7) or gauge == "box"
+
+
+@pytest.mark.parametrize("gauge", GAUGES)
+def test_convex_miqp_is_exactly_8(gauge, tmp_path):
+    """The bounded least squares of every jump, against SCIP on the written miqp-exact."""
+    import pyscipopt
+    from crossfield.export.formats.registry import write
+
+    instance = corner(gauge)
+    best = min(square_optimum(instance, p) for p in every_field_of_jumps(instance))
+    assert best > 1e-2
+    write(formulate(instance, "miqp-exact"), tmp_path / "exact.mps")
+    scip = pyscipopt.Model()
+    scip.hideOutput()
+    scip.readProblem(str(tmp_path / "exact.mps"))
+    scip.setParam("limits/time", 20)
+    scip.optimize()
+    assert scip.getStatus() == "optimal"
+    assert scip.getObjVal() == pytest.approx(best, abs=1e-5)
+
+
+# declarations
+
+
+def test_options_that_a_formulation_lacks_are_refused():
+    with pytest.raises(FormulationError, match="no formulation 'milp'; choose one of minlp-parity"):
+        declare("milp")
+    with pytest.raises(FormulationError, match="no option 'norm'"):
+        declare("milp-mccormick", norm=1)
+    with pytest.raises(FormulationError, match="minlp-cubic has no option facet"):
+        declare("minlp-cubic", facet="printed")
+    with pytest.raises(FormulationError, match="qp-fixed has no option relax"):
+        declare("qp-fixed", relax=True)
+    with pytest.raises(FormulationError, match="miqp-exact has no option facet"):
+        declare("miqp-exact", facet="printed")
+    with pytest.raises(FormulationError, match="no facet 'round'"):
+        declare("milp-mccormick", facet="round")
+    with pytest.raises(FormulationError, match="1 or 2"):
+        declare("milp-mccormick", stroke_norm=3)
+    assert declare("milp-mccormick", facet=None, relax=None) == declare("milp-mccormick")
+    assert declare("minlp-cubic", facet="hull") == declare("minlp-cubic")
+
+
+@for_each("name", FORMULATIONS)
+def test_every_row_comes_from_the_paper_or_says_so(name):
+    declared = declare(name)
+    tags = [family.tag for family in declared.rows]
+    assert len(set(tags)) == len(tags)
+    assert all(family.paper for family in (*declared.objective, *declared.rows))
+    assert [family.over for family in declared.objective] == ["pairs", "strokes", "pixels"]
+    assert set(declared.variables) <= set(n.VARIABLES)
+    assert ("p1" in declared.variables) == (name not in {"minlp-parity", "qp-fixed"})

@@ -1,0 +1,307 @@
+"""Problems: columns and bounds, terms against values, points against fields, violations,
+what identifies a problem.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from cases import CASES, LOW_DEGREE, MASKS, make_field, make_instance, make_problem, points_of, problem_of
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.models.errors import FormulationError, InstanceError
+from crossfield.models.field.field import CrossField
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed, with_rest_fixed
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from loops import for_each
+
+POLYNOMIAL = [label for label in CASES if not label.startswith("minlp-parity")]
+
+
+def by_terms(terms, count, point):
+    """Monomials summed up at a point, one value per element."""
+    total = np.zeros(count)
+    for term in terms:
+        total += term.coefficient * np.prod([point[factor] for factor in term.factors], axis=0)
+    return total
+
+
+@for_each("label", POLYNOMIAL)
+def test_terms_give_the_values_of_every_family(label):
+    for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
+        for point in points_of(problem, 5):
+            for family in (*problem.objective, *problem.rows):
+                np.testing.assert_allclose(
+                    by_terms(family.terms, family.count, point), family.values(point), rtol=1e-10, atol=1e-10
+                )
+            for family in problem.rows:
+                assert family.degree <= 2
+                rest = by_terms([term for term in family.terms if term.degree], family.count, point)
+                np.testing.assert_allclose(rest - family.limit, family.values(point), rtol=1e-10, atol=1e-10)
+
+
+@for_each("label", POLYNOMIAL)
+def test_merged_objective_gives_its_value(label):
+    for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):
+        merged = [problem.merged_objective(degree) for degree in range(problem.objective_degree + 1)]
+        for index, coefficient in merged[1:]:
+            assert (coefficient != 0).all()
+            assert (np.diff(index, axis=1) >= 0).all()
+            assert len(np.unique(index, axis=0)) == len(index)
+            assert index.tolist() == sorted(index.tolist())
+        for point in points_of(problem, 5):
+            value = sum(np.prod(point[index], axis=1) @ coefficient for index, coefficient in merged)
+            assert value == pytest.approx(problem.objective_value(point), rel=1e-10, abs=1e-10)
+
+
+def test_parity_is_no_polynomial():
+    problem = problem_of("minlp-parity gauge=strokes")
+    assert [family.degree for family in problem.objective] == [99, 2, 2]
+    assert problem.objective[0].terms is None
+    assert problem_of("minlp-parity shape=pixel").objective_degree == 2
+
+
+# columns
+
+
+@for_each("label", CASES)
+def test_columns_and_rows_are_counted(label):
+    problem = problem_of(label)
+    instance = problem.instance
+    sizes = {"pixels": instance.mask.sum(), "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
+    end = 0
+    for block in problem.blocks.values():
+        assert (block.offset, block.count) == (end, sizes[block.over])
+        end += block.count
+    assert problem.columns == end == len(problem.lower) == len(problem.upper) == len(problem.integer)
+    assert problem.row_count == sum(family.count for family in problem.rows)
+    assert (problem.lower <= problem.upper).all()
+    for name, block in problem.blocks.items():
+        whole = name in {"p", "p1", "p2"} and not problem.formulation.options.relax
+        assert block.integer == (whole and (problem.pinned is None or problem.free is not None))
+
+
+@for_each("gauge", ["strokes", "box"])
+@for_each("shape", MASKS)
+def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
+    problem = make_problem("minlp-cubic", make_instance(shape, gauge))
+    instance = problem.instance
+    p1, p2 = problem.blocks["p1"], problem.blocks["p2"]
+    reached = [set() for _ in instance.grid.first]
+    for first, second in product((0, 1), range(-4, 5)):
+        point = np.zeros(problem.columns)
+        point[p1.columns], point[p2.columns] = first, second
+        allowed = (p1.lower <= first) & (first <= p1.upper) & (p2.lower <= second) & (second <= p2.upper)
+        for family in problem.rows:
+            excess = family.values(point)
+            allowed[family.elements[excess < 0 if family.family.sense == ">=" else excess > 0]] = False
+        for pair in np.nonzero(allowed)[0]:
+            reached[pair].add(first + 2 * second)
+    expected = [set(range(low, high + 1)) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
+    assert reached == expected
+    parity = make_problem("minlp-parity", instance).blocks["p"]
+    assert parity.lower.tolist() == instance.p_min.tolist()
+    assert parity.upper.tolist() == instance.p_max.tolist()
+
+
+# points and fields
+
+
+@for_each("label", CASES)
+def test_a_field_is_a_feasible_point_and_comes_back(label):
+    problem = problem_of(label)
+    field = make_field(problem.instance)  # also the one whose jumps are data or fixed
+    for each in (problem, carried(problem, FORMATS["lp"]) if label in LOW_DEGREE else problem):
+        point = each.point(field)
+        assert each.violation(point).worst < 1e-12
+        back = each.field(point)
+        for name in ("alpha", "beta", "p"):
+            np.testing.assert_array_equal(getattr(back, name), getattr(field, name))
+        assert each.objective_value(point) == pytest.approx(
+            problem.objective_value(problem.point(field)), rel=1e-12
+        )
+
+
+@pytest.mark.parametrize("name", ["minlp-quartic", "minlp-cubic"])
+def test_lifted_problems_are_exact(name):
+    """At any angles and any binary p1, with z = p1 beta, far outside of the bounds as well."""
+    problem = make_problem(name, make_instance())
+    other = lifted(problem)
+    assert (other.objective_degree, other.row_degree, other.convex) == (2, 1, name == "minlp-quartic")
+    rng = np.random.default_rng(7)
+    for point in points_of(problem):
+        p1 = rng.integers(0, 2, problem.blocks["p1"].count)
+        point[problem.blocks["p1"].columns] = p1
+        z = p1 * point[problem.blocks["beta"].columns][problem.instance.grid.first]
+        assert list(other.blocks) == [*problem.blocks, "z"]
+        extended = np.concatenate([point, z])
+        assert other.objective_value(extended) == pytest.approx(problem.objective_value(point), rel=1e-12)
+    assert "hull" in other.formulation.lifted
+    assert other.sha256 != problem.sha256
+    assert lifted(make_problem("minlp-cubic", make_instance(), relax=True)).problem_class == "QP"
+
+
+def test_convex_means_convex():
+    """The Hessian of a quadratic objective is positive semidefinite where the problem says so,
+    and only there.
+    """
+    for label in LOW_DEGREE:
+        problem = carried(problem_of(label), FORMATS["lp"])
+        if problem.row_degree > 1:
+            assert not problem.convex
+            continue
+        index, coefficient = problem.merged_objective(2)
+        hessian = np.zeros((problem.columns, problem.columns))
+        np.add.at(hessian, (index[:, 0], index[:, 1]), coefficient)
+        least = np.linalg.eigvalsh(hessian + hessian.T)[0] if len(coefficient) else 0.0
+        if problem.convex:
+            assert least > -1e-12
+        elif len(problem.instance.grid.first):
+            assert least < -1e-3
+
+
+def test_violations_are_found():
+    field = make_field(make_instance("full"))
+    problem = formulate(field.instance, "milp-mccormick")
+    point = problem.point(field)
+    tight = next(family for family in problem.rows if family.family.tag == "c22")
+    assert (point[problem.blocks["gamma"].columns] >= np.abs(field.residual_r) - 1e-15).all()
+    worse = point.copy()
+    worse[problem.blocks["gamma"].offset] -= 0.25
+    found = problem.violation(worse)
+    assert found.rows == pytest.approx(0.25)
+    assert found.worst_family in {"c22", "c23"}
+    assert tight.count == len(field.instance.theta)
+    worse = point.copy()
+    worse[problem.blocks["beta"].offset] = -QUARTER - 0.125
+    assert problem.violation(worse).bounds == pytest.approx(0.125)
+    worse = point.copy()
+    worse[problem.blocks["p2"].offset] += 0.0625
+    assert problem.violation(worse).integrality == pytest.approx(0.0625)
+    assert problem.violation(worse).worst >= 0.0625
+    exact = formulate(field.instance, "miqp-exact")
+    worse = exact.point(field)
+    worse[exact.blocks["d"].offset] += 0.5
+    assert (exact.violation(worse).rows, exact.violation(worse).worst_family) == (pytest.approx(0.5), "cd")
+
+
+def test_fractional_jumps_of_an_answer_are_rounded():
+    field = make_field(make_instance("full"))
+    for name in ("milp-mccormick", "minlp-parity"):
+        problem = formulate(field.instance, name)
+        noise = np.random.default_rng(0).uniform(-0.1, 0.1, problem.columns)
+        point = problem.point(field) + np.where(problem.integer, noise, 0)
+        np.testing.assert_array_equal(problem.field(point).p, field.p)
+
+
+# fixed integers and data
+
+
+@for_each("name", [name for name in FORMULATIONS if name != "qp-fixed"])
+def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
+    field = make_field(make_instance("parts"))
+    problem = formulate(field.instance, name)
+    pinned = with_integers_fixed(problem, field)
+    assert not pinned.integer.any()
+    assert ((pinned.lower == pinned.upper) == problem.integer).all()
+    assert (pinned.lower[problem.integer] == problem.point(field)[problem.integer]).all()
+    assert pinned.objective_value(pinned.point(field)) == problem.objective_value(problem.point(field))
+    assert pinned.sha256 != problem.sha256
+
+
+@for_each("name", FORMULATIONS)
+def test_with_the_rest_fixed_only_what_lies_inside_is_free(name):
+    field = make_field(make_instance("full"))
+    grid = field.instance.grid
+    problem = make_problem(name, field.instance)
+    free = grid.rows > 0
+    window = with_rest_fixed(problem, field, free)
+    fixed = window.lower == window.upper
+    inside = {"pixels": free, "pairs": free[grid.first] | free[grid.second]}
+    point = problem.point(field)
+    for quantity, block in problem.blocks.items():
+        if quantity in {"alpha", "beta", "p", "p1", "p2"}:
+            expected = ~inside[block.over] | (problem.lower == problem.upper)[block.columns]
+            assert (fixed[block.columns] == expected).all()
+            outside = np.nonzero(~inside[block.over])[0] + block.offset
+            assert (window.lower[outside] == point[outside]).all()
+        else:
+            assert not fixed[block.columns].any()
+    assert window.integer.any() == problem.integer.any()
+    assert window.objective_value(point) == problem.objective_value(point)
+    others = (
+        problem,
+        with_rest_fixed(problem, field, ~free),
+        with_rest_fixed(problem, make_field(field.instance, 9), free),
+    )
+    assert len({window.sha256, *(other.sha256 for other in others)}) == 4
+
+
+def test_free_pixels_are_told_for_the_whole_grid():
+    field = make_field(make_instance("row"))
+    with pytest.raises(FormulationError, match=r"free has shape \(2,\), but the grid has 5 pixels"):
+        with_rest_fixed(formulate(field.instance, "miqp-exact"), field, np.ones(2, bool))
+
+
+def test_jumps_belong_to_qp_fixed_alone():
+    instance = make_instance("row")
+    with pytest.raises(FormulationError, match="qp-fixed takes the jumps of all pairs as data"):
+        formulate(instance, "qp-fixed")
+    with pytest.raises(FormulationError, match="milp-mccormick has the jumps as variables"):
+        formulate(instance, "milp-mccormick", p=np.zeros(4))
+    with pytest.raises(FormulationError, match=r"shape \(3,\), but the grid has 4 pairs"):
+        formulate(instance, "qp-fixed", p=np.zeros(3))
+    problem = formulate(instance, "qp-fixed", p=[3, -2, 0, -1])
+    assert problem.data["p1"].tolist() == [1, 0, 0, 1]
+    assert problem.data["p2"].tolist() == [1, -1, 0, -1]
+
+
+def test_fields_of_another_instance_are_refused():
+    field = make_field(make_instance("row"))
+    others = [make_instance("row", seed=5), make_instance("row", gauge="box"), make_instance("full")]
+    for other in others:
+        problem = formulate(other, "milp-mccormick")
+        with pytest.raises(InstanceError, match="not on 'tiny', or under another gauge"):
+            problem.point(field)
+        with pytest.raises(InstanceError, match="not on 'tiny', or under another gauge"):
+            with_integers_fixed(problem, field)
+
+
+def test_sha256_stands_for_everything_that_changes_a_file():
+    instance = make_instance()
+    field = make_field(instance)
+    other = CrossField(
+        instance, field.alpha, field.beta, np.clip(field.p + 1, instance.p_min, instance.p_max)
+    )
+    problems = [
+        formulate(instance, "milp-mccormick"),
+        formulate(instance.with_gauge("box"), "milp-mccormick"),
+        formulate(instance, "milp-mccormick", facet="printed"),
+        formulate(instance, "milp-mccormick", relax=True),
+        formulate(instance, "milp-mccormick", stroke_norm=2),
+        formulate(instance, "milp-mccormick", beta_norm=2),
+        formulate(instance, "miqp-mccormick"),
+        formulate(instance, "qp-fixed", p=field.p),
+        formulate(instance, "qp-fixed", p=other.p),
+        with_integers_fixed(formulate(instance, "milp-mccormick"), field),
+        with_integers_fixed(formulate(instance, "milp-mccormick"), other),
+    ]
+    assert len({problem.sha256 for problem in problems}) == len(problems)
+    assert formulate(make_instance(), "milp-mccormick").sha256 == problems[0].sha256
+
+
+def test_noise_is_left_out_and_small_weights_are_not():
+    """Jumps that cancel leave no cost of 1e-16; a weight of 1e-13 stays to be judged by the format."""
+    mask = np.ones((1, 3), dtype=bool)
+    instance = Instance("line", mask, np.array([[0, 0]]), np.array([1e-16]), np.ones(1), w_beta=1e-13)
+    problem = formulate(instance, "qp-fixed", p=[1, 1])
+    index, coefficient = problem.merged_objective(1)
+    middle = problem.blocks["alpha"].offset + 1
+    assert middle not in index[:, 0]  # - pi + pi
+    assert np.abs(coefficient).min() == pytest.approx(2 * HALF * 2)
+    line = formulate(instance, "milp-mccormick")
+    index, coefficient = line.merged_objective(1)
+    assert coefficient.min() == 1e-13
+    assert (coefficient == 1e-13).sum() == 3

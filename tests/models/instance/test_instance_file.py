@@ -1,0 +1,247 @@
+"""Instance files: there and back, byte for byte, and one named line for every kind of damage."""
+
+import io
+import json
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from crossfield.models.array_archive import pack_arrays
+from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.instance.file import arrays_of, read_instance, to_json, write_instance
+from crossfield.models.instance.instance import Instance
+from loops import for_each
+
+MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
+
+
+@pytest.fixture
+def instance():
+    return Instance(
+        name="sample",
+        mask=MASK,
+        stroke_pixels=[[0, 0], [1, 1], [2, 2]],
+        theta=[0.1, 1 / 3, 2.9],
+        w=[1.0, 0.1, 2 / 3],
+        w_strokes=0.5,
+        w_beta=1e-7,
+        gauge="box",
+        source='a "quoted" sketch.svg, Größe',
+        pixel_size=2.5,
+        origin=(-1.25, 1e-3),
+    )
+
+
+def same_instance(one, other):
+    return one.sha256 == other.sha256 and (one.mask == other.mask).all() and (one.theta == other.theta).all()
+
+
+def refused(read, path, message, error=InstanceError):
+    with pytest.raises(error) as caught:
+        read(path)
+    text = str(caught.value)
+    assert text.startswith(str(path))
+    assert message in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_instance_comes_back_and_gives_the_same_bytes(instance, tmp_path, suffix):
+    first = write_instance(instance, tmp_path / f"one.{suffix}")
+    back = read_instance(first)
+    assert same_instance(instance, back)
+    for name in ("name", "gauge", "source", "w_strokes", "w_beta", "pixel_size", "origin"):
+        assert getattr(back, name) == getattr(instance, name)
+    second = write_instance(back, tmp_path / f"two.{suffix}")
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_json_needs_only_name_mask_and_strokes(tmp_path):
+    path = tmp_path / "short.json"
+    document = {
+        "format": "crossfield-instance",
+        "version": 1,
+        "name": "a",
+        "mask": ["#"],
+        "strokes": [[0, 0, 1, 1]],
+    }
+    path.write_text(json.dumps(document))
+    instance = read_instance(path)
+    assert (instance.gauge, instance.w_strokes, instance.w_beta, instance.pixel_size) == (
+        "strokes",
+        1,
+        1e-6,
+        1,
+    )
+
+
+def change(key, value):
+    return lambda document: document | {key: value}
+
+
+def without(key):
+    return lambda document: {k: v for k, v in document.items() if k != key}
+
+
+@for_each(
+    "edit,message",
+    [
+        (change("format", "other"), '"format" must be "crossfield-instance"'),
+        (change("version", 2), "has version 2, but this program reads version 1"),
+        (change("version", None), "has version None"),
+        (change("name", "Big"), "$.name: 'Big' does not match"),
+        (change("name", 5), "$.name: 5 is not of type 'string'"),
+        (change("gauge", "none"), "$.gauge: 'none' is not one of"),
+        (change("source", 1), "$.source: 1 is not of type 'string'"),
+        (change("source", "a\u2028b\nc"), "source holds a line break"),
+        (change("source", "\ud800"), "source holds"),
+        (change("w_strokes", -1), "$.w_strokes: -1 is less than the minimum of 0"),
+        (change("w_beta", "1"), "$.w_beta: '1' is not of type 'number'"),
+        (change("w_beta", float("nan")), "w_beta is nan"),
+        (change("w_beta", 10**400), "beyond the range of doubles"),
+        (change("pixel_size", 0), "$.pixel_size"),
+        (change("pixel_size", True), "$.pixel_size"),
+        (change("origin", [0]), "$.origin"),
+        (change("origin", [0, float("inf")]), "origin is (0.0, inf)"),
+        (change("origin", [0, 10**400]), "beyond the range of doubles"),
+        (change("mask", []), "$.mask"),
+        (change("mask", ["##", "#x"]), "$.mask[1]: '#x' does not match"),
+        (change("mask", ["##", "#"]), "mask row 1 has 1 pixels, the first one 2; make them equal"),
+        (change("mask", ["#..."] * 3), "stroke pixel [1, 1]: is outside the mask"),
+        (change("strokes", {}), "$.strokes"),
+        (change("strokes", []), "no stroke lies inside the mask"),
+        (change("strokes", [[0, 0, 1]]), "$.strokes[0]"),
+        (change("strokes", [[0, 0, 1, 1, 1]]), "$.strokes[0]"),
+        (change("strokes", [[0.5, 0, 1, 1]]), "$.strokes[0][0]: 0.5 is not of type 'integer'"),
+        (change("strokes", [[0, -1, 1, 1]]), "$.strokes[0][1]"),
+        (change("strokes", [[0, 10**30, 1, 1]]), "$.strokes[0][1]"),
+        (change("strokes", [[0, 0, None, 1]]), "$.strokes[0][2]"),
+        (change("strokes", [[0, 0, float("nan"), 1]]), "stroke pixel [0, 0]: theta is not a finite number"),
+        (change("strokes", [[0, 0, 10**400, 1]]), "beyond the range of doubles"),
+        (change("strokes", [[0, 0, 1, 0]]), "$.strokes[0][3]"),
+        (change("strokes", [[0, 0, 1, 2]]), "$.strokes[0][3]"),
+        (change("strokes", [[0, 0, 1, float("nan")]]), "stroke pixel [0, 0]: w is not in (0, 1]"),
+        (
+            change("strokes", [[0, 0, 1, 1], [0, 0, 1, 1]]),
+            "stroke pixel [0, 0] is out of order or listed twice",
+        ),
+        (change("extra", 1), "$: Additional properties are not allowed ('extra' was unexpected)"),
+        (without("name"), "'name' is a required property"),
+        (without("mask"), "'mask' is a required property"),
+        (without("strokes"), "'strokes' is a required property"),
+        (without("version"), "has version None"),
+        (lambda document: [document], '"format" must be'),
+        (lambda _: None, '"format" must be'),
+    ],
+)
+def test_json_that_breaks_the_rules_is_named_with_its_place(instance, tmp_path, edit, message):
+    path = tmp_path / "broken.json"
+    path.write_text(json.dumps(edit(json.loads(to_json(instance)))))
+    refused(read_instance, path, message)
+
+
+@for_each(
+    "data,message",
+    [
+        (b"", "is not valid JSON"),
+        (b"{", "is not valid JSON"),
+        (b"[" * 100_000, "is not valid JSON"),
+        (b'{"version": ' + b"9" * 5000 + b"}", "is not valid JSON"),
+        (b"\xff\xfe\x00\x01", "is neither JSON nor .npz"),
+        (bytes(range(256)), "is neither JSON nor .npz"),
+        (b"PK\x03\x04 this is no archive", "is a damaged or unsafe .npz"),
+        (b"PK", "is a damaged or unsafe .npz"),
+    ],
+)
+def test_what_is_no_instance_file_is_refused(tmp_path, data, message):
+    path = tmp_path / "junk.json"
+    path.write_bytes(data)
+    refused(read_instance, path, message)
+
+
+def test_json_with_a_byte_order_mark_is_read(instance, tmp_path):
+    path = tmp_path / "bom.json"
+    path.write_bytes(b"\xef\xbb\xbf" + to_json(instance).encode())
+    assert same_instance(read_instance(path), instance)
+
+
+def test_missing_file_and_folder_are_named(tmp_path):
+    refused(read_instance, tmp_path / "none.json", "cannot be read: no such file", InputError)
+    refused(read_instance, tmp_path, "cannot be read: is a directory", InputError)
+
+
+class Harmful:
+    """Makes a folder when it is unpickled."""
+
+    def __init__(self, folder):
+        self.folder = str(folder)
+
+    def __reduce__(self):
+        return Path.mkdir, (Path(self.folder),)
+
+
+def test_pickles_are_neither_read_nor_run(instance, tmp_path):
+    folder = tmp_path / "made"
+    path = write_instance(instance, tmp_path / "evil.npz")
+    entries = dict(np.load(path))
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, array in entries.items():
+            stream = io.BytesIO()
+            evil = np.array([Harmful(folder)], dtype=object) if name == "theta" else array
+            np.lib.format.write_array(stream, evil, allow_pickle=True)
+            archive.writestr(f"{name}.npy", stream.getvalue())
+    refused(read_instance, path, "is a damaged or unsafe .npz")
+    path.write_bytes(pickle.dumps(Harmful(folder)))
+    refused(read_instance, path, "")
+    assert not folder.exists()
+    pickle.loads(path.read_bytes())
+    assert folder.exists()
+
+
+def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (10**7,)})
+    path = tmp_path / "bomb.npz"
+    others = arrays_of(instance)
+    del others["theta"]
+    path.write_bytes(pack_arrays(others))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("theta.npy", head.getvalue() + b"12345678")
+    refused(read_instance, path, "another length than its header says")
+
+
+@for_each(
+    "name,array,message",
+    [
+        ("theta", np.array(["a", "b", "c"]), "array 'theta' holds <U1, not numbers"),
+        ("theta", np.array([0.1, 0.2]), "3 stroke pixels need as many theta and w, but there are 2 and 3"),
+        ("theta", np.array([0.1, np.nan, 0.2]), "stroke pixel [1, 1]: theta is not a finite number"),
+        (
+            "stroke_pixels",
+            np.array([[0, 0], [1, 1], [2, 2**40]]),
+            "stroke_pixels holds something other than whole",
+        ),
+        ("mask", np.ones(3, dtype=bool), "array 'mask' has shape (3,); expected 2 dimensions"),
+        ("origin", np.array([1.0]), "has an entry of the wrong kind"),
+        ("head", np.zeros(4, np.uint8), "its array 'head' is not JSON text"),
+        ("head", np.frombuffer(b"[]", np.uint8), '"format" must be'),
+        (
+            "head",
+            np.frombuffer(b'{"format": "crossfield-instance", "version": 7}', np.uint8),
+            "has version 7",
+        ),
+        (
+            "head",
+            np.frombuffer(b'{"format": "crossfield-instance", "version": 1}', np.uint8),
+            "wrong kind: 'name'",
+        ),
+        ("w", None, "holds no array 'w'"),
+    ],
+)
+def test_npz_that_breaks_the_rules_is_named(instance, tmp_path, name, array, message):
+    path = write_instance(instance, tmp_path / "broken.npz")
+    entries = dict(np.load(path)) | {name: array}
+    path.write_bytes(pack_arrays({key: value for key, value in entries.items() if value is not None}))
+    refused(read_instance, path, message)

@@ -1,0 +1,56 @@
+"""Deadlines: what is left, and that the parts of a budget never add up to more than the whole."""
+
+import math
+import pickle
+
+from crossfield.models.processes.deadline import Deadline
+from hypothesis import given
+from hypothesis import strategies as st
+
+SECONDS = st.floats(1e-3, 1e6)
+
+
+class Clock:
+    """A clock that moves when it is told to."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
+    clock = Clock()
+    deadline = Deadline.after(3.0, clock)
+    assert (deadline.left(), deadline.passed()) == (3.0, False)
+    clock.now += 2.0
+    assert (deadline.left(), deadline.passed()) == (1.0, False)
+    clock.now += 5.0
+    assert (deadline.left(), deadline.passed()) == (0.0, True)
+
+
+def test_without_a_limit_there_is_no_end():
+    deadline = Deadline(math.inf)
+    assert deadline.left() == deadline.share(0.5).left() == deadline.later(-1e9).left() == math.inf
+    assert not deadline.passed()
+    assert Deadline(math.inf, clock := Clock()).within(2.0) == Deadline(clock.now + 2.0, clock)
+
+
+@given(SECONDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), SECONDS, SECONDS)))
+def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
+    """However much of its share each part takes, all end by the deadline of the whole."""
+    clock = Clock()
+    whole = Deadline.after(seconds, clock)
+    for part, taken, most, kept in steps:
+        own = whole.share(part).within(most).later(-kept)
+        assert own.at <= whole.at + 1e-9 * seconds
+        clock.now += taken * own.left()
+    assert clock.now <= whole.at + 1e-9 * seconds
+
+
+def test_a_deadline_goes_to_another_process():
+    """What is left travels, not the time of a clock that the other process may not share."""
+    for seconds in (5.0, math.inf):
+        sent, arrived = Deadline.after(seconds), pickle.loads(pickle.dumps(Deadline.after(seconds)))
+        assert sent.at <= arrived.at <= Deadline.after(seconds).at

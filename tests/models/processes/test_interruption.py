@@ -1,0 +1,154 @@
+"""Ctrl-C and a run: what it ends, what is kept, and that nobody is left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import crossfield as cf
+import pytest
+from children import all_end, descendants, running
+from crossfield.export.solving.methods import METHODS
+from crossfield.export.solving.run import PICTURES, plan
+
+FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj"}
+
+RUN = """
+import sys, crossfield as cf
+tell = lambda line: print(line, flush=True)
+report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=tell)
+"""
+
+
+@contextmanager
+def started(command, first=None):
+    """A process that has printed a line which begins so; afterwards none that it has started is left."""
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        while first and not (line := process.stdout.readline()).startswith(first):
+            assert line, process.communicate()
+        theirs = descendants(process.pid)
+        try:
+            yield process
+        finally:
+            process.kill()
+    assert all_end(theirs | {pid for pid, (_, group) in running().items() if group == process.pid})
+
+
+def press(process, times=1):
+    """Exit code and complaints of a process that Ctrl-C is pressed for."""
+    for _ in range(times):
+        os.killpg(process.pid, signal.SIGINT)
+    err = process.communicate(timeout=120)[1]
+    return process.returncode, err
+
+
+def pictures(folder):
+    return {path.stem for path in folder.glob("*.png")}
+
+
+def test_ctrl_c_in_the_search_ends_the_run_with_its_best_field(tmp_path):
+    (tmp_path / "overview.png").write_bytes(b"of yesterday")
+    with started([sys.executable, "-c", RUN, tmp_path, "600"], "search: energy") as process:
+        assert press(process) == (0, "")
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["interrupted"] == "search"
+    by_method = {row["method"]: row for row in report["methods"]}
+    assert set(by_method) == {"greedy", "power", "power + QP", "search"}
+    assert by_method["search"]["interrupted"] is True
+    assert cf.read_field(tmp_path / "field.npz").energy().total == pytest.approx(
+        min(row["energy_2_norm"] for row in report["methods"]), rel=1e-9
+    )
+    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {*FIELDS, "report.json"}
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_it_draws_keeps_the_report(tmp_path):
+    with started([sys.executable, "-c", RUN, tmp_path, "1"], "drawing field") as process:
+        assert press(process) == (0, "")
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["interrupted"] == "drawing"
+    assert "two-stage" in {row["method"] for row in report["methods"]}
+    assert {"overview"} <= pictures(tmp_path) < set(PICTURES)
+    assert not list(tmp_path.rglob(".*.part"))
+
+
+def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
+    with started([sys.executable, "-c", RUN, tmp_path, "600"], "search: energy") as process:
+        code, err = press(process, times=2)
+    assert not list(tmp_path.rglob(".*.part"))
+    assert pictures(tmp_path) == set()
+    if (tmp_path / "report.json").exists():
+        assert (code, err) == (0, "")
+        assert json.loads((tmp_path / "report.json").read_text())["interrupted"] == "search"
+    else:
+        assert "KeyboardInterrupt" in err
+
+
+def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
+    """At that size the greedy field takes longer than the signal.
+
+    Not while libraries load: there Python may drop a KeyboardInterrupt that comes inside a callback.
+    """
+    command = [sys.executable, "-m", "crossfield", "run", "mouse", "--size", "150"]
+    with started([*command, "-o", tmp_path / "out"]) as process:
+        while not (tmp_path / "out").exists():
+            assert process.poll() is None
+        assert press(process) == (1, "crossfield: interrupted; files that stand are whole\n")
+    assert not list(tmp_path.rglob(".*.part"))
+    assert not (tmp_path / "out" / "report.json").exists()
+
+
+def test_the_plan_names_each_method_that_searches_and_the_sum():
+    told = plan(cf.Limits(20))
+    assert told.startswith("at most 40 s: search 20 s, two-stage 20 s;")
+    timed = [method.name for method in METHODS.values() if method.timed and method.in_runs]
+    assert timed == ["search", "two-stage"]
+
+
+def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
+    class StoppedError(Exception):
+        pass
+
+    def tell(line):
+        assert line == plan(cf.Limits(7))
+        raise StoppedError
+
+    with pytest.raises(StoppedError):
+        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=tell)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "skew", "--size", "4", "--threads"],
+        ["solve", "skew", "--size", "4", "-m", "search", "--threads"],
+        ["run", "skew", "--size", "4", "--jobs"],
+        ["export", "skew", "--size", "4", "--jobs"],
+        ["library", "build", "default", "--jobs"],
+    ],
+)
+def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, arguments, capsys):
+    from crossfield.export.cli.app import invoke
+    from crossfield.models.processes.side_by_side import MOST
+
+    what, least = ("threads", 0) if "--threads" in arguments else ("jobs", 1)
+    assert invoke([*arguments, "100000", "-o", str(tmp_path / "out")]) == 2
+    said = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
+    assert f"100000 {what} cannot be; give {least} to {MOST}" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_too_many_jobs_are_refused_in_python_too(tmp_path):
+    from crossfield.export.library.building.build import build
+    from crossfield.export.library.plan.spec import default_spec
+
+    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+        cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000)
+    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+        build(default_spec(), tmp_path / "library", jobs=100000)
+    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+        cf.search(cf.sample("mouse", 14), seconds=1, jobs=100000)

@@ -1,0 +1,105 @@
+"""Work in several processes: answers in order, errors as they were raised, and nobody left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import crossfield as cf
+import pytest
+from children import all_end, descendants
+from crossfield.models.errors import InputError
+from crossfield.models.processes import side_by_side as module
+from crossfield.models.processes.side_by_side import MOST, WorkerError, checked, side_by_side
+
+
+def test_answers_come_in_the_order_of_the_tasks():
+    for jobs in (1, 3):
+        with side_by_side(int, jobs) as work:
+            assert work([str(number) for number in range(20)]) == list(range(20))
+            assert work([]) == []
+            assert work(["7"]) == [7]
+
+
+def test_there_are_as_many_processes_as_tasks_and_jobs_allow():
+    before = descendants(os.getpid())
+    with side_by_side(time.sleep, 4) as work:
+        assert work([0.0]) == [None]
+        assert len(descendants(os.getpid()) - before) == 1
+        work([0.3] * 9)
+        assert 1 < len(descendants(os.getpid()) - before) <= 4
+
+
+def test_an_error_of_the_work_is_raised_here_and_the_process_goes_on():
+    with side_by_side(int, 2) as work:
+        with pytest.raises(ValueError, match="'three'") as caught:
+            work(["1", "three"])
+        assert "in _answer" in caught.value.__notes__[0]
+        assert work(["4", "5"]) == [4, 5]
+
+
+def test_a_process_that_dies_is_said():
+    with side_by_side(os._exit, 2) as work, pytest.raises(WorkerError, match="fewer jobs or threads"):
+        work([3])
+
+
+def test_no_process_stays_behind():
+    """Neither after a good end, nor after an error of the caller's, nor while tasks are under way."""
+    before = descendants(os.getpid())
+    with side_by_side(abs, 2) as work:
+        work([1, 2, 3])
+        assert len(descendants(os.getpid()) - before) == 2
+    assert descendants(os.getpid()) == before
+    with pytest.raises(TypeError), side_by_side(abs, 2) as work:
+        len(work([1, 2, 3])[0])
+    assert descendants(os.getpid()) == before
+    with side_by_side(time.sleep, 2) as work, pytest.raises(TypeError):
+        work([None, 600])
+    assert descendants(os.getpid()) == before
+
+
+def test_a_search_leaves_no_process_behind():
+    before = descendants(os.getpid())
+    cf.search(cf.sample("skew", 9), rounds=1, jobs=2)
+    assert descendants(os.getpid()) == before
+
+
+PARENT = """
+import time
+from crossfield.models.processes.side_by_side import side_by_side
+with side_by_side(time.sleep, 3) as work:
+    work([0.0] * 3)
+    print("started", flush=True)
+    work([600.0] * 3)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_processes_end_with_their_parent(number):
+    command = [sys.executable, "-c", PARENT]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as parent:
+        assert parent.stdout.readline() == b"started\n"
+        theirs = descendants(parent.pid)
+        parent.send_signal(number)
+        parent.wait(60)
+    assert theirs
+    assert all_end(theirs)
+
+
+def test_a_file_where_the_user_happens_to_be_is_not_run(tmp_path, monkeypatch):
+    (tmp_path / "pickle.py").write_text("raise SystemExit('taken for a library')")
+    monkeypatch.chdir(tmp_path)
+    with side_by_side(abs, 2) as work:
+        assert work([-1, -2]) == [1, 2]
+
+
+def test_how_many_may_be_asked_for_is_said():
+    assert checked(1) == 1
+    assert checked(MOST) == MOST >= 16
+    for count in (0, -1, MOST + 1, 100000):
+        with pytest.raises(InputError, match=f"{count} jobs cannot be; give 1 to {MOST}"):
+            checked(count)
+    with pytest.raises(InputError, match="100000 jobs"), side_by_side(abs, 100000):
+        pass
+    assert 1 <= module.cores() <= (os.cpu_count() or 1)

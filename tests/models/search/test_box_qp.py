@@ -1,0 +1,209 @@
+"""The best angles for given jumps: conditions of optimality, hand calculations, and two other solvers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossfield.export.solving.two_stage import fit_angles
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.power_field import power_field
+from crossfield.models.sketch.samples import sample, samples
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+from scipy.optimize import lsq_linear
+
+pytestmark = pytest.mark.numeric
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_instance(seed, shape=None, gauge="box", w_beta=1e-3):
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(1, 8, 2)) < 0.8 if shape is None else np.ones(shape, bool)
+    mask[0, 0] = True
+    at = np.argwhere(mask)
+    at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(max(1, len(at) // 2))])]
+    theta, w = rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at))
+    return Instance("random", mask, at, theta, w, w_beta=w_beta, gauge=gauge)
+
+
+def random_field(instance, seed):
+    """Angles and jumps anywhere in their bounds: most angles want to leave them."""
+    rng = np.random.default_rng(seed)
+    alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
+    beta = rng.uniform(-QUARTER, QUARTER, len(alpha))
+    return CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
+
+
+def gradient(field):
+    """The gradient of the energy in (alpha, beta) by the chain rule through the residuals, shape (2, n)."""
+    instance, grid = field.instance, field.instance.grid
+    a, b = 4 * field.residual_a, 4 * field.residual_b
+    r = np.zeros(grid.size)
+    r[instance.stroke_index] = 2 * instance.w_strokes * instance.w * field.residual_r
+    sign = (-1.0) ** field.p
+    of_alpha, of_beta = r.copy(), r + 2 * instance.w_beta * field.beta
+    np.add.at(of_alpha, grid.first, a)
+    np.add.at(of_alpha, grid.second, -a)
+    np.add.at(of_beta, grid.first, sign * b)
+    np.add.at(of_beta, grid.second, -b)
+    return np.stack([of_alpha, of_beta])
+
+
+def assert_optimal(field):
+    """The conditions of Karush, Kuhn and Tucker, which suffice for a convex problem;
+    the number of active bounds comes back.
+    """
+    instance, quarter = field.instance, np.full(len(field.beta), QUARTER)
+    x = np.stack([field.alpha, field.beta])
+    lower, upper = np.stack([instance.alpha_lower, -quarter]), np.stack([instance.alpha_upper, quarter])
+    assert (x >= lower).all()
+    assert (x <= upper).all()
+    slope = gradient(field)
+    moves = np.where(slope > 0, x > lower, x < upper)
+    scale = 1 + HALF * 4 * np.abs(field.p).max(initial=0) + np.pi * instance.w_strokes
+    assert np.abs(slope[moves]).max(initial=0) < 1e-9 * scale
+    return int(np.sum(~moves))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gradient_agrees_with_differences(seed):
+    field = random_field(random_instance(seed), seed)
+    way = np.random.default_rng(seed).normal(size=(2, len(field.alpha)))
+    ends = [
+        CrossField(field.instance, field.alpha + h * way[0], field.beta + h * way[1], field.p).energy().total
+        for h in (0.5, -0.5)
+    ]
+    # Central differences of a quadratic are exact.
+    assert ends[0] - ends[1] == pytest.approx(np.sum(gradient(field) * way), rel=1e-9)
+
+
+@given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
+@settings(deadline=None)
+def test_random_jumps_are_fitted_to_the_optimum(seed, gauge):
+    field = random_field(random_instance(seed, gauge=gauge), seed)
+    best = fitted(field)
+    assert_optimal(best)
+    assert (best.p == field.p).all()
+    assert best.energy().total <= field.energy().total
+
+
+@given(seed=SEEDS, w_beta=st.sampled_from([0, 1e-6, 1]), w_strokes=st.sampled_from([0, 1e-6, 1, 100]))
+@settings(deadline=None)
+def test_any_weights_will_do(seed, w_beta, w_strokes):
+    instance = replace(random_instance(seed), w_beta=w_beta, w_strokes=w_strokes)
+    assert_optimal(fitted(random_field(instance, seed)))
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_thousands_of_active_bounds(gauge):
+    instance = random_instance(3, (80, 100), gauge, 1e-6)
+    assert assert_optimal(fitted(random_field(instance, 0))) > 1000
+
+
+def test_contact_along_the_strokes_of_a_drawing():
+    # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
+    assert assert_optimal(fitted(power_field(sample("mouse", 96, "box")))) > 200
+
+
+@for_each("seed", range(8))
+def test_same_energy_as_bounded_dense_least_squares(seed):
+    instance = random_instance(seed, (4, 5), ("strokes", "box")[seed % 2])
+    field = random_field(instance, seed)
+    size = instance.grid.size
+    # The residuals are affine: their rows come from unit fields.
+    zero = residuals(instance, np.zeros(2 * size), field.p)
+    rows = np.stack([residuals(instance, unit, field.p) - zero for unit in np.eye(2 * size)], axis=1)
+    quarter = np.full(size, QUARTER)
+    lower = np.concatenate([instance.alpha_lower, -quarter])
+    upper = np.concatenate([instance.alpha_upper, quarter])
+    answer = lsq_linear(rows, -zero, (lower, upper), method="bvls", tol=1e-14)
+    assert fitted(field).energy().total == pytest.approx(2 * answer.cost, rel=1e-9)
+
+
+def residuals(instance, x, p):
+    """All residuals times the roots of their weights."""
+    field = CrossField(instance, *np.split(x, 2), p)
+    root = np.sqrt(instance.w_strokes * instance.w)
+    parts = (
+        np.sqrt(2) * field.residual_a,
+        np.sqrt(2) * field.residual_b,
+        root * field.residual_r,
+        np.sqrt(instance.w_beta) * field.beta,
+    )
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize("name, size", [*((known.name, 24) for known in samples()), ("ring", 48)])
+def test_same_optimum_as_ipopt_on_the_file(name, size):
+    instance = sample(name, size, "box")
+    centre = CrossField(
+        instance,
+        (instance.alpha_lower + instance.alpha_upper) / 2,
+        np.zeros(instance.grid.size),
+        random_field(instance, size).p,
+    )
+    best, other = fitted(centre), fit_angles(centre).field
+    assert assert_optimal(best) > 10
+    assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
+
+
+def test_one_pixel_in_the_box_of_the_paper():
+    instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box")
+    field = fitted(CrossField(instance, [0.1], [0.2], []))
+    # beta = (theta - alpha) / (1 + w_beta), and alpha leans on its bound.
+    assert field.alpha.tolist() == [HALF]
+    assert field.beta == pytest.approx([np.pi / 6 / (1 + 1e-6)], rel=1e-12)
+
+
+def test_pair_with_a_jump_between_two_strokes():
+    # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
+    instance = Instance("two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], w_beta=0)
+    field = fitted(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
+    assert field.energy().total == pytest.approx(0, abs=1e-18)
+    assert field.alpha + field.beta == pytest.approx([0.3, 0.3 + HALF])
+
+
+def test_angles_stay_where_the_energy_does_not_say():
+    mask = np.ones((3, 9), bool)
+    mask[:, 4] = False
+    instance = Instance("parts", mask, [[0, 0]], [0.7], [1.0], w_beta=0)
+    rng = np.random.default_rng(0)
+    given = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
+    field = fitted(given)
+    apart = instance.grid.columns > 4
+    for before, after in ((given.alpha, field.alpha), (given.beta, field.beta)):
+        # The nearest constant is the mean.
+        assert after[apart] == pytest.approx(np.full(12, before[apart].mean()), abs=1e-6)
+    assert field.energy().total == pytest.approx(0, abs=1e-18)
+
+
+def test_the_optimum_comes_back_as_it_is():
+    best = fitted(random_field(random_instance(7, (12, 12)), 7))
+    again = fitted(best)
+    assert again.alpha.tobytes() == best.alpha.tobytes()
+    assert again.beta.tobytes() == best.beta.tobytes()
+
+
+def test_same_field_gives_the_same_bits():
+    field = random_field(random_instance(8, (20, 20)), 8)
+    one, two = fitted(field), fitted(field)
+    assert one.alpha.tobytes() == two.alpha.tobytes()
+    assert one.beta.tobytes() == two.beta.tobytes()
+
+
+def test_optimum_without_jumps_is_that_of_the_transposed_sketch():
+    # (alpha, beta) becomes (pi/2 - alpha, -beta), so that jumps 0 stay 0 and the box stays the box.
+    mask = np.ones((7, 9), bool)
+    at = np.argwhere(mask)[::5]
+    theta = np.random.default_rng(1).uniform(-QUARTER, 3 * QUARTER, len(at))
+    instance = Instance("any", mask, at, theta, np.ones(len(at)), w_beta=1e-3, gauge="box")
+    energies = []
+    for each in (instance, instance.transposed()):
+        zero = np.zeros(each.grid.size)
+        energies.append(fitted(CrossField(each, zero, zero, np.zeros(len(each.p_min)))).energy().total)
+    assert energies[0] > 0.1
+    assert energies[1] == pytest.approx(energies[0], rel=1e-9)

@@ -1,0 +1,302 @@
+"""The greedy baseline and the power field: exact cases, symmetries, bounds,
+and brute force over the jumps.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.greedy import greedy
+from crossfield.models.search.improvement import first_field
+from crossfield.models.search.nearest_stroke import nearest_strokes
+from crossfield.models.search.power_field import power_field
+from crossfield.models.search.search import search
+from crossfield.models.sketch.samples import sample
+from exhaustive import exact, least_energy, random_instance, sketch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+pytestmark = pytest.mark.numeric
+
+SEEDS = st.integers(0, 2**32 - 1)
+SOLVERS = pytest.mark.parametrize("solve", [greedy, first_field, power_field])
+
+
+def assert_feasible(field):
+    instance = field.instance
+    assert (field.alpha >= instance.alpha_lower).all()
+    assert (field.alpha <= instance.alpha_upper).all()
+    assert (np.abs(field.beta) <= QUARTER).all()
+    assert (field.p >= instance.p_min).all()
+    assert (field.p <= instance.p_max).all()
+
+
+def some_curves(size=16, seed=3):
+    """Arcs of random circles: a sketch without ties."""
+    rng = np.random.default_rng(seed)
+    theta = np.full((size, size), np.nan)
+    for _ in range(5):
+        centre, radius, start = rng.uniform(0, size, 2), size * rng.uniform(0.2, 0.8), rng.uniform(0, 6)
+        way = np.linspace(start, start + 2, 6 * size)
+        row = np.floor(centre[0] - radius * np.sin(way)).astype(int)
+        column = np.floor(centre[1] + radius * np.cos(way)).astype(int)
+        on = (row >= 0) & (column >= 0) & (row < size) & (column < size)
+        theta[row[on], column[on]] = way[on] + HALF
+    return sketch(np.ones((size, size), bool), theta)
+
+
+@SOLVERS
+@for_each("degrees", [0, 20, 45, 90, 120, 135, 179])
+def test_parallel_strokes_give_a_constant_field(solve, degrees):
+    theta = np.full((6, 7), np.nan)
+    theta[[1, 4], 1:5] = np.radians(degrees)
+    field = solve(sketch(np.ones((6, 7), bool), theta))
+    for norm in (1, 2):
+        assert field.energy(norm).total < 1e-5
+    assert np.abs(field.beta).max() < 1e-3
+
+
+@for_each("w_beta", [0, 1e-9, 1e-6])
+@for_each("first", [0, 77, 130])
+@for_each("between", [15, 30, 44, 50, 60, 90, 100, 130, 155])
+def test_two_families_give_a_constant_skewed_field(first, between, w_beta):
+    theta = np.full((7, 7), np.nan)
+    theta[2, :] = np.radians(first)
+    theta[3:, 4] = np.radians(first + between)
+    field = first_field(sketch(np.ones((7, 7), bool), theta, w_beta))
+    # Both norms vanish with w_beta; the constant field of these lines is the bound for the 2-norm.
+    assert field.energy(2).total < 1e-12 + 49 * w_beta * QUARTER**2
+    assert field.energy(1).total < 1e-6 + 200 * w_beta
+    assert np.degrees(field.angle_between) == pytest.approx(min(between, 180 - between), abs=0.01)
+
+
+def test_one_pixel_in_the_box_of_the_paper():
+    field = greedy(Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box"))
+    assert field.alpha == pytest.approx([HALF])
+    assert field.beta == pytest.approx([np.pi / 6], abs=1e-5)
+    assert field.energy().total == pytest.approx(1e-6 * (np.pi / 6) ** 2, rel=1e-4)
+
+
+def test_one_pixel_under_the_gauge_of_strokes():
+    field = greedy(Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0]))
+    assert (field.alpha[0], field.beta[0]) == pytest.approx((2 * np.pi / 3, 0))
+
+
+@pytest.mark.parametrize("index", [0.25, -0.25])
+@SOLVERS
+def test_frame_of_strokes_round_one_singularity(solve, index):
+    rows, columns = np.mgrid[0:10, 0:12]
+    theta = index * np.arctan2(-(rows - 4.5), columns - 5.5)
+    theta[2:-2, 2:-2] = np.nan
+    field = solve(sketch(np.ones((10, 12), bool), theta))
+    assert field.singularities.index.tolist() == [index]
+    assert field.singularities.row[0] == pytest.approx(4, abs=1)
+    assert field.singularities.column[0] == pytest.approx(5, abs=1)
+
+
+def test_large_grids_are_grown_by_local_updates():
+    # More than 8192 pixels. Two families are constant; a frame of strokes turns round one singularity.
+    rows, columns = np.mgrid[0:91, 0:92]
+    theta = np.where((rows == 20) | (rows == 60), np.radians(77), np.nan)
+    theta[(columns == 30) & (rows > 60)] = np.radians(127)
+    field = greedy(sketch(np.ones(theta.shape, bool), theta))
+    assert field.energy().total < 91 * 92 * 1e-6 * QUARTER**2
+    assert np.degrees(field.angle_between) == pytest.approx(50, abs=0.1)
+    around = np.arctan2(-(rows - 45.5), columns - 45.5) / 4
+    around[12:-12, 12:-12] = np.nan
+    field = greedy(sketch(np.ones(theta.shape, bool), around))
+    assert field.singularities.index.tolist() == [0.25]
+
+
+MOVES = {"turned": np.rot90, "mirrored": np.fliplr, "transposed": np.transpose}
+
+
+def same_cells(instance, moved, move):
+    """Whether pixels as near to two strokes, if any, went to the same stroke before and after the move."""
+    cells = np.full(instance.mask.shape, -1)
+    cells[instance.mask] = nearest_strokes(instance)
+    names = np.full(instance.mask.shape, -1)
+    names[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
+    order = move(names)[tuple(moved.stroke_pixels.T)]
+    return (np.append(order, -1)[nearest_strokes(moved)] == move(cells)[moved.mask]).all()
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_greedy_energy_is_that_of_the_moved_sketch(name):
+    compared = 0
+    for seed in range(60):
+        instance = random_instance(seed, strokes=4)
+        moved = getattr(instance, name)()
+        if same_cells(instance, moved, MOVES[name]):
+            compared += instance.grid.size > 9
+            assert greedy(moved).energy().total == pytest.approx(
+                greedy(instance).energy().total, rel=1e-6, abs=1e-9
+            )
+    assert compared > 5
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_power_energy_is_that_of_the_moved_sketch(name):
+    for seed in range(4):
+        instance = some_curves(12, seed)
+        moved = getattr(instance, name)()
+        assert power_field(moved).energy().total == pytest.approx(
+            power_field(instance).energy().total, rel=1e-6
+        )
+
+
+def test_turns_of_a_sketch_with_ties_have_close_energies():
+    instance = some_curves()
+    energies = [greedy(moved).energy().total for moved in (instance, instance.turned(), instance.mirrored())]
+    assert max(energies) < 1.2 * min(energies)
+
+
+@SOLVERS
+@given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
+@settings(deadline=None)
+def test_answers_are_inside_all_bounds(solve, seed, gauge):
+    field = solve(random_instance(seed, gauge=gauge))
+    assert_feasible(field)
+    assert np.isfinite(field.energy().total)
+
+
+@given(seed=SEEDS, w_beta=st.sampled_from([0, 1e-6, 1]), w_strokes=st.sampled_from([0, 1e-6, 1, 100]))
+@settings(deadline=None)
+def test_any_weights_will_do(seed, w_beta, w_strokes):
+    instance = replace(random_instance(seed), w_beta=w_beta, w_strokes=w_strokes)
+    assert_feasible(greedy(instance))
+    assert_feasible(power_field(instance))
+
+
+@SOLVERS
+def test_parts_without_strokes_are_constant_and_cost_nothing(solve):
+    mask = np.ones((5, 9), bool)
+    mask[:, 4] = False
+    theta = np.full(mask.shape, np.nan)
+    theta[:, 1] = 0.3
+    theta[2, :2] = 1.2
+    field = solve(sketch(mask, theta))
+    apart = field.image(field.alpha)[:, 5:]
+    assert np.ptp(apart) == pytest.approx(0, abs=1e-9)
+    assert field.image(field.pixel_energy)[:, 5:] == pytest.approx(np.zeros((5, 4)), abs=1e-15)
+
+
+def test_parts_do_not_know_of_each_other():
+    mask = np.ones((4, 9), bool)
+    mask[:, 4] = False
+    left, right = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan)
+    left[0], left[:, 0] = 0.3, 1.1
+    right[1], right[:, 6] = 2.3, 0.2
+    left[:, 4:], right[:, :4] = np.nan, np.nan
+    both = greedy(sketch(mask, np.where(np.isfinite(left), left, right))).energy().total
+    apart = [greedy(sketch(mask, theta)).energy().total for theta in (left, right)]
+    assert both == pytest.approx(sum(apart), rel=1e-3)
+
+
+@SOLVERS
+def test_same_instance_gives_the_same_bits(solve):
+    instance = some_curves()
+    one, two = solve(instance), solve(instance)
+    for name in ("alpha", "beta", "p"):
+        assert getattr(one, name).tobytes() == getattr(two, name).tobytes()
+
+
+def test_progress_counts_up_to_all_jumps():
+    seen = []
+    field = greedy(some_curves(), progress=lambda known, total: seen.append((known, total)))
+    known = [first for first, _ in seen]
+    assert known == sorted(set(known))
+    assert seen[-1] == (len(field.p), len(field.p))
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_answer_is_the_optimum_for_its_jumps(gauge):
+    field = greedy(some_curves().with_gauge(gauge))
+    assert fitted(field).energy().total == pytest.approx(field.energy().total, rel=1e-12)
+
+
+def test_answer_is_stationary_for_its_jumps():
+    field = greedy(some_curves(10))
+    least = least_energy(field.instance, field.p[None])[0]
+    assert np.abs(field.beta).max() < QUARTER - 1e-3
+    assert field.energy().total == pytest.approx(least, rel=1e-6)
+
+
+@for_each("seed", range(12))
+def test_never_below_the_optimum_over_all_jumps(seed):
+    instance = random_instance(seed, shape=(2, 3), strokes=3)
+    assert greedy(instance).energy().total >= exact(instance) - 1e-9
+
+
+def test_mostly_equal_to_the_optimum_over_all_jumps():
+    # A ring of eight pixels, with as many pairs.
+    ring = np.ones((3, 3), bool)
+    ring[1, 1] = False
+    ratio = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        theta = np.full((3, 3), np.nan)
+        theta.flat[rng.permutation([0, 1, 2, 3, 5, 6, 7, 8])[:3]] = rng.uniform(0, np.pi, 3)
+        instance = sketch(ring, theta, w_beta=1e-3)
+        ratio.append(greedy(instance).energy().total / exact(instance))
+    ratio = np.array(ratio)
+    assert (ratio > 1 - 1e-6).all()
+    assert (ratio < 1 + 1e-3).sum() >= 10, ratio
+
+
+def test_three_blocks_against_all_jumps():
+    theta = np.full((3, 3), np.nan)
+    theta[0, 0], theta[2, 2] = 0.2, 1.4
+    mask = np.ones((3, 3), bool)
+    mask[0, 2] = False
+    instance = sketch(mask, theta, w_beta=1e-3)
+    assert greedy(instance).energy().total == pytest.approx(exact(instance), rel=1e-6)
+
+
+def test_power_field_is_orthogonal():
+    assert (power_field(some_curves()).beta == 0).all()
+
+
+def test_power_field_of_one_stroke_among_two_pixels():
+    field = power_field(Instance("two", [[True, True]], [[0, 0]], [0.4], [1.0]))
+    assert field.alpha == pytest.approx([0.4, 0.4])
+
+
+def test_cells_go_round_the_hole_of_a_mask():
+    # The wall of '.' separates the right column from the nearer stroke on the left.
+    picture = ["#.#", "#.#", "###"]
+    mask = np.array([[pixel == "#" for pixel in row] for row in picture])
+    theta = np.full(mask.shape, np.nan)
+    theta[0, 0], theta[2, 2] = 0.1, 0.2
+    instance = sketch(mask, theta)
+    cells = np.full(mask.shape, -1)
+    cells[mask] = nearest_strokes(instance)
+    assert cells[:, 2].tolist() == [1, 1, 1]
+    assert cells[:2, 0].tolist() == [0, 0]
+
+
+def test_cells_do_not_leap_over_a_corner():
+    mask = np.eye(2, dtype=bool)
+    instance = sketch(mask, np.array([[0.3, np.nan], [np.nan, np.nan]]))
+    assert nearest_strokes(instance).tolist() == [0, -1]
+
+
+def test_dense_least_squares_agree_with_the_energy_of_a_field():
+    instance = random_instance(5, (2, 2), 2)
+    least = least_energy(instance, np.zeros((1, 4), int))[0]
+    rng = np.random.default_rng(0)
+    fields = [CrossField(instance, *rng.normal(0.5, 0.5, (2, 4)), np.zeros(4, int)) for _ in range(200)]
+    assert least <= min(field.energy().total for field in fields)
+
+
+@pytest.mark.parametrize("w_beta", [0.0, 1e-6, 1e6])
+def test_the_greatest_weights_are_solved(w_beta):
+    for instance in (sample("mouse", 8), Instance("one", [[True]], [[0, 0]], [2.0], [1.0])):
+        heavy = replace(instance, w_strokes=1e6, w_beta=w_beta)
+        for field in (greedy(heavy), power_field(heavy), search(heavy, rounds=1).field):
+            assert np.isfinite(field.energy().total)
+        assert np.abs(greedy(heavy).residual_r).max() < 1e-3

@@ -1,0 +1,137 @@
+"""Walks over jumps on odd instances: whatever updates lose, energies are those of their definition,
+and every walk ends.
+"""
+
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import GAUGES
+from crossfield.models.processes.deadline import Deadline
+from crossfield.models.search.free_field import free_bounds
+from crossfield.models.search.improvement import first_field, stroke_curves
+from crossfield.models.search.kicks import Kicks
+from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
+from crossfield.models.search.search import _Hunt
+from crossfield.models.search.walk import explore
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from threadpoolctl import threadpool_limits
+
+SEEDS = st.integers(0, 2**32 - 1)
+WEIGHTS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread():
+    """Small systems: on a busy machine threads would wait for each other."""
+    with threadpool_limits(1):
+        yield
+
+
+def odd_instance(seed):
+    """Any size up to 12 x 12, holes, parts without strokes, parallel or random strokes,
+    weights of any magnitude.
+    """
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(1, 13, 2)) < rng.choice([0.5, 0.8, 1.0])
+    mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
+    at = np.argwhere(mask)
+    at = at[np.sort(rng.permutation(len(at))[: max(1, round(len(at) * rng.choice([0.05, 0.2, 0.6])))])]
+    spread = rng.choice([0.0, 0.3, np.pi])
+    return cf.Instance(
+        "odd",
+        mask,
+        at,
+        rng.uniform(0, np.pi) + spread * rng.random(len(at)),
+        10.0 ** rng.uniform(rng.choice([-12, -3, 0]), 0, len(at)),
+        w_strokes=float(rng.choice(WEIGHTS)),
+        w_beta=float(rng.choice(WEIGHTS)),
+        gauge=str(rng.choice(GAUGES)),
+    )
+
+
+def definition(instance, x, p):
+    return CrossField(instance, *np.split(x, 2), p).energy().total
+
+
+def assert_as_defined(land):
+    """The energy of a landscape is that of its angles and jumps, and of the pulls on them."""
+    energy = definition(land.patch.instance, land.angles, land.p)
+    held = sum(_HOLD * (land._x[place] - bound) ** 2 for place, bound in land._held.items())
+    soft = float(land._soft @ land._x**2)
+    assert land.energy >= 0
+    assert land.energy == pytest.approx(energy + held + soft, rel=1e-9, abs=1e-9)
+
+
+def walked(instance, seed, kicks, steps):
+    """Kicks, and after each some steps of the best change of one jump; every point on the way is checked."""
+    field = first_field(instance)
+    patch = Patch.of(instance, np.ones(instance.grid.size, bool))
+    if not len(patch.pairs):
+        return
+    curve = np.full(instance.grid.size, -1)
+    curve[instance.stroke_index] = stroke_curves(instance)
+    land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
+    draw, rng = Kicks(patch, curve).draw, np.random.default_rng(seed)
+    for _ in range(kicks):
+        land.change(*draw(rng, land.p))
+        assert_as_defined(land)
+        for _ in range(steps):
+            gains = land.gains()
+            assert (land.energy + gains >= -1e-7 * (1 + land.energy)).all()
+            row, pair = np.unravel_index(np.argmin(gains), gains.shape)
+            land.change(np.array([pair]), STEPS[[row]])
+            assert_as_defined(land)
+
+
+def explored(instance, seed, kicks):
+    """What the patches of a round find, checked, and a round of the search."""
+    tasks = _Hunt(instance, seed, first_field(instance)).tasks(Deadline(np.inf))
+    lower, upper = free_bounds(instance)
+    for task in tasks:
+        better, whole = explore(replace(task, kicks=kicks))
+        assert whole
+        if better is not None:
+            assert 0 <= better.energy < definition(instance, task.x, task.p)
+            assert better.energy == pytest.approx(
+                definition(instance, better.x, better.p), rel=1e-9, abs=1e-9
+            )
+            assert (better.x >= lower).all()
+            assert (better.x <= upper).all()
+
+
+def searched(instance, seed, rounds):
+    found = cf.search(instance, rounds=rounds, seed=seed, jobs=1)
+    assert found.rounds <= rounds
+    assert found.ended in {"rounds", "patience"}
+    energies = [energy for _, energy in found.energies]
+    assert min(energies) >= 0
+    assert found.field.energy().total <= energies[0] * (1 + 1e-9) + 1e-9
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_energies_on_odd_instances_are_those_of_their_definition(seed):
+    instance = odd_instance(seed)
+    walked(instance, seed, kicks=3, steps=4)
+    explored(instance, seed, kicks=2)
+
+
+@pytest.mark.parametrize(
+    "name, size, seed", [("wave_sheet", 5, 0), ("bottle", 8, 0), ("cylinder_bend", 7, 1)]
+)
+def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size, seed):
+    walked(cf.sample(name, size), seed, kicks=60, steps=6)
+
+
+@pytest.mark.slow
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=50)
+def test_searches_of_odd_instances_end(seed):
+    instance = odd_instance(seed)
+    walked(instance, seed, kicks=12, steps=6)
+    explored(instance, seed, kicks=20)
+    searched(instance, seed, rounds=1)

@@ -1,0 +1,336 @@
+"""The search: its formulas against dense least squares, its answers against all jumps,
+and what it promises.
+"""
+
+import pickle
+
+import crossfield as cf
+import numpy as np
+import pytest
+from children import interrupted
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.processes.deadline import Deadline
+from crossfield.models.search.coarse import halved, prolonged
+from crossfield.models.search.greedy import greedy
+from crossfield.models.search.improvement import first_field, improved, stroke_curves
+from crossfield.models.search.kicks import Kicks
+from crossfield.models.search.landscape import STEPS, Landscape, Patch
+from crossfield.models.search.walk import Task, explore
+from exhaustive import exact, least_energy, random_instance, sketch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytestmark = pytest.mark.numeric
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def angles(field):
+    return np.concatenate([field.alpha, field.beta])
+
+
+def landscape(field, free=None):
+    size = field.instance.grid.size
+    patch = Patch.of(field.instance, np.ones(size, bool) if free is None else free)
+    return Landscape(patch, angles(field), field.p)
+
+
+def kicks_of(patch):
+    instance = patch.instance
+    curve = np.full(instance.grid.size, -1)
+    curve[instance.stroke_index] = stroke_curves(instance)
+    return Kicks(patch, curve)
+
+
+def gentle(seed):
+    """An instance whose strokes are so close in direction that no bound matters for small jumps."""
+    rng = np.random.default_rng(seed)
+    theta = np.where(rng.random((4, 5)) < 0.4, 1.0 + 0.2 * rng.random((4, 5)), np.nan)
+    theta[0, 0] = 1.0
+    return sketch(np.ones((4, 5), bool), theta, w_beta=0.1)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_gains_are_those_of_dense_least_squares(seed):
+    field = first_field(gentle(seed))
+    land = landscape(field)
+    gains = land.gains()
+    rng = np.random.default_rng(seed)
+    for pair in rng.integers(len(field.p), size=4):
+        for row, step in enumerate(STEPS):
+            p = field.p.copy()
+            p[pair] += step
+            assert land.energy + gains[row, pair] == pytest.approx(
+                least_energy(field.instance, p[None])[0], rel=1e-6
+            )
+
+
+@given(seed=SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_energy_after_many_changes_is_that_of_its_jumps(seed):
+    field = first_field(gentle(seed))
+    land = landscape(field)
+    rng = np.random.default_rng(seed)
+    kicks = kicks_of(land.patch)
+    start = land.saved()
+    for _ in range(6):
+        land.change(*kicks.draw(rng, land.p))
+    least = least_energy(field.instance, land.p[None])[0]
+    # Bounds only raise it; where none is met it is equal.
+    assert land.energy >= least - 1e-6
+    if not land._held:
+        assert land.energy == pytest.approx(least, rel=1e-6)
+    reached = CrossField(field.instance, *np.split(land.angles, 2), land.p).energy().total
+    assert land.energy == pytest.approx(reached, rel=1e-3)
+    land.restore(start)
+    assert land.energy == start.energy
+    assert (land.p == field.p).all()
+
+
+def test_bounds_hold_after_changes():
+    field = first_field(random_instance(4, shape=(5, 6), strokes=12))
+    land = landscape(field)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(0)
+    for _ in range(30):
+        land.change(*kicks.draw(rng, land.p))
+        beta = np.split(land.angles, 2)[1]
+        assert np.abs(beta).max() < QUARTER + 1e-2
+
+
+def test_angles_outside_the_patch_stay():
+    field = first_field(cf.sample("mouse", 12))
+    grid = field.instance.grid
+    free = grid.columns < 6
+    land = landscape(field, free)
+    assert land.energy == pytest.approx(field.energy().total, rel=1e-6)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(3)
+    for _ in range(5):
+        land.change(*kicks.draw(rng, land.p))
+    outside = np.concatenate([~free, ~free])
+    assert (land.angles[outside] == angles(field)[outside]).all()
+    across = ~(free[grid.first] & free[grid.second])
+    assert (land.p[across] == field.p[across]).all()
+
+
+def turns(instance, p):
+    bottom, side, top, left = instance.grid.blocks.T
+    return p[bottom] + p[side] - p[top] - p[left]
+
+
+def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
+    field = first_field(cf.sample("ring", 14))
+    land = landscape(field)
+    kicks, rng = kicks_of(land.patch), np.random.default_rng(5)
+    before = turns(field.instance, field.p)
+    moved = set()
+    for _ in range(200):
+        for change, most in ((kicks.turn(rng), 0), (kicks.shift(rng, field.p), 2)):
+            pairs, steps = change
+            assert len(pairs) == len(set(pairs.tolist()))
+            p = field.p.copy()
+            p[land.patch.pairs[pairs]] += steps
+            changed = turns(field.instance, p) - before
+            assert (changed != 0).sum() <= most
+            moved.add(int(np.abs(changed).sum()))
+    assert moved >= {0, 1, 2}
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_search_finds_the_optimum_over_all_jumps(seed):
+    instance = random_instance(seed, shape=(2, 3), strokes=6)
+    field = cf.search(instance, rounds=2).field
+    least = exact(instance)
+    assert field.energy().total >= least - 1e-9
+    if np.abs(field.beta).max() < QUARTER - 1e-3:
+        assert field.energy().total == pytest.approx(least, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["skew", "singular", "bottle"])
+def test_search_is_never_above_what_it_starts_from(name):
+    instance = cf.sample(name, 10)
+    start = cf.power_field(instance)
+    found = cf.search(instance, rounds=1, start=start).field
+    for other in (greedy(instance), first_field(instance), start):
+        assert found.energy().total <= other.energy().total + 1e-9
+    assert (np.abs(found.beta) <= QUARTER).all()
+    assert (found.alpha >= instance.alpha_lower).all()
+    assert (found.alpha <= instance.alpha_upper).all()
+
+
+def test_search_gets_below_the_greedy_field():
+    instance = cf.sample("mouse", 24)
+    found = cf.search(instance, rounds=4)
+    assert found.field.energy().total < 0.99 * first_field(instance).energy().total
+    energies = [energy for _, energy in found.energies]
+    assert energies[-1] == pytest.approx(found.field.energy().total, rel=1e-6)
+    assert energies == sorted(energies, reverse=True)
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
+    instance = cf.sample("mouse", 14).with_gauge(gauge)
+    fields = [cf.search(instance, rounds=2, seed=7, jobs=jobs).field for jobs in (1, 2, 2)]
+    for name in ("alpha", "beta", "p"):
+        assert len({getattr(field, name).tobytes() for field in fields}) == 1
+
+
+def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
+    instance = cf.sample("mouse", 40)
+    seen = []
+    found = cf.search(instance, rounds=2, progress=lambda rounds, energy: seen.append((rounds, energy)))
+    assert found.field.energy().total < first_field(instance).energy().total
+    assert (found.rounds, found.ended) == (2, "rounds")
+    assert [rounds for rounds, _ in seen] == [1, 2]
+
+
+def test_search_ends_by_itself_when_nothing_is_found():
+    found = cf.search(cf.sample("skew", 6))
+    assert found.ended == "patience"
+    assert found.field.energy().total < 1e-4
+
+
+@pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
+def test_a_search_without_time_gives_a_field_within_its_bounds(name):
+    instance = cf.sample(name, 24)
+    found = cf.search(instance, seconds=1e-9, jobs=1)
+    assert (found.rounds, found.ended) == (0, "time")
+    assert (np.abs(found.field.beta) <= QUARTER).all()
+    assert (found.field.alpha >= instance.alpha_lower).all()
+    assert (found.field.alpha <= instance.alpha_upper).all()
+
+
+def test_a_deadline_that_is_far_changes_no_bit():
+    instance = cf.sample("ring", 10)
+    fields = [cf.search(instance, rounds=1, seconds=seconds, jobs=1).field for seconds in (None, 1e9)]
+    assert fields[0].alpha.tobytes() == fields[1].alpha.tobytes()
+
+
+class Hourglass:
+    """Time that is over after it has been asked for so many times, and how often it was asked."""
+
+    def __init__(self, grains):
+        self.grains, self.asked = grains, 0
+
+    def __call__(self):
+        self.asked += 1
+        return self.asked > self.grains
+
+
+WORK = {
+    "greedy": lambda over: greedy(cf.sample("mouse", 16), over=over),
+    "improved": lambda over: improved(greedy(cf.sample("mouse", 16)), over),
+    "prolonged": lambda over: prolonged(
+        first_field(halved(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
+    ),
+}
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_work_ends_soon_after_its_time_and_gives_a_field(work):
+    whole = Hourglass(np.inf)
+    WORK[work](whole)
+    assert whole.asked > 10
+    for grains in (0, 3, whole.asked // 2):
+        time = Hourglass(grains)
+        assert np.isfinite(WORK[work](time).energy().total)
+        assert time.asked - grains <= 8
+
+
+def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
+    field = first_field(cf.sample("mouse", 12))
+    free, curve = np.ones(field.instance.grid.size, bool), np.full(field.instance.grid.size, -1)
+    task = Task(
+        field.instance,
+        angles(field),
+        field.p,
+        free,
+        curve,
+        kicks=10**9,
+        seed=(0,),
+        deadline=Deadline.after(0.0),
+    )
+    assert explore(task) == (None, False)
+
+
+def test_a_deadline_in_another_process_says_what_was_left_when_it_was_sent():
+    clock = iter([10.0, 13.0]).__next__
+    arrived = pickle.loads(pickle.dumps(Deadline.after(5.0, clock)))
+    assert 1.0 < arrived.left() <= 2.0
+    assert pickle.loads(pickle.dumps(Deadline(np.inf))).left() == np.inf
+
+
+@pytest.mark.parametrize("given", [{"seconds": 0}, {"seconds": np.nan}, {"rounds": -1}, {"jobs": 0}])
+def test_limits_that_cannot_be_are_refused(given):
+    with pytest.raises(cf.CrossfieldError, match="positive"):
+        cf.search(cf.sample("skew", 6), **given)
+
+
+CHILD = """
+import crossfield as cf
+if True:
+    instance = cf.sample("mouse", 16)
+    found = cf.search(instance, jobs=2, progress=lambda rounds, energy: print(rounds, flush=True))
+    print(found.ended, found.field.energy().total)
+"""
+
+
+@pytest.mark.slow
+def test_ctrl_c_gives_the_best_field_so_far():
+    ended, energy = interrupted(CHILD)
+    assert ended == "interrupted"
+    assert float(energy) <= first_field(cf.sample("mouse", 16)).energy().total + 1e-9
+
+
+@given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
+@settings(deadline=None, max_examples=30)
+def test_improved_fields_are_no_worse_and_stay_improved(seed, gauge):
+    field = greedy(random_instance(seed, gauge=gauge))
+    better = improved(field)
+    assert better.energy().total <= field.energy().total
+    assert improved(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
+
+
+def test_a_constant_field_stays_constant_on_finer_grids():
+    theta = np.full((9, 7), np.nan)
+    theta[2], theta[6], theta[3:6, 3] = 0.3, 0.3, 1.6
+    fine = sketch(np.ones(theta.shape, bool), theta)
+    coarse = halved(fine)
+    assert coarse.mask.shape == (5, 4)
+    field = prolonged(first_field(coarse), fine)
+    assert field.energy().total < fine.grid.size * fine.w_beta
+    assert not len(field.singularities.index)
+
+
+def test_smooth_energy_is_the_same_on_both_grids():
+    # A quarter turn of the frame round the middle, with the exact field in between on both grids.
+    rows, columns = np.mgrid[0:32, 0:32]
+    around = np.arctan2(-(rows - 15.5), columns - 15.5) / 4
+    theta = np.where((rows - 15.5) ** 2 + (columns - 15.5) ** 2 > 14**2, around, np.nan)
+    fine = sketch(np.ones(theta.shape, bool), theta)
+    field, above = first_field(fine), first_field(halved(fine))
+    assert field.singularities.index.tolist() == above.singularities.index.tolist() == [0.25]
+    assert prolonged(above, fine).singularities.index.tolist() == [0.25]
+    assert prolonged(above, fine).energy().total == pytest.approx(field.energy().total, rel=0.01)
+
+
+def test_crossing_strokes_leave_no_coarse_stroke():
+    theta = np.array([[0.0, HALF], [HALF, 0.0]])
+    assert halved(sketch(np.ones((2, 2), bool), theta)) is None
+
+
+@pytest.mark.parametrize("w_beta", [0.0, 1e-6])
+def test_parts_without_strokes_and_free_skews_do_no_harm(w_beta):
+    mask = np.ones((6, 11), bool)
+    mask[:, 5] = False
+    theta = np.full(mask.shape, np.nan)
+    theta[:, 1], theta[2, 2:5], theta[4, 3] = 0.3, 1.2, 2.5
+    found = cf.search(sketch(mask, theta, w_beta=w_beta), rounds=4).field
+    assert found.energy().total <= first_field(found.instance).energy().total + 1e-9
+    assert found.image(found.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)
+
+
+def test_a_single_pixel_is_a_search_of_nothing():
+    found = cf.search(cf.Instance("one", [[True]], [[0, 0]], [2.0], [1.0]))
+    assert (found.ended, found.field.energy().total) == ("patience", 0)

@@ -1,0 +1,158 @@
+"""The built-in samples: complete, drawn as they say, and good instances at every size."""
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from crossfield.models.errors import InputError
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.angles import line_difference
+from crossfield.models.sketch.samples import SAMPLES, sample, sample_svg, samples
+from crossfield.models.sketch.surfaces import SURFACES, analytic
+from crossfield.models.sketch.svg import read_svg
+from loops import for_each
+from scipy import ndimage
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
+
+SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
+ANALYTIC = [each.name for each in samples() if each.kind == "analytic"]
+
+
+def test_the_table_lists_every_drawing_and_every_surface():
+    drawings = {
+        path.name.removesuffix(".svg")
+        for path in files("crossfield.models.sketch").joinpath("drawings").iterdir()
+    }
+    assert set(SKETCHES) == drawings
+    assert set(ANALYTIC) == set(SURFACES)
+    assert list(SAMPLES) == [each.name for each in samples()]
+    assert {"cylinder_bend", "mouse", "bottle", "saddle", "skew", "singular"} <= drawings
+    for each in samples():
+        assert each.description
+        assert "\n" not in each.description
+
+
+@pytest.mark.parametrize("name", SKETCHES)
+def test_the_colours_are_those_of_the_description(name):
+    curves = read_svg(sample_svg(name).encode())
+    mixed = "red" in SAMPLES[name].description
+    assert curves.red.any() == mixed
+    assert not curves.red.all()
+    assert curves.canvas is not None
+    x, y, width, height = curves.canvas
+    corners = curves.points.reshape(-1, 2)
+    assert (corners >= (x, y)).all()
+    assert (corners <= (x + width, y + height)).all()
+
+
+def test_there_are_drawings_in_one_and_in_two_colours():
+    mixed = [bool(read_svg(sample_svg(name).encode()).red.any()) for name in SKETCHES]
+    assert sum(mixed) >= 2
+    assert sum(mixed) <= len(mixed) - 2
+
+
+@for_each("name", list(SAMPLES))
+@for_each("size", [8, 16, 24, 48, 96])
+def test_every_sample_is_one_connected_region_with_enough_strokes(name, size):
+    instance = sample(name, size)
+    assert max(instance.mask.shape) == size
+    assert instance.name == name
+    assert instance.grid.parts == 1
+    if size >= 24:
+        assert 0.2 < instance.mask.mean() <= 1
+        assert 0.1 < len(instance.theta) / instance.grid.size < 0.85
+        # Both families are there: even the flattest sample has lines 65 degrees apart.
+        assert np.ptp(instance.theta) > np.radians(60)
+
+
+@pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
+def test_samples_are_the_same_each_time_and_take_a_gauge(name):
+    assert sample(name, 20).sha256 == sample(name, 20).sha256
+    assert sample(name).sha256 == sample(name, 24, "strokes").sha256
+    assert sample(name, 20, gauge="box").gauge == "box"
+    assert sample(name, 20, gauge="box").with_gauge("strokes").sha256 == sample(name, 20).sha256
+
+
+def test_a_computed_sample_is_the_analytic_instance():
+    assert sample("torus_patch", 20).sha256 == analytic("torus_patch", 20).instance.sha256
+
+
+@pytest.mark.parametrize("size", [24, 48])
+def test_the_skewed_sheet_has_a_constant_answer_without_energy(size):
+    instance = sample("skew", size)
+    u, v = np.radians(12), np.radians(77)
+    clear = instance.w > 0.9
+    assert clear.sum() > 0.3 * len(clear)
+    near = np.minimum(
+        line_difference(instance.theta, np.full_like(instance.theta, u)),
+        line_difference(instance.theta, np.full_like(instance.theta, v)),
+    )
+    assert np.degrees(near[clear]).max() < 6
+    assert np.degrees(np.median(near)) < 0.5
+    beta = (np.pi / 2 - (v - u)) / 2
+    field = CrossField(
+        instance,
+        np.full(instance.grid.size, u - beta),
+        np.full(instance.grid.size, beta),
+        np.zeros(len(instance.grid.first)),
+    )
+    assert field.energy().smooth < 1e-20
+    assert field.cross_error(np.full(1, u), np.full(1, v)).max() < 1e-12
+
+
+def power_field(instance):
+    """exp(4 i angle) spread from the strokes by a Laplace equation: a cross at every pixel,
+    on the mask as a picture.
+    """
+    grid = instance.grid
+    n = grid.size
+    pair = coo_matrix((np.ones(len(grid.first)), (grid.first, grid.second)), (n, n))
+    pair = pair + pair.T
+    laplace = diags(np.asarray(pair.sum(axis=1)).ravel()) - pair
+    weight = np.zeros(n)
+    weight[instance.stroke_index] = instance.w
+    goal = np.zeros(n, dtype=complex)
+    goal[instance.stroke_index] = np.exp(4j * instance.theta)
+    picture = np.full(instance.mask.shape, np.nan + 0j)
+    picture[instance.mask] = spsolve((laplace + diags(weight)).tocsc().astype(complex), weight * goal)
+    return picture
+
+
+def turns(picture, top, left, bottom, right):
+    """Turns of the cross on a counter-clockwise walk round a rectangle of pixels (y up)."""
+    down = [(row, left) for row in range(top, bottom)]
+    across = [(bottom, column) for column in range(left, right)]
+    up = [(row, right) for row in range(bottom, top, -1)]
+    back = [(top, column) for column in range(right, left, -1)]
+    walk = np.array([picture[at] for at in (*down, *across, *up, *back)])
+    assert not np.isnan(walk).any()
+    return np.angle(np.roll(walk, -1) / walk).sum() / (2 * np.pi) / 4
+
+
+@pytest.mark.parametrize("size", [32, 48, 64])
+def test_the_rounded_cube_has_a_singularity_of_a_quarter_at_its_corner(size):
+    picture = power_field(sample("singular", size))
+    height, width = picture.shape
+    box = [round(height * 0.3), round(width * 0.35), round(height * 0.62), round(width * 0.72)]
+    assert turns(picture, *box) == pytest.approx(0.25, abs=1e-9)
+    assert turns(
+        picture, round(height * 0.6), round(width * 0.2), round(height * 0.75), round(width * 0.4)
+    ) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_ring_keeps_its_hole_and_the_bend_no_end_cap():
+    ring = sample("ring", 48).mask
+    hole = ndimage.binary_fill_holes(ring) & ~ring
+    assert 0.03 < hole.mean() < 0.3
+    pipe = sample("cylinder_bend", 48).mask
+    assert not pipe[-8:].any()  # the cap has an outline and no curvature lines
+
+
+def test_unknown_names_are_refused_with_the_choice():
+    with pytest.raises(InputError, match="no sample 'sphere'; choose one of cylinder_bend, mouse"):
+        sample("sphere")
+    with pytest.raises(InputError, match="'wave_sheet' is computed, not drawn; choose one of cylinder_bend"):
+        sample_svg("wave_sheet")
+    with pytest.raises(InputError, match="size is 0"):
+        sample("mouse", 0)

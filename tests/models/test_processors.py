@@ -1,0 +1,58 @@
+"""The same instances on every kind of processor: other kernels of OpenBLAS, NumPy without its faster loops,
+a C library without FMA.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from crossfield.models.instance.elementary import arctangent, cosine, sine
+
+HASHES = """
+import json
+import crossfield as cf
+from crossfield.models.sketch.samples import SAMPLES
+names = [name for name in SAMPLES if name not in {"skew", "saddle", "singular"}]
+print(json.dumps({name: cf.sample(name, 10).sha256 for name in names}))
+"""
+PLAIN = {
+    "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
+}
+PROCESSORS = [
+    {"OPENBLAS_CORETYPE": "Haswell"},
+    {"OPENBLAS_CORETYPE": "Nehalem"},
+    {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN,
+]
+
+
+def hashes_on(processor):
+    found = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", HASHES],
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor,
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    return json.loads(found.stdout)
+
+
+def test_samples_are_the_same_on_every_processor():
+    first, *others = (hashes_on(processor) for processor in PROCESSORS)
+    assert len(first) == 7
+    for processor, other in zip(PROCESSORS[1:], others, strict=True):
+        assert other == first, processor
+
+
+def test_elementary_functions_are_right():
+    rng = np.random.default_rng(0)
+    angle = np.concatenate(
+        [rng.uniform(-7, 7, 10_000), rng.uniform(-1e6, 1e6, 10_000), np.arange(-8, 9) * np.pi / 4]
+    )
+    assert sine(angle) == pytest.approx(np.sin(angle), rel=0, abs=1e-15)
+    assert cosine(angle) == pytest.approx(np.cos(angle), rel=0, abs=1e-15)
+    y, x = rng.normal(size=(2, 10_000)) * 10.0 ** rng.integers(-9, 10, (2, 10_000))
+    y, x = np.concatenate([y, [0, 0, 0, 1, -1, 1]]), np.concatenate([x, [0, 1, -1, 0, 0, 1]])
+    assert arctangent(y, x) == pytest.approx(np.arctan2(y, x), rel=1e-15, abs=1e-15)

@@ -1,0 +1,194 @@
+"""What comments, docstrings and pages cite is there: rules, sections, tests, files and links;
+and every page is reached from the index.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from functools import cache
+from pathlib import Path
+
+ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists())
+PARTS = ("models", "export", "templates", "docs", "tests")
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+NOT_HERE = (
+    "formats.md",
+    "domain notes",
+    "formulation notes",
+    "the project's notes",
+    "../shared",
+    "the brief",
+    "design.md",
+)
+"""What only those had who wrote the first version."""
+
+
+@cache
+def modules() -> list[Path]:
+    """Every module of the repository, and the layouts that stand for text."""
+    found = [path for part in PARTS for path in (ROOT / part).rglob("*") if path.suffix in {".py", ".j2"}]
+    return sorted([*ROOT.glob("*.py"), *found])
+
+
+@cache
+def said(path: Path) -> str:
+    """Comments and docstrings of a module; all of a page or layout."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return text
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = [
+        token.string for token in tokens if token.type == tokenize.COMMENT and "noqa" not in token.string
+    ]
+    tree = ast.parse(text)
+    strings = [
+        node.value.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    ]
+    return "\n".join([*comments, *strings])
+
+
+def place(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def rules(text: str) -> list[str]:
+    """The numbers of rules that a text cites, ranges as in M1-M3 written out."""
+    found: list[str] = []
+    for letter, first, last in re.findall(r"\b([LMGNBOQWR])(\d{1,2})(?:-\1?(\d{1,2}))?\b", text):
+        found += [f"{letter}{number}" for number in range(int(first), int(last or first) + 1)]
+    return found
+
+
+def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
+    page = (ROOT / "docs" / "format-rules.md").read_text().partition("<!-- traps:")[0]
+    listed = re.findall(r"^\| ([LMGNBOQWR]\d+) \|", page, re.MULTILINE)
+    assert len(set(listed)) == len(listed) > 80
+    cited = {
+        (place(path), rule)
+        for path in modules()
+        if path.is_relative_to(ROOT / "export") or path.is_relative_to(ROOT / "templates")
+        for rule in rules(said(path))
+    }
+    assert len(cited) > 40
+    assert {(where, rule) for where, rule in cited if rule not in listed} == set()
+    pages = {
+        (place(path), rule)
+        for path in PAGES
+        for rule in re.findall(r"\b[LMGNBOQW]\d{1,2}\b", path.read_text())
+    }
+    assert {(where, rule) for where, rule in pages if rule not in listed} == set()
+
+
+def test_nothing_is_cited_that_only_others_have():
+    found = [
+        (place(path), words)
+        for path in [*modules(), *PAGES]
+        for words in NOT_HERE
+        if words in " ".join(said(path).split()) and path != Path(__file__).resolve()
+    ]
+    assert found == []
+
+
+def test_cited_pages_and_their_sections_are_there():
+    sections = re.findall(r"^## (\d+)\.", (ROOT / "docs" / "mathematics.md").read_text(), re.MULTILINE)
+    assert sections == [str(number) for number in range(1, len(sections) + 1)]
+    for path in modules():
+        text = " ".join(said(path).split())
+        for page in re.findall(r"\bdocs/[\w-]+\.md\b", text):
+            assert (ROOT / page).exists(), (place(path), page)
+        for numbers in re.findall(r"docs/mathematics\.md, (\d+(?:(?:,| and| to) \d+)*)", text):
+            assert set(re.findall(r"\d+", numbers)) <= set(sections), (place(path), numbers)
+
+
+def test_tests_that_pages_name_are_there():
+    named = {(place(path), test) for path in PAGES for test in re.findall(r"`(test_\w+)`", path.read_text())}
+    assert len(named) > 60
+    tests = {
+        name
+        for path in (ROOT / "tests").rglob("test_*.py")
+        for name in re.findall(r"def (test_\w+)", path.read_text())
+    }
+    assert {(page, test) for page, test in named if test not in tests} == set()
+
+
+def anchor(title: str) -> str:
+    """The anchor of a heading, as GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
+
+
+def test_links_lead_to_files_and_headings():
+    for path in PAGES:
+        for link in re.findall(r"\]\(([^)\s]+)\)", path.read_text()):
+            if link.startswith(("https:", "http:", "mailto:")):
+                continue
+            file, _, heading = link.partition("#")
+            target = (path.parent / file).resolve() if file else path
+            assert target.exists(), (place(path), link)
+            if heading:
+                titles = re.findall(r"^#+ (.+)$", target.read_text(), re.MULTILINE)
+                assert heading in map(anchor, titles), (place(path), link)
+
+
+def test_paths_that_pages_and_comments_name_are_there():
+    """Words like `export/formats/lp.py` or `models/search/`, with NAME for any name,
+    and modules by their dotted name.
+    """
+    path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
+    missing = []
+    for path in [*PAGES, *modules()]:
+        for found in path_like.findall(said(path)):
+            if path.suffix == ".j2" or (path.suffix == ".py" and "." not in found.rpartition("/")[2]):
+                # layouts name each other from their own folder, and in code words with a / may be anything
+                continue
+            if not any(ROOT.glob(found.rstrip("/").replace("NAME", "*"))):
+                missing.append((place(path), found))
+        for dotted in re.findall(
+            r"\bcrossfield\.((?:models|export|templates)[a-z_0-9.]*[a-z_0-9])", said(path)
+        ):
+            target = ROOT.joinpath(*dotted.split("."))
+            if not (target.is_dir() or target.with_suffix(".py").exists()):
+                missing.append((place(path), dotted))
+    assert missing == []
+
+
+def test_modules_that_comments_name_without_a_folder_are_there():
+    """Words like `worker.py`; numpy.py is a file that a user may have by mistake."""
+    there = {path.name for path in modules()} | {"numpy.py"}
+    named = {
+        (place(path), name)
+        for path in modules()
+        for name in re.findall(r"(?<![\w/.*<{-])([a-z_]+\.py)\b", said(path))
+    }
+    assert len(named) > 10
+    assert {(where, name) for where, name in named if name not in there} == set()
+
+
+def test_the_index_leads_to_every_page_and_every_page_back():
+    index = (ROOT / "docs" / "index.md").read_text()
+    for path in PAGES:
+        if path.name in {"index.md", "README.md"}:
+            continue
+        link = path.name if path.parent.name == "docs" else f"../{path.name}"
+        assert re.search(rf"^- \[[^]]+\]\({re.escape(link)}\): .+[?.]$", index, re.MULTILINE), place(path)
+        back = "index.md" if path.parent.name == "docs" else "docs/index.md"
+        assert f"({back})" in path.read_text()[:700], place(path)
+    assert "(docs/index.md)" in (ROOT / "README.md").read_text()
+
+
+def test_every_word_of_the_glossary_stands_once_and_in_order():
+    words = re.findall(r"^\| ([^|]+?) \| ", (ROOT / "docs" / "glossary.md").read_text(), re.MULTILINE)[2:]
+    assert len(words) > 50
+    assert words == sorted(words, key=str.lower)
+    assert len(set(words)) == len(words)
+
+
+def test_commands_have_one_form_that_of_an_activated_environment():
+    for path in PAGES:
+        assert re.findall(r"\.venv/bin/(?!activate\b)\S*", path.read_text()) == [], place(path)

@@ -1,0 +1,39 @@
+"""The spellings that our writers use are read alike by every program;
+docs/format-rules.md tells of the others.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists())
+
+
+@pytest.fixture(scope="module")
+def traps():
+    """The program with the files and the programs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "docs")
+        return import_module("traps")
+
+
+def test_the_page_tells_of_every_trap(traps):
+    page = (ROOT / "docs" / "format-rules.md").read_text()
+    rows = re.findall(
+        r"^\| ([LMW]\d+) \| (.+?) \| ([\w-]+) \|", page.partition("<!-- traps:")[2], re.MULTILINE
+    )
+    assert rows == [(trap.rule, trap.what, traps.meaning(trap)) for trap in traps.TRAPS]
+
+
+@pytest.mark.oracles
+def test_what_our_writers_write_is_read_as_it_is_meant(traps):
+    assert {"HiGHS"} <= set(traps.present())
+    for trap in (trap for trap in traps.TRAPS if trap.good):
+        quadratic = "^" in trap.text or "QUADOBJ" in trap.text
+        for title in traps.present():
+            if not (quadratic and title in {"GLPK", "CBC"}):  # they take linear models only
+                assert traps.answer(title, trap) == pytest.approx(trap.meant, abs=1e-6), (trap.what, title)

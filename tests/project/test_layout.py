@@ -1,0 +1,91 @@
+"""The wheel: everything of the tree that is needed, nothing that is not, and one top-level name."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import places
+import pytest
+
+ROOT = places.ROOT
+PARTS = ("models", "export", "templates")
+DATA = (".svg", ".json", ".toml", ".j2", ".css", ".js", ".typed")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """Names of the files in a wheel that was built from a copy of the tree."""
+    pytest.importorskip("build")
+    if not (ROOT / "pyproject.toml").exists():
+        pytest.skip("the tests do not lie in a source tree")
+    tree = tmp_path_factory.mktemp("build") / "crossfield"
+    left_out = shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "__pycache__")
+    shutil.copytree(ROOT, tree, ignore=left_out)
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", "dist", "."]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (built,) = (tree / "dist").glob("*.whl")
+    with zipfile.ZipFile(built) as archive:
+        return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+
+
+def in_tree():
+    """What belongs into the wheel: every module and every data file of the package's parts."""
+    files = [*ROOT.glob("*.py"), ROOT / "py.typed"]
+    for part in PARTS:
+        files += [path for path in (ROOT / part).rglob("*") if path.suffix in {".py", *DATA}]
+    return {f"crossfield/{path.relative_to(ROOT).as_posix()}": path.read_bytes() for path in files}
+
+
+def of_package(wheel):
+    return {name: content for name, content in wheel.items() if ".dist-info/" not in name}
+
+
+def test_the_wheel_holds_the_tree_byte_by_byte(wheel):
+    expected, found = in_tree(), of_package(wheel)
+    assert sorted(expected) == sorted(found)
+    assert all(found[name] == content for name, content in expected.items())
+
+
+def test_every_kind_of_file_is_there(wheel):
+    names = of_package(wheel)
+    for suffix, least in ((".py", 40), (".schema.json", 3), (".svg", 5), (".j2", 3), ("py.typed", 1)):
+        assert sum(name.endswith(suffix) for name in names) >= least
+
+
+def test_crossfield_is_the_only_top_level_name(wheel):
+    tops = {name.split("/")[0] for name in wheel}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"crossfield"}
+    assert len(tops) == 2
+
+
+def test_neither_tests_nor_docs_are_installed(wheel):
+    assert not [
+        name
+        for name in wheel
+        if "/tests/" in name or "/docs/" in name or "conftest" in name or "/test_" in name
+    ]
+
+
+def test_the_wheel_names_its_licence_and_its_command(wheel):
+    facts = {
+        name.split(".dist-info/")[1]: content.decode()
+        for name, content in wheel.items()
+        if ".dist-info/" in name
+    }
+    assert "crossfield = crossfield.export.cli.app:main" in facts["entry_points.txt"]
+    assert "licenses/LICENSE" in facts
+    assert "License-Expression: MIT" in facts["METADATA"]
+    assert "Root-Is-Purelib: true" in facts["WHEEL"]
+
+
+def test_the_layers_point_one_way():
+    """Modules of `models` never import from `export` or `templates`."""
+    upwards = re.compile(r"from \.+(export|templates)\b|crossfield\.(export|templates)")
+    paths = sorted((ROOT / "models").rglob("*.py"))
+    assert len(paths) > 40
+    assert [path for path in paths if upwards.search(path.read_text())] == []

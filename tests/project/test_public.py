@@ -1,0 +1,173 @@
+"""The face of the package: its names, their docstrings, and what importing it costs."""
+
+import inspect
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import FunctionType
+
+import crossfield
+import pytest
+
+ROOT = Path(crossfield.__file__).parent
+MODULES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for part in ("models", "export")
+    for path in sorted((ROOT / part).rglob("*.py"))
+    if path.name != "__init__.py"
+]
+NOT_IMPORTED = "casadi_driver"  # a program; it is read as text below
+
+
+def test_every_module_is_looked_at_however_deep_it_lies():
+    assert len(MODULES) > 100
+    assert any(name.count(".") > 1 for name in MODULES)
+
+
+def loaded_after(code):
+    """Top-level names of the modules that are loaded after some lines of Python in a fresh process."""
+    command = [
+        sys.executable,
+        "-c",
+        f"import sys\n{code}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_the_public_names_are_sorted_and_there():
+    assert list(crossfield.__all__) == sorted(crossfield.__all__)
+    assert len(set(crossfield.__all__)) == len(crossfield.__all__) > 25
+    for name in crossfield.__all__:
+        assert getattr(crossfield, name) is not None
+    assert set(crossfield.__all__) <= set(dir(crossfield))
+    with pytest.raises(AttributeError, match="no attribute 'wings'"):
+        _ = crossfield.wings
+
+
+def test_all_steps_from_a_sketch_to_a_picture_are_public():
+    wanted = (
+        "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw "
+        "two_stage run greedy sample"
+    )
+    assert set(wanted.split()) <= set(crossfield.__all__)
+
+
+def test_type_checkers_see_the_same_names():
+    """The names that are imported for type checkers only are those of the table."""
+    text = (ROOT / "__init__.py").read_text()
+    static = {
+        line.split(" as ")[1].strip(" ,()")
+        for line in text.splitlines()
+        if " as " in line and "import" in line
+    }
+    assert static == set(crossfield.__all__)
+
+
+def documented():
+    for name in crossfield.__all__:
+        yield name, getattr(crossfield, name)
+    for module_name in MODULES:
+        if module_name.endswith(NOT_IMPORTED):
+            continue
+        module = _module(f"crossfield.{module_name}")
+        if module is None:
+            continue
+        yield module_name, module
+        for name, thing in vars(module).items():
+            if name.startswith("_") or getattr(thing, "__module__", None) != module.__name__:
+                continue
+            if inspect.isclass(thing) or inspect.isfunction(thing):
+                yield f"{module_name}.{name}", thing
+            if inspect.isclass(thing):
+                yield from _methods(f"{module_name}.{name}", thing)
+
+
+def _module(name):
+    """The module, or None when it is about a program that is not installed here."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("crossfield"):
+            raise
+        return None
+
+
+def _methods(path, thing):
+    for name, member in vars(thing).items():
+        function = member.fget if isinstance(member, property) else getattr(member, "func", member)
+        if (
+            not name.startswith("_")
+            and isinstance(function, FunctionType)
+            and function.__qualname__.startswith(thing.__name__)
+        ):
+            yield f"{path}.{name}", function
+
+
+def test_everything_public_says_what_it_is_in_a_first_sentence():
+    found = list(documented())
+    assert len(found) > 250
+    faults = [name for name, thing in found if not _opens_with_a_sentence(inspect.getdoc(thing) or "-")]
+    assert faults == []
+
+
+def _opens_with_a_sentence(text):
+    """It begins like one, and one of its first two lines ends like one or goes on with details."""
+    lines = text.partition("\n\n")[0].splitlines()[:2]
+    return bool(re.match(r"[A-Z0-9`.]", lines[0])) and any(line[-1] in ".:" for line in lines)
+
+
+SOLVERS_AND_LAYOUT = {
+    "jinja2",
+    "matplotlib",
+    "pyomo",
+    "casadi",
+    "highspy",
+    "pyscipopt",
+    "gurobipy",
+    "rich",
+    "typer",
+}
+
+
+def test_the_models_know_no_solver_and_no_template():
+    imports = "\n".join(f"import crossfield.{name}" for name in MODULES if name.startswith("models."))
+    loaded = loaded_after(imports)
+    assert {"numpy", "sympy"} <= loaded
+    assert not loaded & SOLVERS_AND_LAYOUT
+
+
+def test_the_models_import_nothing_of_export():
+    code = "import crossfield\n" + "\n".join(
+        f"import crossfield.{name}" for name in MODULES if name.startswith("models.")
+    )
+    command = [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules)"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert not [name for name in done.stdout.split() if name.startswith("crossfield.export")]
+
+
+def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
+    loaded = loaded_after("import crossfield as cf\ncf.greedy(cf.sample('skew', 6))")
+    assert not loaded & SOLVERS_AND_LAYOUT
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    loaded = loaded_after("import crossfield")
+    assert not loaded & (SOLVERS_AND_LAYOUT | {"numpy", "scipy", "sympy", "PIL"})
+
+
+def test_pyomo_is_imported_in_one_file():
+    users = {
+        path.name
+        for part in ("models", "export")
+        for path in (ROOT / part).rglob("*.py")
+        if "pyomo" in _imports(path)
+    }
+    assert users == {"pyomo_model.py"}
+
+
+def _imports(path):
+    lines = (line.split() for line in path.read_text().splitlines())
+    return {line[1].split(".")[0] for line in lines if len(line) > 1 and line[0] in {"import", "from"}}

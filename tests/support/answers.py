@@ -1,0 +1,142 @@
+"""Solution files that real solvers wrote for two small instances: what each claims, and the problems they are of."""
+
+from functools import cache
+
+import numpy as np
+import places
+from crossfield.models.formulations.problem import formulate
+from crossfield.models.instance.instance import Instance
+
+HERE = places.SOLUTIONS
+TINY = HERE / "tiny"
+GOOD = sorted(path for path in TINY.iterdir() if path.is_file())
+BAD = sorted((TINY / "bad").iterdir())
+WITH_POINT = {"optimal-global", "optimal-local", "feasible", "limit-with-point"}
+
+G, C, S, B, K, X = "gurobi-13.0.3", "cplex-22.2.0.1", "scip-10.0", "cbc-2.10.8", "glpk-5.0", "xpress-9.9.1"
+A, R = "gams-54.6.1", "baron-26.5.27"
+GLOBAL, LOCAL, FEASIBLE, INFEASIBLE = "optimal-global", "optimal-local", "feasible", "infeasible"
+LIMIT, NOTHING, UNBOUNDED, ERROR = "limit-with-point", "limit-without-point", "unbounded", "error"
+SILENT = "no-point"
+
+FILES = {
+    f"{G}_milp_optimal.sol": ("gurobi", FEASIBLE),
+    f"{G}_qp_optimal.sol": ("gurobi", FEASIBLE),
+    f"{G}_quartic_optimal.sol": ("gurobi", FEASIBLE),
+    f"{G}_milp_optimal.json": ("gurobi-json", GLOBAL),
+    f"{G}_milp_pool.json": ("gurobi-json", GLOBAL),
+    f"{G}_qp_optimal.json": ("gurobi-json", GLOBAL),
+    f"{G}_quartic_optimal.json": ("gurobi-json", GLOBAL),
+    f"{G}_milp_infeasible.json": ("gurobi-json", INFEASIBLE),
+    f"{G}_milp_time_without_point.json": ("gurobi-json", NOTHING),
+    f"{G}_milp_nodes_with_point.json": ("gurobi-json", LIMIT),
+    f"{C}_milp_optimal.sol": ("cplex", GLOBAL),
+    f"{C}_milp_optimal_nonzero.sol": ("cplex", GLOBAL),
+    f"{C}_milp_within_tolerance.sol": ("cplex", GLOBAL),
+    f"{C}_milp_pool.sol": ("cplex", LIMIT),
+    f"{C}_qp_optimal.sol": ("cplex", GLOBAL),
+    f"{C}_milp_infeasible.sol": ("cplex", INFEASIBLE),
+    f"{C}_milp_time_with_point.sol": ("cplex", LIMIT),
+    f"{C}_milp_solution_limit.sol": ("cplex", LIMIT),
+    f"{C}_other_unbounded.sol": ("cplex", UNBOUNDED),
+    f"{S}_milp_optimal.sol": ("scip", GLOBAL),
+    f"{S}_qp_optimal.sol": ("scip", GLOBAL),
+    f"{S}_quartic_nl_without_status.sol": ("scip", FEASIBLE),
+    f"{S}_milp_zeros_without_status.sol": ("scip", FEASIBLE),
+    f"{S}_milp_infeasible.sol": ("scip", INFEASIBLE),
+    f"{S}_milp_infeasible_without_status.sol": ("scip", SILENT),
+    f"{S}_milp_time_with_point.sol": ("scip", LIMIT),
+    f"{S}_milp_time_without_point.sol": ("scip", NOTHING),
+    f"{S}_milp_solution_limit.sol": ("scip", LIMIT),
+    f"{S}_other_infinite.sol": ("scip", FEASIBLE),
+    f"{B}_milp_optimal.sol": ("cbc", GLOBAL),
+    f"{B}_milp_optimal_all.sol": ("cbc", GLOBAL),
+    f"{B}_milp_infeasible.sol": ("cbc", INFEASIBLE),
+    f"{B}_milp_infeasible_all.sol": ("cbc", INFEASIBLE),
+    f"{B}_milp_solution_limit.sol": ("cbc", LIMIT),
+    f"{B}_milp_time_without_point.sol": ("cbc", NOTHING),
+    f"{K}_milp_optimal_lp.sol": ("glpk", GLOBAL),
+    f"{K}_milp_optimal_mps.sol": ("glpk", GLOBAL),
+    f"{K}_milp_infeasible.sol": ("glpk", INFEASIBLE),
+    f"{K}_milp_time_without_point.sol": ("glpk", NOTHING),
+    f"{K}_milp_relaxed_bas.sol": ("glpk", GLOBAL),
+    f"{K}_milp_relaxed_ipt.sol": ("glpk", GLOBAL),
+    f"{X}_milp_optimal.slx": ("xpress-slx", FEASIBLE),
+    f"{X}_qp_optimal.slx": ("xpress-slx", FEASIBLE),
+    f"{X}_milp_time_without_point.slx": ("xpress-slx", FEASIBLE),
+    f"{X}_milp_infeasible.slx": ("xpress-slx", SILENT),
+    "xpress-by-layout_milp_two_solutions.slx": ("xpress-slx", FEASIBLE),
+    f"{X}_milp_optimal.asc": ("xpress-asc", FEASIBLE),
+    f"{X}_qp_optimal.asc": ("xpress-asc", FEASIBLE),
+    f"{X}_milp_time_without_point.asc": ("xpress-asc", FEASIBLE),
+    f"{A}_cplex_milp_optimal.csv": ("gams-csv", GLOBAL),
+    f"{A}_conopt_qp_optimal.csv": ("gams-csv", LOCAL),
+    f"{A}_baron_quartic_optimal.csv": ("gams-csv", GLOBAL),
+    f"{A}_sbb_quartic_optimal.csv": ("gams-csv", FEASIBLE),
+    f"{A}_baron_quartic_time_with_point.csv": ("gams-csv", LIMIT),
+    f"{A}_cplex_milp_time_without_point.csv": ("gams-csv", NOTHING),
+    f"{A}_cplex_milp_infeasible.csv": ("gams-csv", INFEASIBLE),
+    f"{A}_cplex_milp_optimal.lst": ("gams-lst", GLOBAL),
+    f"{A}_conopt_qp_optimal.lst": ("gams-lst", LOCAL),
+    f"{A}_baron_quartic_optimal.lst": ("gams-lst", GLOBAL),
+    f"{A}_sbb_quartic_optimal.lst": ("gams-lst", FEASIBLE),
+    f"{A}_baron_quartic_time_with_point.lst": ("gams-lst", LIMIT),
+    f"{A}_cplex_milp_time_without_point.lst": ("gams-lst", NOTHING),
+    f"{A}_cplex_milp_infeasible.lst": ("gams-lst", INFEASIBLE),
+    f"{A}_other_error.lst": ("gams-lst", ERROR),
+    f"{R}_qp_optimal_res.lst": ("baron-res", GLOBAL),
+    f"{R}_pair_optimal_res.lst": ("baron-res", GLOBAL),
+    f"{R}_pair_first_point_res.lst": ("baron-res", FEASIBLE),
+    f"{R}_pair_iterations_with_point_res.lst": ("baron-res", LIMIT),
+    f"{R}_qp_infeasible_res.lst": ("baron-res", INFEASIBLE),
+    f"{R}_other_unbounded_res.lst": ("baron-res", UNBOUNDED),
+    f"{R}_other_iterations_without_point_res.lst": ("baron-res", NOTHING),
+    f"{R}_qp_optimal_tim.lst": ("baron-tim", GLOBAL),
+    f"{R}_pair_optimal_tim.lst": ("baron-tim", GLOBAL),
+    f"{R}_pair_first_point_tim.lst": ("baron-tim", GLOBAL),
+    f"{R}_pair_iterations_with_point_tim.lst": ("baron-tim", LIMIT),
+    f"{R}_qp_infeasible_tim.lst": ("baron-tim", INFEASIBLE),
+    f"{R}_other_unbounded_tim.lst": ("baron-tim", UNBOUNDED),
+    f"{R}_other_iterations_without_point_tim.lst": ("baron-tim", NOTHING),
+    f"{R}_qp_time_without_point_tim.lst": ("baron-tim", NOTHING),
+    f"{R}_other_syntax_tim.lst": ("baron-tim", ERROR),
+    f"{R}_quartic_licence_tim.lst": ("baron-tim", ERROR),
+    "miplib-by-layout_milp_optimal.sol": ("miplib", FEASIBLE),
+    "miplib-by-layout_milp_infeasible.sol": ("miplib", INFEASIBLE),
+}
+"""Every file of the folder: its reader and what it claims."""
+
+STATUS_ALONE = {"gams-lst", "baron-tim"}
+RELAXATIONS = {"milp_time_without_point", "milp_relaxed"}
+"""Files that hold the point of a relaxation, as the solver leaves it."""
+
+OPTIMA = {
+    "milp": 0.5565360828459345,
+    "qp": 8.8679297733801,
+    "quartic": 0.183341329995846,
+    "pair": 0.000162736965904,
+}
+"""Found by several solvers alike; that of the MILP and the QP by HiGHS in the first place."""
+
+
+@cache
+def problem(name):
+    """The problems behind the files: 2 x 2 pixels with three strokes, and a pair of pixels."""
+    if name == "pair":
+        pair = Instance(
+            "pair", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.2, 1.2]),
+            np.array([1.0, 0.75]), w_strokes=1.5, w_beta=1e-3, gauge="strokes",
+        )  # fmt: skip
+        return formulate(pair, "minlp-quartic")
+    tiny = Instance(
+        "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
+        np.array([1.0, 0.75, 0.5]), w_strokes=1.5, w_beta=1e-3, gauge="strokes",
+    )  # fmt: skip
+    formulation = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[name]
+    return formulate(tiny, formulation, p=np.array([0, 0, -1, 0]) if name == "qp" else None)
+
+
+def problem_of(path):
+    """The problem that a file is of; its name comes first after the solver's, and in GAMS after that of its solver."""
+    words = path.stem.split("_")
+    return next((word for word in words if word in OPTIMA), None)

@@ -1,0 +1,117 @@
+"""Small instances, random fields and problems that several test modules share."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from crossfield.models.field.field import CrossField
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed, with_rest_fixed
+from crossfield.models.instance.grid import Floats
+from crossfield.models.instance.instance import QUARTER, Instance
+
+MASKS = {
+    "hole": ["###", "#.#", "###"],
+    "parts": ["##.#", "#..#", "..#."],
+    "row": ["#####"],
+    "column": ["#"] * 5,
+    "pixel": ["#"],
+    "far": ["." * 98 + "###"],
+    "full": ["####"] * 3,
+}
+"""Shapes by name: with a hole, of several parts (one of them a single pixel), lines, one pixel,
+three-digit columns, 3 x 4.
+"""
+
+_VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *(
+        (name, {"shape": shape})
+        for name in ("minlp-quartic", "milp-mccormick", "qp-fixed")
+        for shape in MASKS
+        if shape != "hole"
+    ),
+    ("minlp-parity", {"shape": "pixel"}),
+    ("miqcp-bilinear", {"shape": "parts"}),
+    ("miqcp-bilinear-l1", {"shape": "pixel"}),
+    ("miqp-exact", {"shape": "row"}),
+    ("minlp-parity", {"relax": True}),
+    ("minlp-quartic", {"relax": True}),
+    ("minlp-cubic", {"relax": True, "gauge": "box"}),
+    ("miqcp-bilinear", {"relax": True}),
+    ("miqp-mccormick", {"relax": True}),
+    ("milp-mccormick", {"relax": True}),
+    ("miqp-exact", {"relax": True}),
+    ("miqp-mccormick", {"facet": "printed"}),
+    ("milp-mccormick", {"facet": "printed", "gauge": "box"}),
+    ("miqcp-bilinear", {"stroke_norm": 1}),
+    ("miqcp-bilinear-l1", {"beta_norm": 2}),
+    ("miqp-mccormick", {"beta_norm": 1}),
+    ("milp-mccormick", {"stroke_norm": 2, "beta_norm": 2}),
+    *((name, {"pinned": True}) for name in FORMULATIONS if name != "qp-fixed"),
+    *((name, {"pinned": "outside"}) for name in FORMULATIONS),
+]
+
+CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    " ".join([name, *(f"{key}={value}" for key, value in given.items())]): (name, given)
+    for name, given in [
+        *((name, {"gauge": gauge}) for name in FORMULATIONS for gauge in ("strokes", "box")),
+        *_VARIANTS,
+    ]
+}
+"""Every formulation in both gauges, and the variants: formulation and what differs from the default."""
+
+LOW_DEGREE = [label for label, (name, _) in CASES.items() if name != "minlp-parity"]
+"""The cases that LP and MPS can hold."""
+
+
+def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **given: Any) -> Instance:
+    """A random instance on a mask by name, some 40 % of its pixels with a stroke."""
+    rng = np.random.default_rng(seed)
+    mask = np.array([[pixel == "#" for pixel in row] for row in MASKS[shape]])
+    pixels = np.argwhere(mask)
+    chosen = rng.random(len(pixels)) < 0.4
+    chosen[rng.integers(len(pixels))] = True
+    pixels = pixels[chosen]
+    theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
+    return Instance(
+        "tiny", mask, pixels, theta, w, **{"w_strokes": 1.5, "w_beta": 1e-3, "gauge": gauge} | given
+    )
+
+
+def make_field(instance: Instance, seed: int = 2) -> CrossField:
+    """A random field: angles anywhere within their bounds, any jump within its bounds."""
+    rng = np.random.default_rng(seed)
+    alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
+    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
+    return CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
+
+
+def make_problem(name: str, instance: Instance, **options: Any) -> Problem:
+    """The problem of that formulation, with the jumps of the random field where they are data."""
+    return formulate(instance, name, p=make_field(instance).p if name == "qp-fixed" else None, **options)
+
+
+@cache
+def problem_of(label: str) -> Problem:
+    """The problem of a case; it is the same object every time, so that its arrays are made once."""
+    name, given = CASES[label]
+    given = dict(given)
+    pinned = given.pop("pinned", False)
+    instance = make_instance(**{key: given.pop(key) for key in ("shape", "gauge") if key in given})
+    problem = make_problem(name, instance, **given)
+    if pinned == "outside":
+        free = np.random.default_rng(5).random(instance.grid.size) < 0.5
+        return with_rest_fixed(problem, make_field(instance), free)
+    return with_integers_fixed(problem, make_field(instance)) if pinned else problem
+
+
+def points_of(problem: Problem, count: int = 20, seed: int = 3) -> Floats:
+    """Random points (count, columns), with no regard to bounds, rows and integrality."""
+    return np.random.default_rng(seed).normal(size=(count, problem.columns))
+
+
+def names_of(matrix: np.ndarray[Any, Any]) -> list[str]:
+    """Names as text, from rows of bytes padded with NUL."""
+    return [bytes(row).rstrip(b"\0").decode() for row in matrix]

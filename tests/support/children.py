@@ -1,0 +1,61 @@
+"""Processes of the tests' own: programs that are interrupted, as by Ctrl-C on a terminal,
+and who is left of whom.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+
+def interrupted(program: str) -> list[str]:
+    """The words of the last line that a Python program prints when Ctrl-C comes after its first line,
+    a number; it must end well.
+    """
+    child = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert int(child.stdout.readline()) > 0
+    os.killpg(child.pid, signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    assert (child.returncode, err) == (0, "")
+    return out.splitlines()[-1].split()
+
+
+def running() -> dict[int, tuple[int, int]]:
+    """The parent and the group of every process that runs;
+    those that have ended and were not waited for are left out.
+    """
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has ended meanwhile
+            state, parent, group, *_ = path.read_text("utf-8", "replace").rpartition(")")[2].split()
+            if state not in "ZX":
+                found[int(path.parent.name)] = (int(parent), int(group))
+    return found
+
+
+def descendants(ancestor: int) -> set[int]:
+    """The processes that run and that a process, or one of these, has started."""
+    parents = {pid: parent for pid, (parent, _) in running().items()}
+    found = {ancestor}
+    while more := {pid for pid, parent in parents.items() if parent in found} - found:
+        found |= more
+    return found - {ancestor}
+
+
+def all_end(processes: set[int], seconds: float = 60.0) -> bool:
+    """Whether all of these processes end; waits no longer than so many seconds."""
+    limit = time.monotonic() + seconds
+    while processes & set(running()):
+        if time.monotonic() > limit:
+            return False
+        time.sleep(0.1)
+    return True

@@ -1,0 +1,62 @@
+"""Small instances, and their least energy over all jumps by dense least squares:
+a second opinion on greedy fields and searches.
+"""
+
+import numpy as np
+from crossfield.models.instance.instance import HALF, Instance
+
+
+def sketch(mask, theta, w_beta=1e-6, gauge="strokes", w=None):
+    """An instance with strokes where the picture theta (radians) is a number."""
+    theta = np.where(mask, theta, np.nan)
+    at = np.argwhere(np.isfinite(theta))
+    weight = np.ones(len(at)) if w is None else w
+    return Instance("sketch", mask, at, theta[tuple(at.T)], weight, w_beta=w_beta, gauge=gauge)
+
+
+def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(1, 7, 2)) < 0.7 if shape is None else np.ones(shape, bool)
+    mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
+    at = np.argwhere(mask)
+    at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(strokes)])]
+    return Instance(
+        "random", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)), w_beta=1e-3, gauge=gauge
+    )
+
+
+def exact(instance):
+    """The least energy over all jumps in the bounds, with the windows of alpha and beta left out:
+    a lower bound.
+    """
+    ranges = [np.arange(low, high + 1) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
+    jumps = (
+        np.stack([axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij")], axis=1)
+        if ranges
+        else np.zeros((1, 0), int)
+    )
+    group = (jumps & 1) @ (1 << np.arange(len(ranges)))
+    order = np.argsort(group, kind="stable")
+    parts = np.split(jumps[order], np.nonzero(np.diff(group[order]))[0] + 1)
+    return min(least_energy(instance, part).min() for part in parts)
+
+
+def least_energy(instance, jumps):
+    """The least energy for each row of jumps, all of one parity, by dense least squares on the residuals;
+    no windows.
+    """
+    grid, size = instance.grid, instance.grid.size
+    pairs, strokes = np.arange(len(grid.first)), np.arange(len(instance.theta))
+    a, b = np.zeros((2, len(pairs), 2 * size))
+    a[pairs, grid.first], a[pairs, grid.second] = 1, -1
+    b[pairs, size + grid.first], b[pairs, size + grid.second] = 1 - 2 * (jumps[0] & 1), -1
+    r = np.zeros((len(strokes), 2 * size))
+    r[strokes, instance.stroke_index] = r[strokes, size + instance.stroke_index] = 1
+    root = np.sqrt(instance.w_strokes * instance.w)
+    skew = np.sqrt(instance.w_beta) * np.eye(2 * size)[size:]
+    rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])
+    right = np.zeros((len(jumps), len(rows)))
+    right[:, : len(pairs)] = -np.sqrt(2) * HALF * jumps
+    right[:, 2 * len(pairs) : 2 * len(pairs) + len(strokes)] = root * instance.target
+    basis = np.linalg.qr(rows)[0]
+    return np.sum((right - (right @ basis) @ basis.T) ** 2, axis=1)

@@ -1,0 +1,92 @@
+"""Independent readers of LP, MPS and .nl files in this process,
+each giving what it read to be compared with a Problem.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.solving.nl_model import read_nl
+from crossfield.export.verify.comparison import of_problem
+from crossfield.export.verify.programs import asl as consumer_asl
+from crossfield.export.verify.programs import highs as consumer_highs
+from crossfield.export.verify.programs import scip as consumer_scip
+from crossfield.export.verify.programs.reading import Meaning as Model
+from crossfield.models.instance.grid import Floats
+
+__all__ = [
+    "Model",
+    "absence",
+    "browser",
+    "by_asl",
+    "by_casadi",
+    "by_gurobi",
+    "by_highs",
+    "by_scip",
+    "of_problem",
+    "scip_columns",
+]
+
+by_highs = consumer_highs.read
+by_scip = consumer_scip.read
+by_casadi = read_nl
+scip_columns = consumer_scip.columns
+
+
+def by_gurobi(path: Path) -> Model:
+    """The file as Gurobi reads it; needs gurobipy."""
+    from crossfield.export.verify.programs import gurobi as consumer_gurobi
+
+    return consumer_gurobi.read(path)
+
+
+def browser() -> str | None:
+    """The path of a Chromium."""
+    return next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chrome"))), None)
+
+
+OTHERS = {
+    "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
+    "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
+    "chromium": (
+        importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),
+        "Chromium with its driver, or selenium,",
+        "apt install chromium chromium-driver",
+    ),
+}
+"""Programs that are no consumers of `verify`: a sign that they are here, their names,
+and what to do where they are not.
+"""
+
+
+def absence(program: str) -> str:
+    """Why tests that need a consumer or another program cannot run, in a line; nothing where it is here."""
+    if program in OTHERS:
+        present, title, remedy = OTHERS[program]
+    else:
+        entry = PROGRAMS[program]
+        present, title, remedy = entry.present, entry.title, entry.install
+    return "" if present else f"{title} is not installed: {remedy}"
+
+
+def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
+    """What the AMPL Solver Library says of an .nl file at its starting point.
+
+    Statistics, objective, gradient, rows, Jacobian (rows, columns).
+    """
+    said = consumer_asl.at_start(path)
+    statistics, values = said["problem statistics"], said["initial evaluations"]
+    columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
+    goal = values["objective function"]["0"]
+    gradient, jacobian = np.zeros(columns), np.zeros((rows, columns))
+    for key, value in goal["gradient"].items():
+        gradient[int(key)] = value
+    for key, value in values.get("constraints' jacobian", {}).items():
+        jacobian[tuple(map(int, key.split("_")))] = value
+    activities = np.array([values["constraints"][str(row)] for row in range(rows)])
+    return statistics, goal["value"], gradient, activities, jacobian
