@@ -1,9 +1,12 @@
 """Jumps between neighbours: the best ones, and steps of the label, which change no cross."""
 
 import numpy as np
+import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps, free_jumps, stepped
 from crossfield.models.instance.instance import Instance
+
+pytestmark = pytest.mark.numeric
 
 
 def some_field(seed):

@@ -42,7 +42,7 @@ def press(process, times=1):
     """Exit code and complaints of a process that Ctrl-C is pressed for."""
     for _ in range(times):
         os.killpg(process.pid, signal.SIGINT)
-    err = process.communicate(timeout=120)[1]
+    err = process.communicate()[1]
     return process.returncode, err
 
 

@@ -20,6 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
 
+pytestmark = pytest.mark.numeric
+
 SEEDS = st.integers(0, 2**32 - 1)
 WEIGHTS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
 
