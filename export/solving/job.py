@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from ...models.errors import InputError
-from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.deadline import Deadline
 from ...models.processes.side_by_side import checked
+
+if TYPE_CHECKING:  # the driver of a solver needs no formulations
+    from ...models.formulations.problem import Problem
 
 LEAST: Final = 0.01
 """Seconds of a solve for which nothing is left: still the point that it starts from comes back."""

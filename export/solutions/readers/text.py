@@ -11,16 +11,18 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from itertools import repeat
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Bools, Floats
-from ...solvers_table import PROGRAMS
-from ...writing.canonical import Order
+
+if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the formulations
+    from ...writing.canonical import Order
 
 Bytes = NDArray[np.bytes_]
 Letters = NDArray[np.uint8]
@@ -40,14 +42,19 @@ _WINDOWS_INFINITY = re.compile(rb"1\.#inf0*", re.IGNORECASE)
 _FORTRAN = bytes.maketrans(b"dD", b"eE")
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 
-ADDED_COLUMNS: Final = {
-    "crossfield": r"ONE",
-    "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE",
-} | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
-"""Patterns of the columns that programs add when they read or write a model: for a constant of the objective, for its part
-that is not linear, for the range of a row. A solution may hold them beside the columns of the problem."""
 
-_ADDED = re.compile("|".join(ADDED_COLUMNS.values()).encode(), re.DOTALL)
+@cache
+def added_columns() -> dict[str, str]:
+    """Patterns of the columns that programs add when they read or write a model, by title of the program.
+
+    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may hold them
+    beside the columns of the problem.
+    """
+    # Not above: a solver's child process, which writes such files, would load all of the formulations with the table.
+    from ...solvers_table import PROGRAMS
+
+    ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
+    return ours | {program.title: program.adds for program in PROGRAMS.values() if program.adds}
 
 
 class Status(StrEnum):
@@ -144,7 +151,8 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     values = np.full(len(names), 0.0 if raw.omits_zeros else np.nan)
     values[index[known]] = raw.values[known]
     _check_repeats(listed[known], raw.values[known], values[index[known]])
-    strangers = sum(_ADDED.fullmatch(name) is None for name in listed[~known].tolist())
+    added = re.compile("|".join(added_columns().values()).encode(), re.DOTALL)
+    strangers = sum(added.fullmatch(name) is None for name in listed[~known].tolist())
     return NamedValues(values, int(np.isnan(values).sum()), strangers)
 
 

@@ -116,3 +116,10 @@ def test_limits_become_what_is_left():
     assert limits.until(deadline) == cf.Limits(10.0, 1e-3, 2)
     now[0] = 20.0
     assert 0 < limits.until(deadline).seconds < 0.1
+
+
+def test_the_driver_of_a_solver_loads_neither_formulas_nor_writers():
+    code = "import sys, crossfield.export.solving.casadi_driver; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "casadi" in done.stdout.split()
+    assert not {"sympy", "scipy", "jinja2", "highspy"} & set(done.stdout.split())
