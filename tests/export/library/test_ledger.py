@@ -29,6 +29,7 @@ sizes = { tiny = [6] }
 """
 
 
+@pytest.mark.usefixtures("short_searches")
 @pytest.mark.parametrize("sha256, told", [(None, False), ("0" * 64, True)])
 def test_a_build_tells_of_records_that_do_not_count(tmp_path, capsys, sha256, told):
     (tmp_path / "spec.toml").write_text(SPEC)

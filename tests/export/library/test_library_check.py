@@ -20,13 +20,14 @@ from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents import archive, check_point
 from crossfield.export.library.documents.archive import opened
 from crossfield.export.library.documents.documents import problem_of, read_library
-from crossfield.export.library.ledger import points
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import CrossfieldError, InputError, SolutionError
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
 from forging import change, seal
 from loops import for_each
+
+pytestmark = pytest.mark.usefixtures("short_searches")
 
 SOLUTIONS = places.SOLUTIONS
 
@@ -187,14 +188,6 @@ random = "full"
 seeds = [1]
 """
 STEM = "cf_rand_n004_s1"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _short_searches():
-    """How good the fields of a library are is nothing to its check."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(points, "_ROUNDS", 1)
-        yield
 
 
 @pytest.fixture(scope="module")

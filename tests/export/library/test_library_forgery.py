@@ -19,6 +19,8 @@ from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
 from forging import seal
 
+pytestmark = pytest.mark.usefixtures("short_searches")
+
 SPEC = """
 format = "crossfield-library-spec"
 version = 1

@@ -23,6 +23,8 @@ from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
 
+pytestmark = pytest.mark.usefixtures("short_searches")
+
 SEEDS = (1, 2)
 SPEC = """format = "crossfield-library-spec"
 version = 1

@@ -19,7 +19,6 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.documents.mathematics import model
-from crossfield.export.library.ledger import points
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import count, percent, size, value, write_site
 from crossfield.export.pictures.svg import told
@@ -29,6 +28,8 @@ from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.instance.file import read_instance
 from loops import for_each
 from oracles import browser as browser_program
+
+pytestmark = pytest.mark.usefixtures("short_searches")
 
 SPEC = """format = "crossfield-library-spec"
 version = 1
@@ -62,9 +63,7 @@ MATHML = "{http://www.w3.org/1998/Math/MathML}"
 def library(tmp_path_factory):
     folder = tmp_path_factory.mktemp("library")
     (folder / "spec.toml").write_text(SPEC)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(points, "_ROUNDS", 1)  # how good the fields are is nothing to the site
-        return build(read_spec(folder / "spec.toml"), folder / "built")
+    return build(read_spec(folder / "spec.toml"), folder / "built")
 
 
 @pytest.fixture(scope="module")

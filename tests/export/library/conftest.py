@@ -1,0 +1,13 @@
+"""What several tests of libraries share."""
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def short_searches():
+    """Libraries are built with one round of search: how good their fields are is nothing to who asks for this."""
+    from crossfield.export.library.ledger import points
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(points, "_ROUNDS", 1)
+        yield
