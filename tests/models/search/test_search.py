@@ -187,7 +187,7 @@ def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
 
 
 def test_search_ends_by_itself_when_nothing_is_found():
-    found = cf.search(cf.sample("skew", 6))
+    found = cf.search(cf.sample("skew", 5))
     assert found.ended == "patience"
     assert found.field.energy().total < 1e-4
 
