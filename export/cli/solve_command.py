@@ -144,14 +144,13 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     from ...models.field.file import write_field
     from ...models.formulations.catalogue import FORMULATIONS
     from ...models.formulations.problem import formulate
-    from ...models.search.improvement import first_field
     from ..bundle.manifest import fixed_jumps
     from ..solving.local import solve
 
     known([name], FORMULATIONS, "formulation")
     instance, deadline = request.instance, Deadline.after(request.limits.seconds)
     request.progress("greedy start")
-    start = request.start or first_field(instance)
+    start = request.begin(deadline)
     problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from ...models.errors import SolverError
 from ...models.processes.deadline import Deadline
+from .job import Job
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
@@ -18,6 +22,8 @@ Then it is killed.
 """
 PATIENCE: Final = 4.0
 """Seconds that it may take to answer Ctrl-C: half way it is interrupted again, then killed."""
+FEASIBLE: Final = 1e-6
+"""Violation up to which a start is a point of the problem: the solvers' own tolerance."""
 _TICK: Final = 0.1
 
 
@@ -31,6 +37,36 @@ class ChildExit(NamedTuple):
     def killed(self) -> bool:
         """Whether it was not let to its end."""
         return self.code == -signal.SIGKILL
+
+
+def solved_by(
+    module: str, arguments: Iterable[str | float], job: Job, leave_start: Callable[[], object]
+) -> ChildExit:
+    """How a module of this folder ended that was run as a program; then the solution file of the job is there.
+
+    leave_start: makes the start the solution; it is called where the program was stopped before it had one,
+    if the start is feasible.
+    Raises SolverError with the program's last words.
+    """
+    # -P: a folder `crossfield` or a file numpy.py where the user happens to be is not meant.
+    program = [sys.executable, "-P", "-m", f"{__package__}.{module}", *map(str, arguments)]
+    ended = run_child(program, job.log, job.deadline)
+    if job.solution.exists():
+        return ended
+    stopped = ended.interrupted or ended.killed
+    if not (stopped and job.start is not None and job.problem.violation(job.start).worst <= FEASIBLE):
+        raise SolverError(_no_answer(job, ended), file=job.model)
+    leave_start()
+    return ended
+
+
+def _no_answer(job: Job, ended: ChildExit) -> str:
+    """What is said of a solver that left nothing: how it ended, and its last words."""
+    if ended.killed and not ended.interrupted:
+        return f"{job.solver} left no answer within its time; give it more, or a start"
+    last = job.log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
+    how = "interrupted" if ended.interrupted else f"exit code {ended.code}"
+    return f"{job.solver} left no answer ({how}): {last[0][:200]}; see {job.log.name} beside it"
 
 
 def run_child(command: list[str], log: Path, deadline: Deadline) -> ChildExit:

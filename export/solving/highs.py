@@ -1,19 +1,26 @@
-"""The driver of HiGHS: in this process it reads a written file, solves, and leaves a solution file."""
+"""The one driver of HiGHS: `run` solves a written file in a process of its own, the rest serves those who
+need its model here.
+"""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import highspy
 import numpy as np
 
-from ...models.errors import OutputError, SolverError
-from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
-from ..writing.names import ONE, column_names
-from .job import Job, RunEnd
+from ...models.errors import CrossfieldError, OutputError, SolverError
+from .job import LEAST, RunEnd
 
+if TYPE_CHECKING:
+    from .job import Job
+
+_BOUND: Final = "dual bound "
+"""What the last line of a log begins with where there is one."""
+_RAW: Final = 0
+"""The style of solution files that HiGHS reads and writes with all digits."""
 _TICK: Final = 0.1
 """Seconds between two looks at a running solver."""
 
@@ -27,17 +34,15 @@ def _model() -> Any:
     return highspy.Highs()  # type: ignore[no-untyped-call]
 
 
-def loaded(path: Path, log: Path | None = None, **options: str | float) -> Any:
-    """The model of an LP or MPS file in HiGHS, with these options; silent, or with its output in a log.
+def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
+    """The model of an LP or MPS file in HiGHS, with these options.
 
     Raises SolverError when HiGHS does not read the file.
     """
     highs = _model()
-    quiet = {"output_flag": "false"} if log is None else {"log_to_console": "false", "log_file": str(log)}
-    set_options(highs, **quiet, **options)
+    set_options(highs, output_flag="false" if silent else "true", **options)
     if highs.readModel(str(path)) == highspy.HighsStatus.kError:
-        see = "" if log is None else f"; see {log.name} beside it"
-        raise SolverError(f"HiGHS cannot read it{see}", file=path)
+        raise SolverError("HiGHS cannot read it", file=path)
     return highs
 
 
@@ -64,8 +69,11 @@ def solved(highs: Any, path: Path) -> Any:
 
 def leave(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
-    if highs.writeSolution(str(solution), 0) == highspy.HighsStatus.kError:
+    beside = solution.with_suffix(".part")
+    if highs.writeSolution(str(beside), _RAW) == highspy.HighsStatus.kError:
+        beside.unlink(missing_ok=True)
         raise OutputError("HiGHS cannot write it; free some space or choose another folder", file=solution)
+    beside.replace(solution)
 
 
 def dual_bound(highs: Any) -> float | None:
@@ -75,21 +83,59 @@ def dual_bound(highs: Any) -> float | None:
 
 
 def run(job: Job) -> RunEnd:
-    """How the solve of the job ended; its solution file and its log are there.
+    """How the solve of the job ended; its solution file and its log are there. Raises SolverError."""
+    from ..bundle.starts import LAYOUTS, Start
+    from ..writing.sink import save
+    from .child import solved_by
 
-    Raises SolverError, OutputError.
-    """
-    highs = loaded(job.model, job.log, mip_rel_gap=job.limits.gap, threads=job.limits.threads)
+    start = job.solution.with_suffix(".start")
     if job.start is not None:
-        highs.setSolution(_start(highs, job.problem, job.start))
-    set_options(highs, time_limit=job.deadline.left())
-    interrupted = _interruptibly(highs)
-    leave(highs, job.solution)
-    return RunEnd(interrupted, dual_bound(highs))
+        save(start, LAYOUTS["highs"](Start(job.problem, job.start)))
+    numbers = map(repr, (job.deadline.at, float(job.limits.gap), job.limits.threads))
+    arguments = *map(str, (job.model, job.solution, start)), *numbers
+    try:
+        ended = solved_by("highs", arguments, job, lambda: start.replace(job.solution))
+    finally:
+        start.unlink(missing_ok=True)
+    return RunEnd(ended.interrupted, _bound_in(job.log))
 
 
-def _interruptibly(highs: Any) -> bool:
-    """Solve. Whether the user interrupted: that ends the search and keeps the incumbent."""
+def _bound_in(log: Path) -> float | None:
+    last = log.read_text("utf-8", "replace").splitlines()[-1:]
+    return float(last[0].removeprefix(_BOUND)) if last and last[0].startswith(_BOUND) else None
+
+
+def main(arguments: list[str]) -> int:
+    """0 when the solution file was written: the program that `run` starts, so that a solve can be ended.
+
+    HiGHS looks at the clock only now and then: after some seconds without a look the process is killed. Its
+    output is the log: the first line says that an interrupt (SIGINT) will be heard, and the last one the dual
+    bound. It ends with its parent: when its standard input closes.
+    """
+    from ...models.processes.deadline import Deadline
+    from ...models.processes.side_by_side import leave_with_parent
+
+    leave_with_parent()
+    (model, solution, start), (deadline, gap, threads) = map(Path, arguments[:3]), arguments[3:]
+    try:
+        highs = loaded(model, silent=False, mip_rel_gap=float(gap), threads=int(threads))
+        if start.exists():
+            highs.readSolution(str(start), _RAW)
+        # It ends by itself, if it looks at the clock in time, before it is interrupted.
+        set_options(highs, time_limit=max(Deadline(float(deadline)).left() - 2 * _TICK, LEAST))
+        _until_it_ends(highs)
+        leave(highs, solution)
+    except CrossfieldError as error:
+        print(error)  # noqa: T201 - what is printed is the log
+        return 1
+    bound = dual_bound(highs)
+    if bound is not None:
+        print(f"{_BOUND}{bound!r}", flush=True)  # noqa: T201
+    return 0
+
+
+def _until_it_ends(highs: Any) -> None:
+    """Solve; an interrupt ends the search and keeps the incumbent."""
     highs.HandleUserInterrupt = True
     highs.startSolve()
     try:
@@ -97,10 +143,6 @@ def _interruptibly(highs: Any) -> bool:
     except KeyboardInterrupt:
         highs.cancelSolve()
         _wait_for(highs)
-    finally:  # the thread must have ended before this process can
-        highs.cancelSolve()
-        highs.wait()
-    return bool(highs.getModelStatus() == highspy.HighsModelStatus.kInterrupt)
 
 
 def _wait_for(highs: Any) -> None:
@@ -108,9 +150,5 @@ def _wait_for(highs: Any) -> None:
         pass
 
 
-def _start(highs: Any, problem: Problem, start: Floats) -> Any:
-    names = [bytes(row).rstrip(b"\0").decode() for row in column_names(problem)]
-    values = dict(zip(names, start.tolist(), strict=True)) | {ONE.decode(): 1.0}
-    given = highspy.HighsSolution()
-    given.col_value = [values[name] for name in highs.getLp().col_names_]
-    return given
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

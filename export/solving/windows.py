@@ -28,6 +28,7 @@ from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
 from ..solutions.solution import Solution
 from ..solvers_table import DRIVEN
+from .child import GRACE
 from .job import Limits
 from .local import solve
 
@@ -38,6 +39,7 @@ _WIDEST: Final = 8  # side at which a search ends: no solver here closes such a 
 _WINDOWS: Final = 4  # a round
 _SECONDS: Final = 5.0  # a window
 _SHORTEST: Final = 0.5  # seconds: with less no solver is started
+_HAND_OVER: Final = 2 * GRACE  # seconds before the end at which solvers end: they may be late by their grace
 
 Progress = Callable[[int, float], object]
 """Is told how many windows are solved, and the least energy so far."""
@@ -97,7 +99,7 @@ def search_windows(
         raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
     if not seconds > 0 or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
-    deadline = Deadline.after(seconds)
+    deadline = Deadline.after(seconds - min(_HAND_OVER, seconds / 4))
     state = _State(field, WINDOW_SOLVERS[solver].side, np.random.default_rng(seed))
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
         try:

@@ -333,9 +333,25 @@ def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
 def test_without_a_start_and_time_there_is_no_point(tmp_path):
     instance = cf.sample("mouse", 30)
     (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
-    solution = cf.solve(cf.formulate(instance, "milp-mccormick"), "highs", tmp_path, limits=cf.Limits(1e-6))
-    assert (solution.point, solution.status) == (None, Status.LIMIT_WITHOUT_POINT)
-    assert "yesterday" not in (tmp_path / "mouse.milp-mccormick.highs.sol").read_text()
+    with pytest.raises(SolverError, match="highs left no answer within its time; give it more, or a start"):
+        cf.solve(cf.formulate(instance, "milp-mccormick"), "highs", tmp_path, limits=cf.Limits(1e-6))
+    assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
+
+
+def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch):
+    """A HiGHS that never looks at the clock: the parent ends it, and the start is the answer."""
+    instance = cf.sample("mouse", 8)
+    start = cf.greedy(instance)
+    (tmp_path / "sitecustomize.py").write_text(
+        "import time, highspy\nhighspy.Highs.startSolve = lambda self: print('in', flush=True) or time.sleep(600)\n"
+        "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    problem = cf.formulate(instance, "milp-mccormick")
+    found = cf.solve(problem, "highs", tmp_path / "files", limits=cf.Limits(2.0), start=start)
+    assert found.status == Status.LIMIT_WITH_POINT
+    assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
+    assert not list((tmp_path / "files").glob("*.start"))
 
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
