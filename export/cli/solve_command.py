@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...models.errors import InputError
+from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
 from .inputs import known, load, options_of
 from .options import (
@@ -105,13 +105,15 @@ def solve_command(
     if method is not None:
         _tell_candidate(candidate, target, quiet=quiet, as_json=as_json)
         return
-    tell_solution(solution, target, quiet=quiet, as_json=as_json)
+    tell_solution(solution, None if solution.doubt else target, quiet=quiet, as_json=as_json)
     if solution.point is None:
         words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
         raise InputError(
             f"the solver found no point ({words}); give it more time or another start, and see its log",
             file=output,
         )
+    if solution.doubt:
+        raise SolutionError(f"the solver {solution.doubt}; no field was written", file=output)
 
 
 def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
@@ -156,7 +158,7 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")
     solution = solve(problem, request.solver, request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
-    if solution.point is None:
+    if solution.point is None or solution.doubt:
         target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one
     else:
         write_field(solution.field, target)

@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 import warnings
 from functools import cache
@@ -13,6 +14,7 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
+from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
@@ -338,15 +340,46 @@ def test_without_a_start_and_time_there_is_no_point(tmp_path):
     assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
 
 
+def told_to_highs(program, folder, monkeypatch):
+    """Let children of this process run the program when they start, highspy at hand."""
+    (folder / "sitecustomize.py").write_text("import highspy\n" + textwrap.dedent(program))
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+
+
+def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, capsys):
+    """HiGHS says optimal of a point that is not feasible."""
+    told_to_highs(
+        """
+        import pathlib, re
+        write = highspy.Highs.writeSolution
+        def moved(self, path, style):
+            status, file = write(self, path, style), pathlib.Path(path)
+            file.write_text(re.sub(r"(?m)^alpha_00_01 .*$", "alpha_00_01 9", file.read_text()))
+            return status
+        highspy.Highs.writeSolution = moved
+        """,
+        tmp_path,
+        monkeypatch,
+    )
+    files = tmp_path / "files"
+    assert invoke(["solve", "skew", "--size", "4", "-f", "milp-mccormick", "-o", str(files), "--quiet"]) == 1
+    assert "says optimal-global, but" in capsys.readouterr().err
+    assert not list(files.glob("*.field.npz"))
+
+
 def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch):
     """A HiGHS that never looks at the clock: the parent ends it, and the start is the answer."""
     instance = cf.sample("mouse", 8)
     start = cf.greedy(instance)
-    (tmp_path / "sitecustomize.py").write_text(
-        "import time, highspy\nhighspy.Highs.startSolve = lambda self: print('in', flush=True) or time.sleep(600)\n"
-        "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+    told_to_highs(
+        """
+        import signal, time
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        highspy.Highs.startSolve = lambda self: print("in", flush=True) or time.sleep(600)
+        """,
+        tmp_path,
+        monkeypatch,
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     problem = cf.formulate(instance, "milp-mccormick")
     found = cf.solve(problem, "highs", tmp_path / "files", limits=cf.Limits(2.0), start=start)
     assert found.status == Status.LIMIT_WITH_POINT
