@@ -3,6 +3,7 @@ says which tests were left out, and why.
 """
 
 import os
+import signal
 import sys
 from collections import Counter
 from pathlib import Path
@@ -23,6 +24,9 @@ settings.register_profile(
 )
 settings.register_profile("fuzz", settings.get_profile("same"), derandomize=False, print_blob=True)
 settings.load_profile("same")
+
+# A shell lets what runs in its background ignore Ctrl-C, and children inherit that: tests press it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}

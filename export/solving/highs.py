@@ -4,6 +4,7 @@ need its model here.
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -116,6 +117,7 @@ def main(arguments: list[str]) -> int:
     from ...models.processes.side_by_side import leave_with_parent
 
     leave_with_parent()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells have it ignored in the background
     (model, solution, start), (deadline, gap, threads) = map(Path, arguments[:3]), arguments[3:]
     try:
         highs = loaded(model, silent=False, mip_rel_gap=float(gap), threads=int(threads))

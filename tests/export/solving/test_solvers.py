@@ -375,6 +375,7 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
         """
         import signal, time
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal = lambda *_: None
         highspy.Highs.startSolve = lambda self: print("in", flush=True) or time.sleep(600)
         """,
         tmp_path,
@@ -385,6 +386,26 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
     assert found.status == Status.LIMIT_WITH_POINT
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
     assert not list((tmp_path / "files").glob("*.start"))
+
+
+def test_highs_hands_over_its_incumbent_in_the_background_too(tmp_path, monkeypatch):
+    """Where Ctrl-C is ignored, as in the background of a shell; this HiGHS knows of no time limit."""
+    told_to_highs(
+        """
+        set_ = highspy.Highs.setOptionValue
+        highspy.Highs.setOptionValue = lambda self, name, value: name == "time_limit" or set_(self, name, value)
+        """,
+        tmp_path,
+        monkeypatch,
+    )
+    problem = cf.formulate(cf.sample("mouse", 12), "milp-mccormick")
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        found = cf.solve(problem, "highs", limits=cf.Limits(2.0), start=cf.greedy(problem.instance))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert found.message == "Interrupted by user"
+    assert found.status == Status.LIMIT_WITH_POINT
 
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
