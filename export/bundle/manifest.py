@@ -13,7 +13,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +38,7 @@ from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
 from ..solvers_table import smallest, takers
 from ..writing.canonical import Canonical
+from .starts import write_starts
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -134,42 +135,60 @@ def write_problem(
 ) -> Manifest:
     """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
 
-    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats
-    written at once. Raises OutputError, and InputError for an unknown format and for a problem that no
-    manifest records: with columns fixed, or with products lifted beforehand.
+    What a format cannot carry is listed in the manifest as refused. The other arguments are those of
+    `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no manifest
+    records: with columns fixed, or with products lifted beforehand.
     """
     _check_recordable(problem)
-    with _pool(jobs) as pool:
-        return _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress).begin(
-            problem
-        )()
+    sets = _Sets(problem.instance, Path(folder), tuple(formats), start, {}, dialects or {}, compress)
+    with sets.threads(jobs):
+        return sets.begin(problem)()
 
 
-@contextmanager
-def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that write files: nearly all the time is spent in NumPy, zlib and hashlib, where threads run side by side.
+def write_all(
+    instance: Instance,
+    folder: str | Path,
+    formulations: Iterable[str] = tuple(FORMULATIONS),
+    formats: Iterable[str] = DEFAULTS,
+    *,
+    start: CrossField | None = None,
+    options: dict[str, Any] | None = None,
+    dialects: dict[str, str] | None = None,
+    compress: bool = False,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Manifest]:
+    """The manifests of the sets of files now in the folder: every formulation in every format that carries it.
 
-    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
-    whole.
+    start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`; without
+    one, `fixed_jumps` says which. options: facet, stroke_norm, beta_norm, relax, each used where a
+    formulation has it. dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms.
+    compress: model files as .gz. jobs: files written at once. progress: called with each name. Raises
+    InputError for an unknown format, FormulationError for an unknown formulation, InstanceError for a start
+    on another instance, and OutputError.
     """
-    with ThreadPoolExecutor(checked(jobs)) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    sets = _Sets(instance, Path(folder), tuple(formats), start, options or {}, dialects or {}, compress)
+    manifests = []
+    with sets.threads(jobs):
+        waiting = {name: sets.begin(sets.problem(name)) for name in formulations}
+        for name in list(waiting):
+            progress(name)
+            manifests.append(waiting.pop(name)())
+    return manifests
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class _Sets:
-    """What sets of files have in common: threads, folder, formats, start, dialects by format, and whether files are compressed."""
+    """What the sets of files of an instance have in common; dialects by format."""
 
-    pool: ThreadPoolExecutor
+    instance: Instance
     folder: Path
     formats: tuple[str, ...]
     start: CrossField | None
+    options: dict[str, Any]
     dialects: dict[str, str]
     compress: bool
+    pool: ThreadPoolExecutor = field(init=False)
 
     def __post_init__(self) -> None:
         """Check that the formats are known."""
@@ -177,9 +196,32 @@ class _Sets:
             if name not in FORMATS:
                 raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
 
+    @contextmanager
+    def threads(self, jobs: int) -> Iterator[None]:
+        """Threads that write files: nearly all the time goes to NumPy, zlib and hashlib, which run side by side.
+
+        After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
+        whole.
+        """
+        with ThreadPoolExecutor(checked(jobs)) as self.pool:
+            make_folder(self.folder)
+            try:
+                yield
+            except BaseException:
+                self.pool.shutdown(cancel_futures=True)
+                raise
+
+    def problem(self, name: str) -> Problem:
+        """A formulation of the instance, with those of the options that it has."""
+        recipe = FORMULATIONS.get(name)
+        chosen = {
+            key: value for key, value in self.options.items() if recipe is None or key in recipe.settable
+        }
+        return formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.start), **chosen)
+
     def begin(self, problem: Problem) -> Callable[[], Manifest]:
         """Hand the files of a problem to the threads; a function that waits for them and gives their manifest."""
-        stem = self.folder / f"{problem.instance.name}.{problem.name}"
+        stem = f"{self.instance.name}.{problem.name}"
         files = {name: self._submit(problem, stem, name) for name in self.formats}
 
         def manifest() -> Manifest:
@@ -190,15 +232,14 @@ class _Sets:
                     written.append(file.result())
                 except UnsupportedByFormatError as error:
                     refused[name] = str(error)
-            document = _document(problem, _instance_file(problem.instance, self.folder), written, refused)
-            path = stem.with_name(f"{stem.name}.manifest.json")
-            write_bytes(path, _as_bytes(document))
-            return Manifest(document, path)
+            if self.start is not None:
+                write_starts(problem, self.start, self.folder, stem)
+            return _kept(_document(problem, self.folder, written, refused), self.folder)
 
         return manifest
 
-    def _submit(self, problem: Problem, stem: Path, name: str) -> Future[Written]:
-        path = stem.with_name(f"{stem.name}{FORMATS[name].suffix}{'.gz' if self.compress else ''}")
+    def _submit(self, problem: Problem, stem: str, name: str) -> Future[Written]:
+        path = self.folder / f"{stem}{FORMATS[name].suffix}{'.gz' if self.compress else ''}"
         return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
 
 
@@ -220,63 +261,26 @@ def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest
 
     Files of the same problem that a manifest there lists stay listed. Raises OutputError.
     """
-    path = folder / f"{problem.instance.name}.{problem.name}.manifest.json"
-    document = _document(problem, _instance_file(problem.instance, folder), [written], {})
+    document = _document(problem, folder, [written], {})
     try:
-        earlier = read_manifest(path).document
+        earlier = read_manifest(_path(document, folder)).document
     except CrossfieldError:
         earlier = {"sha256": ""}
     if earlier["sha256"] == problem.sha256:
         others = [file for file in earlier["files"] if file["name"] not in written.files]
         document |= {"files": others + document["files"], "refused": earlier["refused"]}
-    write_bytes(path, _as_bytes(document))
+    return _kept(document, folder)
+
+
+def _path(document: dict[str, Any], folder: Path) -> Path:
+    return folder / f"{document['instance']['name']}.{document['formulation']}.manifest.json"
+
+
+def _kept(document: dict[str, Any], folder: Path) -> Manifest:
+    """The manifest now in the folder."""
+    path = _path(document, folder)
+    write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
-
-
-def _as_bytes(document: dict[str, Any]) -> bytes:
-    return (json.dumps(document, indent=1) + "\n").encode()
-
-
-def write_all(
-    instance: Instance,
-    folder: str | Path,
-    formulations: Iterable[str] = tuple(FORMULATIONS),
-    formats: Iterable[str] = DEFAULTS,
-    *,
-    start: CrossField | None = None,
-    options: dict[str, Any] | None = None,
-    dialects: dict[str, str] | None = None,
-    compress: bool = False,
-    jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
-) -> list[Manifest]:
-    """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
-
-    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says
-    which.
-    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written
-    at once.
-    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
-    .gz.
-    progress: called with each name. Raises InputError for an unknown format, FormulationError for an unknown
-    formulation, InstanceError for a start on another instance, and OutputError.
-    """
-    manifests = []
-    with _pool(jobs) as pool:
-        sets = _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress)
-        waiting = {}
-        for name in formulations:
-            waiting[name] = sets.begin(_formulated(instance, name, start, options or {}))
-        for name in list(waiting):
-            progress(name)
-            manifests.append(waiting.pop(name)())
-    return manifests
-
-
-def _formulated(instance: Instance, name: str, start: CrossField | None, options: dict[str, Any]) -> Problem:
-    recipe = FORMULATIONS.get(name)
-    chosen = {key: value for key, value in options.items() if recipe is None or key in recipe.settable}
-    return formulate(instance, name, p=fixed_jumps(instance, name, start), **chosen)
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
@@ -306,7 +310,7 @@ def _instance_file(instance: Instance, folder: Path) -> str:
 
 
 def _document(
-    problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
+    problem: Problem, folder: Path, written: list[Written], refused: dict[str, str]
 ) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
     form = Canonical(problem)
@@ -320,7 +324,7 @@ def _document(
         "version": VERSION,
         "generator": generator(),
         "instance": {
-            "file": instance_file,
+            "file": _instance_file(instance, folder),
             "name": instance.name,
             "gauge": instance.gauge,
             "sha256": instance.sha256,

@@ -161,14 +161,10 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
-    taking = takes(problem, solver)
-    if taking.answer == "no":
-        raise UnsupportedBySolverError(f"{solver} does not take {problem.name}: {taking.reason}")
     start = start_of(problem, field)
-    if STARTS[solver].convex and not start.problem.convex:
-        raise UnsupportedBySolverError(
-            f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
-        )
+    refusal = _refusal(problem, start, solver)
+    if refusal:
+        raise UnsupportedBySolverError(refusal)
     save(Path(path), LAYOUTS[STARTS[solver].layout](start))
     return start.objective
 
@@ -180,13 +176,19 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
     """
     if not problem.integer.any():
         return {}
-    convex = start_of(problem, field).problem.convex
-    solvers = [
-        name
-        for name, entry in STARTS.items()
-        if takes(problem, name).answer != "no" and (convex or not entry.convex)
-    ]
+    start = start_of(problem, field)
+    solvers = [name for name in STARTS if not _refusal(problem, start, name)]
     paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
     for name, path in paths.items():
-        write_start(problem, field, path, name)
+        save(path, LAYOUTS[STARTS[name].layout](start))
     return paths
+
+
+def _refusal(problem: Problem, start: Start, solver: str) -> str:
+    """Why a solver does not start from a point of the problem, empty where it does."""
+    taking = takes(problem, solver)
+    if taking.answer == "no":
+        return f"{solver} does not take {problem.name}: {taking.reason}"
+    if STARTS[solver].convex and not start.problem.convex:
+        return f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
+    return ""

@@ -194,7 +194,6 @@ def export_command(
     from ...models.field.file import read_field
     from ...models.formulations.catalogue import FORMULATIONS
     from ..bundle.manifest import write_all
-    from ..bundle.starts import write_starts
     from ..formats.registry import DEFAULTS, FORMATS
 
     formulations, formats = (
@@ -216,12 +215,6 @@ def export_command(
             jobs=jobs,
             progress=show,
         )
-        if field is not None:
-            show("starting points")
-            for manifest in manifests:
-                write_starts(
-                    manifest.problem(), field, output, manifest.path.name.removesuffix(".manifest.json")
-                )
     if as_json:
         say_json([manifest.document for manifest in manifests])
     elif not quiet:

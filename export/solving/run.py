@@ -113,7 +113,7 @@ def run(
     """The report of a run.
 
     The folder then holds instance, solver files, the best field, pictures and report.json.
-        DIR/models     every formulation in every format, manifests, the instance
+        DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
