@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..solutions.solution import Solution
     from ..solving.run import Report
 
-Progress = Callable[[str], None]
-
 WIDTH: Final = 80
 """Columns that tables are made for; a wider terminal is used where it helps."""
 
@@ -33,20 +31,19 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Progress]:
+def progress(*, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
 
     Raises InterruptedRunError for a Ctrl-C that nobody caught.
     """
     from rich.console import Console
-    from rich.progress import Progress as Bar
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     shown = console.is_terminal and not quiet
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     try:
-        with Bar(*columns, console=console, transient=True, disable=not shown) as bar:
+        with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
             task = bar.add_task("starting")
             yield lambda text: bar.update(task, description=text)
     except KeyboardInterrupt as stop:

@@ -26,7 +26,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import VARIABLES, IndexSet, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
@@ -134,11 +134,11 @@ def _label(instance: Instance, block: Block) -> str:
     return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
 
 
-def _described(family: Bound) -> dict[str, str]:
+def _described(family: PlacedFamily) -> dict[str, str]:
     return described(_Ampl, family, SENSES) | {"domain": _domain(family)}
 
 
-def _domain(family: Bound) -> str:
+def _domain(family: PlacedFamily) -> str:
     """The set of a family, with a condition for rows that are needed only for one parity of a bound."""
     over, only = family.family.over, family.family.only
     if only is None:

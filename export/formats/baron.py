@@ -24,7 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.expressions import wrapped
@@ -82,7 +82,7 @@ def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
         yield from render([name, b": ", words(scalar_when_constant(values)), b";\n"], len(values))
 
 
-def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     terms = [_monomial(term, names) for term in (*family.of_degree(1), *family.of_degree(2))]
     sense = f" {family.family.sense} ".encode()
     parts = [names.row(family), b":", *(piece for term in terms for piece in term), sense]

@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import VARIABLES, IndexSet
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -163,7 +163,7 @@ def _bound(expression: sp.Expr, over: IndexSet) -> str:
     return _Gams(over, SETS[over]).bound(expression)
 
 
-def _described(family: Bound) -> dict[str, str]:
+def _described(family: PlacedFamily) -> dict[str, str]:
     domain = DOMAINS[family.family.over]
     controls = f"{SETS[family.family.over]}({domain})"
     return described(_Gams, family, SENSES) | {"domain": domain, "controls": controls}
@@ -193,7 +193,7 @@ def _exact(constant: sp.Expr) -> str:
     return text if denominator == 1 else f"{text}/{denominator}"
 
 
-def _condition(family: Bound) -> str:
+def _condition(family: PlacedFamily) -> str:
     """For rows that are needed only for one parity of a bound."""
     if family.family.only is None:
         return ""

@@ -31,7 +31,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
@@ -112,7 +112,7 @@ def bracketed(values: Floats) -> Texts:
 class Scalar(Language):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
-    def __init__(self, family: Bound, names: Names) -> None:
+    def __init__(self, family: PlacedFamily, names: Names) -> None:
         self._family = family
         self._names = names
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...models.formulations.problem import Block, Bound
+from ...models.formulations.problem import Block, PlacedFamily
 from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names
 from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
@@ -76,7 +76,7 @@ def _objective(form: Canonical) -> Iterator[bytes]:
     yield b" ] / 2\n"
 
 
-def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
         parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
@@ -88,7 +88,7 @@ def _columns(form: Canonical) -> Iterator[bytes]:
             yield b" ONE c_ONE 1\n"
 
 
-def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
     """The lines of a column of a block for the rows of a family, in the order of rows."""
     chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
     lines = [line for term in chosen for line in _incident(family, term)]
@@ -102,7 +102,7 @@ def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterato
             yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
-def _incident(family: Bound, term: Term) -> list[tuple[int, Ints | None, Term]]:
+def _incident(family: PlacedFamily, term: Term) -> list[tuple[int, Ints | None, Term]]:
     """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
@@ -190,7 +190,7 @@ def _objective_matrix(form: Canonical) -> Iterator[bytes]:
     )
 
 
-def _row_matrices(family: Bound, names: Names) -> Iterator[bytes]:
+def _row_matrices(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     products = family.of_degree(2)
     if not products:
         return

@@ -28,7 +28,7 @@ from typing import Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.expressions import is_data, split
@@ -121,7 +121,7 @@ def _objective(problem: Problem) -> Iterator[bytes]:
     yield b"</obj>\n</objectives>\n"
 
 
-def _constraints(family: Bound, names: Names) -> Iterator[bytes]:
+def _constraints(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     limit = words(scalar_when_constant(family.limit))
     lower: Piece = b"-INF" if family.family.sense == "<=" else limit
     upper: Piece = b"INF" if family.family.sense == ">=" else limit
@@ -189,7 +189,7 @@ def _nonlinear(problem: Problem) -> Iterator[bytes]:
     yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
 
 
-def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _tree(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """An expression as nodes; parts free of columns become one number."""
     if is_data(family, expression):
         return _constant(family, expression)
@@ -203,7 +203,7 @@ def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
     return _node(b"cos", _tree(family, expression.args[0]))
 
 
-def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _chain(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """A sum or a product, its parts free of columns joined into one number in front."""
     data, others = split(family, expression)
     constant = [] if data is None else _constant(family, data)
@@ -211,7 +211,7 @@ def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
     return _node(b"sum" if expression.is_Add else b"product", inside)
 
 
-def _constant(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _constant(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     return [b'<number value="', words(family.data(expression)), b'"/>']
 
 

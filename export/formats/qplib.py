@@ -32,7 +32,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.problem import Bound
+from ...models.formulations.problem import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.curvature import probtype
@@ -115,7 +115,7 @@ def _rows(form: Canonical) -> Iterator[bytes]:
             first += family.count
 
 
-def _row_terms(family: Bound, degree: int, first: int) -> Iterator[bytes]:
+def _row_terms(family: PlacedFamily, degree: int, first: int) -> Iterator[bytes]:
     row = Decimals(np.arange(first, first + family.count))
     linear: list[Any] = []
     for term in family.of_degree(degree):

@@ -154,7 +154,7 @@ def run(
 
 
 @dataclass
-class _Findings:
+class _Found:
     """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
 
     candidates: list[Candidate] = field(default_factory=list)
@@ -162,9 +162,9 @@ class _Findings:
     interrupted: str = ""
 
 
-def _tried_in_turn(request: Request) -> _Findings:
+def _tried_in_turn(request: Request) -> _Found:
     """What the methods of a run find, one after the other, until one of them is interrupted."""
-    found = _Findings()
+    found = _Found()
     for method in _tried():
         try:
             for candidate in method.find(request):

@@ -39,7 +39,7 @@ _WINDOWS: Final = 4  # a round
 _SECONDS: Final = 5.0  # a window
 _SHORTEST: Final = 0.5  # seconds: with less no solver is started
 
-Progress = Callable[[int, float], object]
+WindowProgress = Callable[[int, float], object]
 """Is told how many windows are solved, and the least energy so far."""
 
 
@@ -84,7 +84,7 @@ def search_windows(
     solver: str = "bonmin",
     seed: int = 0,
     jobs: int = 2,
-    progress: Progress = lambda *_: None,
+    progress: WindowProgress = lambda *_: None,
 ) -> WindowSearch:
     """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
 

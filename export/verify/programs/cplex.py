@@ -1,4 +1,4 @@
-"""CPLEX as a consumer of LP and MPS, through its Python API.
+"""CPLEX as a reader of LP and MPS, through its Python API.
 
 The community edition solves up to 1000 columns and rows.
 """

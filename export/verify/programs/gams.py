@@ -18,7 +18,7 @@ from typing import Final
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
 from ...solutions.readers.text import RawSolution, Status
-from . import casadi as consumer_casadi
+from . import casadi as casadi_program
 from .protocol import Refused, TooLarge
 from .reading import Evaluation, Points, told
 
@@ -43,7 +43,7 @@ def version() -> str:
     """Its version, and that of CasADi, which evaluates what CONVERT writes."""
     from importlib.metadata import version as installed
 
-    return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {consumer_casadi.version()})"
+    return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {casadi_program.version()})"
 
 
 def _system(solver: str) -> Path:
@@ -120,7 +120,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     _run(path, "convert")
     if not Path("out.nl").exists():
         raise Refused("CONVERT wrote no .nl")
-    found = consumer_casadi.evaluate(Path("out.nl").resolve(), points, our_name)
+    found = casadi_program.evaluate(Path("out.nl").resolve(), points, our_name)
     return replace(found, may_lack=True, rounding=1e-14)
 
 

@@ -1,4 +1,4 @@
-"""GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
+"""GLPK's executable as a reader of LP, MPS and AMPL models with their data. It takes linear models only.
 
 What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
 is a row there as well, and columns are indexed: alpha[1,2].

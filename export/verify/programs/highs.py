@@ -1,4 +1,4 @@
-"""HiGHS as a consumer of LP and MPS. It reads no quadratic rows, and solves no MIQP."""
+"""HiGHS as a reader of LP and MPS. It reads no quadratic rows, and solves no MIQP."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
+"""SCIP as a reader of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
 A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
 variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is

@@ -1,4 +1,4 @@
-"""Xpress as a consumer of LP and MPS, through its Python API. The community edition is limited in size."""
+"""Xpress as a reader of LP and MPS, through its Python API. The community edition is limited in size."""
 
 from __future__ import annotations
 

@@ -95,9 +95,9 @@ def test_verify_compares_optima_across_formats(written, two, tmp_path):
     if not PROGRAMS["scip"].present:
         pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
-    found = verify(tmp_path, seconds=4.0, consumers=["scip", "highs"])
+    found = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
     assert found.bad == []
-    solves = {f.file.rpartition(".")[2]: f for f in found.findings if f.step == "solve" and f.objective}
+    solves = {f.file.rpartition(".")[2]: f for f in found.checks if f.step == "solve" and f.objective}
     weak, whole = solves["mps"], solves["nl"]
     assert weak.relaxes == whole.group != weak.group
     assert weak.objective < whole.objective - 0.04
@@ -114,5 +114,5 @@ def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
     document = json.loads(manifest.path.read_text())
     document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
     manifest.path.write_text(json.dumps(document))
-    (bad,) = verify(tmp_path, consumers=["highs"]).bad
+    (bad,) = verify(tmp_path, programs=["highs"]).bad
     assert "the manifest says" in bad.reason

@@ -28,8 +28,8 @@ from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
-from crossfield.export.verify.programs import glpk as consumer_glpk
-from crossfield.export.verify.programs import scip as consumer_scip
+from crossfield.export.verify.programs import glpk as glpk_program
+from crossfield.export.verify.programs import scip as scip_program
 from crossfield.export.verify.programs.reading import Meaning, Points
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
@@ -169,22 +169,20 @@ def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
 def test_verify_hands_them_to_their_readers(tmp_path: Path):
     """SCIP reads every .osil, GLPK the linear .mod; the others are refused as the table states. Nobody is handed .qplib or .bar."""
     write_all(tiny(), tmp_path, formats=MORE)
-    found = verify(tmp_path, consumers=["scip", "glpk"], seconds=0.3)
+    found = verify(tmp_path, programs=["scip", "glpk"], seconds=0.3)
     assert found.bad == []
-    read = {(f.consumer, f.file.split(".", 1)[1]): f.verdict for f in found.findings if f.step == "read"}
+    read = {(f.program, f.file.split(".", 1)[1]): f.verdict for f in found.checks if f.step == "read"}
     if PROGRAMS["glpk"].present:
         agrees = {
-            name for (consumer, name), verdict in read.items() if (consumer, verdict) == ("glpk", "agrees")
+            name for (program, name), verdict in read.items() if (program, verdict) == ("glpk", "agrees")
         }
         assert agrees == {"milp-mccormick.mod"}
         assert read["glpk", "minlp-cubic.mod"] == Verdict.REFUSED
-        solved = [f for f in found.findings if (f.consumer, f.step) == ("glpk", "solve") and f.proven]
+        solved = [f for f in found.checks if (f.program, f.step) == ("glpk", "solve") and f.proven]
         assert [f.file for f in solved] == ["small.milp-mccormick.mod"]
-    assert {name for consumer, name in read if consumer == "scip"} == {
-        f"{name}.osil" for name in FORMULATIONS
-    }
-    assert {verdict for (consumer, _), verdict in read.items() if consumer == "scip"} == {Verdict.AGREES}
-    assert not any(f.file.endswith((".qplib", ".bar", ".dat")) for f in found.findings)
+    assert {name for program, name in read if program == "scip"} == {f"{name}.osil" for name in FORMULATIONS}
+    assert {verdict for (program, _), verdict in read.items() if program == "scip"} == {Verdict.AGREES}
+    assert not any(f.file.endswith((".qplib", ".bar", ".dat")) for f in found.checks)
 
 
 # AMPL
@@ -279,11 +277,11 @@ def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Pa
 def test_glpk_reads_the_linear_ampl_model_as_the_problem(
     label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.chdir(tmp_path)  # where the consumer puts its files
+    monkeypatch.chdir(tmp_path)  # where the program puts its files
     problem = problem_of(label)
     write(problem, tmp_path / "model.mod")
     points = feasible_points(problem)
-    found = consumer_glpk.evaluate(tmp_path / "model.mod", points)
+    found = glpk_program.evaluate(tmp_path / "model.mod", points)
     assert evaluation_difference(found, problem, points) == ""
     assert found.integer.sum() == problem.integer.sum()
 
@@ -436,7 +434,7 @@ def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
     write(problem, tmp_path / "model.osil")
     points = feasible_points(problem)
-    found = consumer_scip.evaluate(tmp_path / "model.osil", points)
+    found = scip_program.evaluate(tmp_path / "model.osil", points)
     assert evaluation_difference(found, problem, points) == ""
     assert np.isfinite(found.objective[2:]).all()
 
@@ -447,7 +445,7 @@ def test_scip_notices_a_wrong_osil(tmp_path: Path):
     (tmp_path / "model.osil").write_text(text.replace('<number value="2"/>', '<number value="2.001"/>'))
     points = feasible_points(problem)
     assert "objective" in evaluation_difference(
-        consumer_scip.evaluate(tmp_path / "model.osil", points), problem, points
+        scip_program.evaluate(tmp_path / "model.osil", points), problem, points
     )
 
 
