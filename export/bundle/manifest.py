@@ -2,7 +2,7 @@
 
     bottle_n024.instance.json (or .npz)              the instance, once per folder
     bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
-    bottle_n024.milp-mccormick.manifest.json         what these are; all that is needed, with the instance, to read a solution
+    bottle_n024.milp-mccormick.manifest.json         what these are; reads a solution, with the instance
 
 Names come from the instance and the formulation alone, so that a later export replaces an earlier one.
 """
@@ -64,7 +64,7 @@ class Manifest:
         return self.path.parent
 
     def instance(self) -> Instance:
-        """The instance beside the manifest. Raises InputError when it is missing, InstanceError when it is another one."""
+        """The instance beside the manifest. Raises InputError, and InstanceError for another instance."""
         path = self.folder / self.document["instance"]["file"]
         instance = read_instance(path)
         if instance.sha256 != self.document["instance"]["sha256"]:
@@ -112,7 +112,7 @@ class Manifest:
 
 
 def read_manifest(path: str | Path) -> Manifest:
-    """The manifest in a file. Raises InputError when it cannot be read, InstanceError when it breaks its schema."""
+    """The manifest in a file. Raises InputError, and InstanceError when it breaks its schema."""
     try:
         document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
@@ -133,7 +133,7 @@ def write_problem(
     compress: bool = False,
     jobs: int = 1,
 ) -> Manifest:
-    """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
+    """The manifest of the files now in the folder: the problem in each of the formats, and the instance.
 
     What a format cannot carry is listed in the manifest as refused. The other arguments are those of
     `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no manifest
@@ -158,7 +158,7 @@ def write_all(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Manifest]:
-    """The manifests of the sets of files now in the folder: every formulation in every format that carries it.
+    """The manifests of the files now in the folder: every formulation in every format that carries it.
 
     start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`; without
     one, `fixed_jumps` says which. options: facet, stroke_norm, beta_norm, relax, each used where a
@@ -198,7 +198,7 @@ class _Sets:
 
     @contextmanager
     def threads(self, jobs: int) -> Iterator[None]:
-        """Threads that write files: nearly all the time goes to NumPy, zlib and hashlib, which run side by side.
+        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run side by side.
 
         After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
         whole.
@@ -220,7 +220,7 @@ class _Sets:
         return formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.start), **chosen)
 
     def begin(self, problem: Problem) -> Callable[[], Manifest]:
-        """Hand the files of a problem to the threads; a function that waits for them and gives their manifest."""
+        """A function that waits for the files of a problem, which the threads now write: their manifest."""
         stem = f"{self.instance.name}.{problem.name}"
         files = {name: self._submit(problem, stem, name) for name in self.formats}
 
@@ -246,18 +246,19 @@ class _Sets:
 def _check_recordable(problem: Problem) -> None:
     if not is_recordable(problem):
         raise InputError(
-            f"a manifest cannot record {problem.name} with columns fixed or products lifted; write it as a single file"
+            f"a manifest cannot record {problem.name} with columns fixed or products lifted; "
+            "write it as a single file"
         )
 
 
 def is_recordable(problem: Problem) -> bool:
-    """Whether formulation, options and jumps say all of a problem: no columns are fixed and no products were lifted beforehand."""
+    """Whether formulation, options and jumps say all of a problem: no column is fixed, no product lifted."""
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
     return plain.sha256 == problem.sha256
 
 
 def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
-    """The manifest, now in the folder with the instance, of a problem of which one format was just written there.
+    """The manifest now in the folder, with the instance, of a problem that was just written in one format.
 
     Files of the same problem that a manifest there lists stay listed. Raises OutputError.
     """
@@ -284,10 +285,10 @@ def _kept(document: dict[str, Any], folder: Path) -> Manifest:
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
-    """The jumps that a formulation takes as data, None where it has them as variables: those of `start`, by default of the improved greedy field.
+    """The jumps that a formulation takes as data; None where it has them as variables.
 
-    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions
-    are of one problem.
+    They are those of `start`, by default of the improved greedy field. Everything that writes or solves a
+    formulation by its name asks here, so that its files and its solutions are of one problem.
     """
     recipe = FORMULATIONS.get(name)
     if recipe is None or not recipe.fixed:

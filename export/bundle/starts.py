@@ -3,7 +3,7 @@
     layout
     list    .mst   lines `name value`                                  Gurobi: model.read(...), or InputFile
     cplex   .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
-    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: --read_solution_file, readSolution
+    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: read_solution_file, readSolution
     scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
     slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
@@ -39,7 +39,7 @@ from ..writing.sink import save
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A complete point of a problem as a format holds it: names and values of all columns, ONE included, and its objective."""
+    """A complete point of a problem as a format holds it."""
 
     problem: Problem
     point: Floats
@@ -113,7 +113,7 @@ def _scip(start: Start) -> Iterator[bytes]:
 
 
 def _objective_variables(start: Start) -> dict[str, float]:
-    """The variables that stand for an objective in SCIP, at what is not linear in it; none where nothing is."""
+    """The variables that stand for an objective in SCIP, at what is not linear in it, if anything is."""
     problem, point = start.problem, start.point
     if problem.objective_degree < 2:
         return {}
@@ -142,9 +142,10 @@ STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solve
 
 
 def start_of(problem: Problem, field: CrossField) -> Start:
-    """The complete point of a field in the columns of the LP and MPS files; those of the .nl file where LP and MPS hold nothing.
+    """The complete point of a field in the columns of the LP and MPS files.
 
-    Raises InstanceError when the field is on another instance.
+    In those of the .nl file where LP and MPS hold nothing. Raises InstanceError when the field is on another
+    instance.
     """
     try:
         held = carried(problem, FORMATS["mps"])
@@ -170,7 +171,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
 
 
 def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
-    """The files now in the folder, by solver: `stem.gurobi.mst` and so on, for the solvers that take the problem.
+    """The files now in the folder, by solver that takes the problem: `stem.gurobi.mst` and so on.
 
     None for a problem without integers, where these files mean nothing. Raises as `write_start`.
     """

@@ -249,8 +249,8 @@ def read_command(
             "--tolerance",
             metavar="X",
             min=0,
-            help="How far the answer may break a row or a bound, and how far, relatively, its objective may be"
-            " off, before it is refused.",
+            help="How far the answer may break a row or a bound, and how far, relatively, its objective"
+            " may be off, before it is refused.",
         ),
     ] = 1e-5,
     quiet: Quiet = False,

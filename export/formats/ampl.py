@@ -103,7 +103,7 @@ def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
 def _listed(
     instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
 ) -> Iterator[bytes]:
-    """One element a line, its index and its values: `1 2 u 0.3`; only the elements `at`, when they are given."""
+    """One element a line, its index and values: `1 2 u 0.3`; only the elements `at`, when they are given."""
     rows, columns = _place(instance, over)
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:

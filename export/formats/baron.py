@@ -1,7 +1,7 @@
-"""BARON's own format, for polynomials up to degree 4 (it has exp, log and powers, but no trigonometric functions: B1).
+"""BARON's own format, for polynomials up to degree 4: it has no trigonometric functions (B1).
 
     // comment
-    BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default), in this order (B2)
+    BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default) (B2)
     LOWER_BOUNDS{                            every finite bound, those of binaries aside
     alpha_00_00: 0;
     }
@@ -9,7 +9,7 @@
     EQUATIONS c14_00_00_u, ...;
     c14_00_00_u: s_00_00_u - alpha_00_00 ... >= 0;    constants on the right (B4)
     OBJ: minimize
-     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, squares kept, one summand a line; negative numbers in brackets (B6)
+     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, one summand a line; (-1) in brackets (B6)
     STARTING_POINT{ ... }
 
 Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of

@@ -1,13 +1,13 @@
-"""GAMS, scalar layout, as instance libraries have it: one variable a column, one equation a row, under our own names.
+"""GAMS, scalar layout, as instance libraries have it: a variable a column, an equation a row, our names.
 
-    Variables objvar;                        the objective is a free scalar (G10), obj.. objvar =e= one summand a line (G6)
-    Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; lists are wrapped, no line starts
-                                             with `*`, which would make it a comment (G6)
-    c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); negative numbers in brackets (G2, G3)
-    alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   both bounds of every column (G7), -inf and +inf (G12), .fx where equal
+    Variables objvar;                        a free scalar (G10); obj.. objvar =e= one summand a line (G6)
+    Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; no line of a list
+                                             starts with `*`, which would make it a comment (G6)
+    c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); (-1) in brackets (G2, G3)
+    alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   of every column (G7), -inf and +inf (G12), .fx where equal
     alpha_00_00.l = 0.3;                     the start
     solve m using minlp minimizing objvar;   the type by what is in the model (G9)
-    $ifThen set RESULTS ... $endIf           after `gams x.gms --RESULTS=x.csv`: the answer as lines name,value
+    $ifThen set RESULTS ... $endIf           with `--RESULTS=x.csv` the answer as lines name,value
 
 Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is
 a cosine. Numbers are shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No

@@ -1,11 +1,12 @@
 """Free MPS, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
 
-    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated by Gurobi, Xpress and GLPK in their solutions; FREE is for CBC (M20)
+    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated in solutions; FREE is for CBC (M20)
     ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
-    COLUMNS                            ` column row value`, one pair a line, `obj 0` for columns without cost (M19);
+    COLUMNS                            ` column row value`, one pair a line; `obj 0` without a cost (M19);
         MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
     RHS                                set name RHS1; no entry for the objective (M4), no RANGES (M11)
-    BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP, LO + PL, MI then UP
+    BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP,
+                                       LO + PL, MI then UP
     QUADOBJ                            one triangle of the Hessian: x'Qx/2 (M13)
     QCMATRIX row                       both triangles, without one-half (M16), after BOUNDS (M17)
     ENDATA
@@ -64,7 +65,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 
 
 def _columns(form: Canonical) -> Iterator[bytes]:
-    """Matrix entries column by column; a record is a column with all its entries, the cost first, then by row."""
+    """Matrix entries column by column; a record is a column: its cost first, then by row."""
     problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
     markers = 0
@@ -103,7 +104,7 @@ def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> 
 
 
 def _incident(family: PlacedFamily, term: Term) -> list[tuple[int, Ints | None, Term]]:
-    """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
+    """Rows of a family in which a column of the term's block stands: (rank, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
     the right one, so that the rows of a pixel are those of its pairs to the left, upwards, to the right and
@@ -128,7 +129,7 @@ def _inverse(index: Ints, count: int) -> Ints:
 
 
 def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
-    """Number of the pair of each pixel with its left, upper, right and lower neighbour, -1 where there is none."""
+    """Number of the pair of each pixel with its left, upper, right and lower neighbour; -1: none."""
     upper, right = grid.pair_number
     left, lower = np.full_like(right, -1), np.full_like(upper, -1)
     left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]

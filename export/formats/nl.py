@@ -272,7 +272,7 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
 
 
 def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
-    """Symbols and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
+    """Symbols and coefficients of a row in J: linear terms, and 0 for what is only in nonlinear ones."""
     linear = {term.symbols[0]: coefficient(term) for term in family.of_degree(1)}
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 

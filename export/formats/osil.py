@@ -1,13 +1,13 @@
 """OSiL, the XML format of COIN-OR's Optimization Services, for SCIP and OSSolverService.
 
     <variables numberOfVariables="7">
-    <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            every attribute always: defaults are lb 0, ub INF (O1); types C, B, I
+    <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            C, B, I; no attribute is left out (O1)
     <objectives> <obj maxOrMin="min" constant="0.3"> <coef idx="0">-1</coef>
     <constraints> <con name="c14_00_00_u" lb="0" ub="INF"/>        constants on the right
     <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
     <quadraticCoefficients>
-    <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               the full coefficient, without one-half; idx -1 is the objective (O1, O2)
-    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms of the objective beyond quadratic, as declared, one <nl> (O2)
+    <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               not halved; -1 is the objective (O1, O2)
+    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       what is beyond quadratic, in one <nl> (O2)
 
 What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
 Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
@@ -88,12 +88,13 @@ _LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
 
 def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
     lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
-    parts: Pieces = [b'<var name="', names.of(block), f'" type="{kind}" lb="'.encode(), lower, b'" ub="', upper, b'"/>\n']  # fmt: skip
+    kind_lower = f'" type="{kind}" lb="'.encode()
+    parts: Pieces = [b'<var name="', names.of(block), kind_lower, lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, block.count)
 
 
 def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """Columns (k, degree) and coefficients (k,) of the objective's terms up to quadratic, each set of columns once."""
+    """Columns (k, degree), each set once, and coefficients (k,) of the objective's terms up to quadratic."""
     nonlinear = problem.objective_degree > 2
     index, value = _beside_nonlinear(problem, degree) if nonlinear else problem.merged_objective(degree)
     if degree:
@@ -116,7 +117,8 @@ def _objective(problem: Problem) -> Iterator[bytes]:
     index, cost = _coefficients(problem, 1)
     constant = float(_coefficients(problem, 0)[1].sum())
     yield b'<objectives numberOfObjectives="1">\n'
-    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" numberOfObjCoef="{len(cost)}" constant="{number(constant)}">\n'.encode()
+    counts = f'numberOfObjCoef="{len(cost)}" constant="{number(constant)}"'
+    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {counts}>\n'.encode()
     yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', words(cost), b"</coef>\n"], len(cost))
     yield b"</obj>\n</objectives>\n"
 

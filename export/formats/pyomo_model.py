@@ -60,7 +60,7 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
 
 
 def places(instance: Instance, over: IndexSet) -> list[Place]:
-    """Where the elements of an index set lie: (row, column), for a pair of its first pixel and then its side."""
+    """Where the elements of an index set lie: (row, column), for a pair of its first pixel, and its side."""
     grid = instance.grid
     at = pixel_of(instance, over)
     coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]

@@ -27,12 +27,12 @@ OBJECTIVE: Final = b"obj"
 
 
 def problem_name(problem: Problem) -> str:
-    """Name of a problem where solvers repeat it in their solution files: instance and stamp, at most 52 letters, digits and underscores."""
+    """Name that solvers repeat in their solution files: instance and stamp, at most 52 word characters."""
     return f"{problem.instance.name}_{problem.stamp}"
 
 
 class Names:
-    """Names of a problem's columns and rows as pieces of records: a tag, and words for where the elements lie.
+    """Names of columns and rows as pieces of records: a tag, and words for where the elements lie.
 
     The words are the same for all blocks and families over an index set, so that there are few of them and
     each is made once.

@@ -109,7 +109,7 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
         model.setControl(option, value)
-    # Before the search: when it is cut short, the names are those of the presolved model, and the values of the whole one.
+    # Before the search: one that is cut short has the names of the presolved model, but values of the whole.
     names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
         _, found = model.optimize()

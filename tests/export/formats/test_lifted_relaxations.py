@@ -1,4 +1,4 @@
-"""With integrality dropped, a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
+"""Without integrality a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ LIFTED = ("minlp-quartic", "minlp-cubic")
 
 @pytest.fixture(scope="module")
 def two():
-    """Two pixels whose strokes pull p1 between 0 and 1: there the hull of the product is larger than the product."""
+    """Two pixels whose strokes pull p1 between 0 and 1, where the hull of the product is larger than it."""
     mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
     return cf.Instance("two", mask, pixels, [0.5, 2.2], [1.0, 1.0], w_beta=1.0, gauge="box")
 
@@ -62,7 +62,7 @@ def test_no_other_relaxation_is_called_the_same_problem(written):
 
 
 def test_the_hull_is_larger(two):
-    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible there and lower than any point of the products."""
+    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible and lower than any of the products."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     lifted = cf.solve(problem, "highs")
     assert lifted.violation.worst < 1e-6
@@ -81,7 +81,7 @@ def starts(instance):
 
 
 def test_a_solver_is_chosen_that_reads_the_products(two):
-    """HiGHS would solve the weaker problem of the .mps; it does so when it is asked for, and the facts tell."""
+    """HiGHS would solve the weaker problem of the .mps; it does when it is asked for, and the facts tell."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
@@ -91,7 +91,7 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 @pytest.mark.slow
 @pytest.mark.oracles
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
-    """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, and a contradiction if both were called optima of one problem."""
+    """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
     if not PROGRAMS["scip"].present:
         pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})

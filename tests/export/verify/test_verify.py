@@ -1,4 +1,4 @@
-"""Every program that is here reads, evaluates and solves what we write; a wrong file, a crash and a hang are noticed."""
+"""Every program that is here reads and solves what we write; wrong files, crashes and hangs are noticed."""
 
 from __future__ import annotations
 
@@ -165,14 +165,16 @@ WRONG = {
     "half": ("miqp-exact", "lp", r"4 d_00_00_r \^2", "2 d_00_00_r ^2"),
     "constant": ("miqp-exact", "lp", r"obj(\w*): \+ \S+ ONE", r"obj\1: + 1 ONE"),
     "double": ("miqp-exact", "mps", r" d_00_00_r d_00_00_r 4", " d_00_00_r d_00_00_r 8"),
-    "product": ("miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"),
+    "product": (
+        "miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"
+    ),
     "number": ("minlp-quartic", "nl", r"\nn1\.5707963267948966\n", "\nn1.571\n"),
     "limit": ("miqp-exact", "nl", r"\nr\n4 0\n", "\nr\n4 1\n"),
     "groups": ("milp-mccormick", "nl", r"^((?:.*\n){6}) (\d+) (\d+) 0 0 0\n", r"\1 0 0 0 0 0\n"),
     "square": ("minlp-cubic", "gms", r"\+ 2\*", "+ 2.001*"),
     "greater": ("miqp-exact", "gms", r"=l=", "=g="),
 }  # fmt: skip
-"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere where it is a name)."""
+"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere for a name)."""
 
 
 @pytest.fixture(scope="session")
@@ -237,7 +239,7 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
 
 @needing("scip")
 def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
-    """An understated count of nonlinear variables in a header takes SCIP's process down; the next file is read all the same."""
+    """An understated count of nonlinear variables takes SCIP's process down; the next file is still read."""
     for name in ("crash", "well"):
         write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
     path = tmp_path / "crash.miqcp-bilinear.nl"
@@ -250,7 +252,7 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
 
 
 def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A program's process that is killed, and one that does not answer: both are answers, and the next task gets a new child."""
+    """A process that is killed, and one that does not answer: both are told, the next task has a new one."""
     with Worker("highs", tmp_path / "highs") as worker:
         assert re.match(r"\d+\.", worker.ask({"step": "version"}, 250)["words"])
         for dead_before_it_is_asked in (False, True):
@@ -370,7 +372,7 @@ def test_claims_are_true(
     kind: str,
     name: str,
 ):
-    """Who takes a problem is not contradicted; who does not, refuses the file or gives no proven optimum of it."""
+    """Who takes a problem is not contradicted; who does not, refuses the file or proves no optimum."""
     verification = verified("1 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
     taking = takes(problem, solver)
