@@ -293,8 +293,7 @@ def draw_command(
     output: Output,
     *,
     kind: Annotated[
-        str | None,
-        typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds."),
+        str | None, typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds.")
     ] = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,

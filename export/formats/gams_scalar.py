@@ -157,11 +157,7 @@ def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]
         start += count
 
 
-KEYWORDS: Final = {
-    "continuous": b"Variables",
-    "binary": b"Binary Variables",
-    "integer": b"Integer Variables",
-}
+KEYWORDS: Final = {"continuous": b"Variables", "binary": b"Binary Variables", "integer": b"Integer Variables"}
 
 
 def _variables(form: Canonical) -> Iterator[bytes]:
@@ -186,14 +182,7 @@ def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
         language, relation = Scalar(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
-        parts = [
-            names.row(family),
-            b".. ",
-            *left,
-            SENSES[family.family.sense],
-            *right,
-            b";\n",
-        ]
+        parts = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 
 
@@ -211,12 +200,7 @@ def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[s
     for suffix in suffixes:
         values = (block.upper if suffix == "up" else block.lower)[at]
         text = words(scalar_when_constant(values), bounds) if len(at) else b""
-        parts += [
-            name,
-            f".{suffix} = ".encode(),
-            text,
-            b"; " if suffix == "lo" else b";\n",
-        ]
+        parts += [name, f".{suffix} = ".encode(), text, b"; " if suffix == "lo" else b";\n"]
     return parts
 
 

@@ -25,16 +25,7 @@ from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names, problem_name
-from ..writing.records import (
-    OnlyWhere,
-    Piece,
-    Pieces,
-    Tagged,
-    number,
-    render,
-    scalar_when_constant,
-    words,
-)
+from ..writing.records import OnlyWhere, Piece, Pieces, Tagged, number, render, scalar_when_constant, words
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
 

@@ -33,15 +33,7 @@ from ..writing.canonical import Canonical, coefficient
 from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, name_length
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
-from ..writing.records import (
-    Decimals,
-    Pieces,
-    Raw,
-    check_coefficients,
-    render,
-    scalar_when_constant,
-    words,
-)
+from ..writing.records import Decimals, Pieces, Raw, check_coefficients, render, scalar_when_constant, words
 
 __all__ = ["Layout", "generate"]
 

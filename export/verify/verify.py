@@ -219,15 +219,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
                 if not points.exists():
                     save(_points(held), points)
                 subjects.append(
-                    _Subject(
-                        manifest,
-                        problem,
-                        held,
-                        entry["name"],
-                        entry["format"],
-                        path,
-                        points,
-                    )
+                    _Subject(manifest, problem, held, entry["name"], entry["format"], path, points)
                 )
     return subjects, broken
 
