@@ -33,7 +33,7 @@ from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.names import name_length
-from ..writing.records import Decimals, Piece, Pieces, Words, number, render, table, words
+from ..writing.records import Decimals, Pieces, Words, number, render, table, words
 from .indexed import Indexed, check_indexed, described
 
 SECOND: Final = "r - north[h], c + east[h]"
@@ -155,7 +155,3 @@ class _Ampl(Indexed):
 
     def exact(self, constant: sp.Expr) -> str:
         return str(constant).replace("**", "^")
-
-    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
-        return [*bracketed, f"^{exponent}".encode()]

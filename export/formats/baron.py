@@ -27,7 +27,7 @@ import numpy as np
 from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
-from ..writing.expressions import wrapped
+from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
 from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
 from .gams_scalar import Scalar, declared
@@ -100,11 +100,9 @@ def _monomial(term: Term, names: Names) -> list[Piece]:
 
 
 class _Baron(Scalar):
-    """The language of one family: that of scalar GAMS, with powers of its own."""
+    """The language of one family: that of scalar GAMS, but for powers."""
 
-    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
-        return [*bracketed, f"^{exponent}".encode()]
+    power = Language.power
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:

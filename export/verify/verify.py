@@ -131,7 +131,6 @@ class Verification:
 class _Subject:
     """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
 
-    manifest: Manifest
     problem: Problem
     held: Problem
     name: str
@@ -142,17 +141,8 @@ class _Subject:
     def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
         group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
-        return Check(
-            _title(self.problem),
-            self.name,
-            program,
-            step,
-            verdict,
-            reason,
-            **numbers,
-            group=group,
-            relaxes=relaxes,
-        )
+        told = (_title(self.problem), self.name, program, step, verdict, reason)
+        return Check(*told, **numbers, group=group, relaxes=relaxes)
 
 
 def _title(problem: Problem) -> str:
@@ -203,24 +193,23 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
         place = temporary / f"set{number}"
         place.mkdir()
         for entry in manifest.document["files"]:
-            source = manifest.folder / entry["name"]
+            about, source = (_title(problem), entry["name"], "", "read"), manifest.folder / entry["name"]
             if not source.is_file() or sha256_of(source) != entry["sha256"]:
                 words = "is not the file that the manifest describes; export again"
-                broken.append(Check(_title(problem), entry["name"], "", "read", Verdict.FAILED, words))
+                broken.append(Check(*about, Verdict.FAILED, words))
                 continue
             path = _unpacked(source, place)
-            if path.suffix == FORMATS[entry["format"]].suffix:
-                held = carried(problem, FORMATS[entry["format"]])
-                if entry["lifted"] != held.formulation.lifted:
-                    said, holds = entry["lifted"], held.formulation.lifted
-                    words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
-                    broken.append(Check(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
-                points = place / f"points_{len(held.blocks)}.npz"
-                if not points.exists():
-                    save(_points(held), points)
-                subjects.append(
-                    _Subject(manifest, problem, held, entry["name"], entry["format"], path, points)
-                )
+            if path.suffix != FORMATS[entry["format"]].suffix:
+                continue
+            held = carried(problem, FORMATS[entry["format"]])
+            said, holds = entry["lifted"], held.formulation.lifted
+            if said != holds:
+                words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
+                broken.append(Check(*about, Verdict.DIFFERS, words))
+            points = place / f"points_{len(held.blocks)}.npz"
+            if not points.exists():
+                save(_points(held), points)
+            subjects.append(_Subject(problem, held, entry["name"], entry["format"], path, points))
     return subjects, broken
 
 
@@ -280,61 +269,56 @@ class _Bench:
 
     def _ask(self, subject: _Subject, step: str, seconds: float, **more: Any) -> dict[str, Any]:
         self.result.unlink(missing_ok=True)
-        task = {
-            "step": step,
-            "path": str(subject.path),
-            "points": str(subject.points),
-            "result": str(self.result),
-        }
-        return self.worker.ask(task | {"seconds": seconds} | more, seconds)
+        paths = {"path": subject.path, "points": subject.points, "result": self.result}
+        task = {"step": step, "seconds": seconds} | {name: str(path) for name, path in paths.items()} | more
+        return self.worker.ask(task, seconds)
 
     def _read(self, subject: _Subject) -> Check:
         algebra = subject.format in self.program.algebra
         refusal = _refusal(self.program.name, subject, "read")
         answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
-        if answer["kind"] != "done":
-            return self._unread(subject, answer, refusal)
-        if refusal:
-            words = f"it was read, though {refusal}"
-            return subject.check(self.program.name, "read", Verdict.DIFFERS, words)
+        if answer["kind"] == "done":
+            wrong = f"it was read, though {refusal}" if refusal else self._difference(subject, algebra)
+            verdict, words = (Verdict.DIFFERS if wrong else Verdict.AGREES), wrong
+        elif answer["kind"] == "too large":
+            verdict, words = Verdict.NOT_TRIED, self._too_large(subject)
+        elif answer["kind"] == "not told":
+            verdict, words = Verdict.NOT_TRIED, answer["words"]
+        elif answer["kind"] == "refused" and refusal:
+            verdict, words = Verdict.REFUSED, refusal
+        else:
+            verdict, words = Verdict.FAILED, answer["words"]
+        return subject.check(self.program.name, "read", verdict, words)
+
+    def _difference(self, subject: _Subject, algebra: bool) -> str:
+        """What the program read otherwise than the problem has it; empty when nothing."""
         points = load(Points, subject.points)
         if algebra:
             model = load(Meaning, self.result)
-            wrong = difference(model, subject.held, self.program.tolerance, points.values)
-        else:
-            wrong = evaluation_difference(load(Evaluation, self.result), subject.held, points)
-        return subject.check(self.program.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong)
-
-    def _unread(self, subject: _Subject, answer: dict[str, Any], refusal: str) -> Check:
-        if answer["kind"] == "too large":
-            return subject.check(self.program.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
-        if answer["kind"] == "not told":
-            return subject.check(self.program.name, "read", Verdict.NOT_TRIED, answer["words"])
-        if answer["kind"] == "refused" and refusal:
-            return subject.check(self.program.name, "read", Verdict.REFUSED, refusal)
-        return subject.check(self.program.name, "read", Verdict.FAILED, answer["words"])
+            return difference(model, subject.held, self.program.tolerance, points.values)
+        return evaluation_difference(load(Evaluation, self.result), subject.held, points)
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
         return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _Subject, solver: str) -> Check:
-        refusal = _refusal(solver, subject, "solve")
-        if refusal:
-            return subject.check(solver, "solve", Verdict.REFUSED, refusal)
-        local = _refusal(solver, subject, "local")
-        if local:
-            return subject.check(solver, "solve", Verdict.NOT_TRIED, local)
+        def told(verdict: Verdict, words: str) -> Check:
+            return subject.check(solver, "solve", verdict, words)
+
+        if refusal := _refusal(solver, subject, "solve"):
+            return told(Verdict.REFUSED, refusal)
+        if local := _refusal(solver, subject, "local"):
+            return told(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
-            reason = f"{SOLVERS[solver].title} is not installed: {missing}"
-            return subject.check(solver, "solve", Verdict.NOT_TRIED, reason)
+            return told(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
         assert self.seconds is not None
         begin = time.perf_counter()
         answer = self._ask(subject, "solve", self.seconds, solver=solver)
         if answer["kind"] == "too large":
-            return subject.check(solver, "solve", Verdict.NOT_TRIED, self._too_large(subject))
+            return told(Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] != "done":
-            return subject.check(solver, "solve", Verdict.FAILED, answer["words"])
+            return told(Verdict.FAILED, answer["words"])
         return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
 
 
@@ -366,23 +350,15 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
     if wrong:
         return subject.check(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
-    return subject.check(
-        solver,
-        "solve",
-        Verdict.AGREES if proven else Verdict.LIMIT,
-        "" if proven else answer.message,
-        proven=proven,
-        **numbers,
-    )
+    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, answer.message)
+    return subject.check(solver, "solve", verdict, words, proven=proven, **numbers)
 
 
 def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
     """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
     options = problem.formulation.options
-    if (
-        options.relax or options.facet == "printed"
-    ):  # then z need not be p1 beta, and the field is another point
-        return ""
+    if options.relax or options.facet == "printed":
+        return ""  # z need not be p1 beta, and the field is another point
     if same(energy, objective) or (not proven and energy < objective):
         return ""
     return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
@@ -400,9 +376,8 @@ def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
     names = np.array([name.encode() for name in names_of(column_names(problem))])
     values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
     point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
-    return np.where(
-        problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point
-    ), wrong
+    whole = problem.integer & (np.abs(point - np.round(point)) <= ROUND)
+    return np.where(whole, np.round(point), point), wrong
 
 
 def same(first: float, second: float) -> bool:

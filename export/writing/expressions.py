@@ -37,9 +37,10 @@ class Language(ABC):
     def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
         """A factor that is data, signed or bracketed like `constant`."""
 
-    @abstractmethod
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        """The power of a base (not bracketed) with an exponent of at least 2."""
+        """The power of a base (not bracketed) with an exponent of at least 2; by default with a caret."""
+        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
+        return [*bracketed, f"^{exponent}".encode()]
 
     def expression(self, expression: sp.Expr) -> list[Piece]:
         """An expression; its first term has a sign only when it is negative."""

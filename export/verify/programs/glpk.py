@@ -16,7 +16,7 @@ import numpy as np
 
 from ...solutions.readers.text import RawSolution, Status
 from ...solvers_table import PROGRAMS
-from ...writing.terms import terms
+from ...writing.terms import listed
 from .protocol import Refused, executable
 from .reading import Evaluation, Meaning, Points, told
 
@@ -82,7 +82,7 @@ def read(path: Path) -> Meaning:
         costs=costs,
         row_lower=row_lower,
         row_upper=row_upper,
-        matrix=terms([e[:2] for e in rest], [e[2] for e in rest], indices=2),
+        matrix=listed(rest, indices=2),
     )
     return _without_objective(model, path) if path.suffix == ".mod" else model
 

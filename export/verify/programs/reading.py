@@ -134,6 +134,12 @@ class Points:
         return self.values[:, places(self.names, columns)]
 
 
+def infinite(values: Sequence[float]) -> Floats:
+    """Bounds, infinite from 1e20 on, as CPLEX and Xpress have it."""
+    given = np.array(values, dtype=float)
+    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
+
+
 def told(
     status: Status,
     words: str,
@@ -148,6 +154,7 @@ def told(
     return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
 
 
+_INFINITY: Final = 1e20
 _TOLD: Final = "the program itself"
 T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
 

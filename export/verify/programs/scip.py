@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, terms
+from ...writing.terms import Terms, listed
 from .protocol import Refused, file_names
 from .reading import Evaluation, Meaning, Points, told
 
@@ -93,10 +93,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
         square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
         linear += [(place, number[v.name], cost) for v, _, cost in squares]
         linear += [(place, number[v.name], value) for v, value in rest if v.name in number]
-    return (
-        terms([e[:2] for e in linear], [e[2] for e in linear], indices=2),
-        terms([e[:3] for e in square], [e[3] for e in square], indices=3, products=2),
-    )
+    return listed(linear, indices=2), listed(square, indices=3, products=2)
 
 
 def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
