@@ -139,7 +139,9 @@ def write_problem(
     `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no manifest
     records: with columns fixed, or with products lifted beforehand.
     """
-    _check_recordable(problem)
+    if not is_recordable(problem):
+        what = f"{problem.name} with columns fixed or products lifted"
+        raise InputError(f"a manifest cannot record {what}; write it as a single file")
     sets = _Sets(problem.instance, Path(folder), tuple(formats), start, {}, dialects or {}, compress)
     with sets.threads(jobs):
         return sets.begin(problem)()
@@ -243,14 +245,6 @@ class _Sets:
         return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
 
 
-def _check_recordable(problem: Problem) -> None:
-    if not is_recordable(problem):
-        raise InputError(
-            f"a manifest cannot record {problem.name} with columns fixed or products lifted; "
-            "write it as a single file"
-        )
-
-
 def is_recordable(problem: Problem) -> bool:
     """Whether formulation, options and jumps say all of a problem: no column is fixed, no product lifted."""
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
@@ -278,7 +272,6 @@ def _path(document: dict[str, Any], folder: Path) -> Path:
 
 
 def _kept(document: dict[str, Any], folder: Path) -> Manifest:
-    """The manifest now in the folder."""
     path = _path(document, folder)
     write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
@@ -346,13 +339,8 @@ def _document(
         },
         "columns": _columns(problem),
         "rows": [
-            {
-                "name": family.family.tag,
-                "over": family.family.over,
-                "count": family.count,
-                "paper": family.family.paper,
-            }
-            for family in problem.rows
+            {"name": row.family.tag, "over": row.family.over, "count": row.count, "paper": row.family.paper}
+            for row in problem.rows
         ],
         "jumps": _nonzero(problem),
         "sha256": problem.sha256,

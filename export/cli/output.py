@@ -138,15 +138,8 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
     for document in documents:
         sizes, counts = _sizes(document), document["counts"]
         written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
-        rows.append(
-            [
-                document["formulation"],
-                document["class"],
-                str(counts["columns"]),
-                str(counts["rows"]),
-                *written,
-            ]
-        )
+        size = [str(counts["columns"]), str(counts["rows"])]
+        rows.append([document["formulation"], document["class"], *size, *written])
     show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
@@ -156,13 +149,8 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
 
 def _sizes(document: dict[str, Any]) -> dict[str, int]:
     """Bytes of the model file of each format."""
-    return {
-        entry["format"]: entry["bytes"] for entry in document["files"] if not _is_list_of_names(entry["name"])
-    }
-
-
-def _is_list_of_names(name: str) -> bool:
-    return name.removesuffix(".gz").endswith((".row", ".col"))
+    lists = (".row", ".col", ".row.gz", ".col.gz")
+    return {file["format"]: file["bytes"] for file in document["files"] if not file["name"].endswith(lists)}
 
 
 _ONLY_IF_ANY: Final = (
@@ -202,11 +190,8 @@ def _text(value: object) -> str:
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
     """Print the tables of formulations, formats, solvers and readers, and which go together."""
     formulations = tables["formulations"][1]
-    show_table(
-        "formulations",
-        ("name", "paper", "class", "summary"),
-        _cells(formulations, ("name", "paper", "class", "summary")),
-    )
+    columns = ("name", "paper", "class", "summary")
+    show_table("formulations", columns, _cells(formulations, columns))
     formats, solvers = tables["formats"], tables["solvers"]
     names = [row["name"] for row in formats[1]]
     carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]

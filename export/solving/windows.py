@@ -26,7 +26,6 @@ from ...models.search.excerpt import Excerpt, excerpt
 from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
-from ..solutions.solution import Solution
 from ..solvers_table import DRIVEN
 from .job import Limits
 from .local import solve
@@ -134,11 +133,8 @@ def _solved(task: _Task) -> _Found | None:
     limits = Limits(threads=1).until(deadline)
     with tempfile.TemporaryDirectory(dir=task.folder) as folder:
         found = solve(problem, task.solver, folder, limits=limits, start=piece.field)
-    return _Found(piece, _field_of(found), found.status.startswith("optimal"))
-
-
-def _field_of(found: Solution) -> CrossField | None:
-    return None if found.point is None else found.field
+    answer = None if found.point is None else found.field
+    return _Found(piece, answer, found.status.startswith("optimal"))
 
 
 class _State:

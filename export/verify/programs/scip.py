@@ -113,7 +113,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     columns, row_names = file_names(path) if path.suffix == ".nl" else (points.names, list(rows))
     ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
-    row_lower, row_upper = _limits([_row_limits(scip, rows[name]) for name in row_names])
+    row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in map(rows.get, row_names)])
     given = points.of(columns)
     return Evaluation(
         [v.name for v in ours],
@@ -136,10 +136,6 @@ def _objective(scip: Any, variables: dict[str, Any], columns: list[str], points:
     for place in range(points.random, len(given)):
         values[place] = _agreed(scip, variables, columns, given[place], float(points.objective[place]))
     return values
-
-
-def _row_limits(scip: Any, row: Any) -> tuple[float, float]:
-    return scip.getLhs(row), scip.getRhs(row)
 
 
 def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
