@@ -40,11 +40,9 @@ SECOND: Final = "r-north(side),c+east(side)"
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
-    """The bytes of the GAMS file in indexed layout, block by block.
+    """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,).
 
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
-    levels. Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with
-    columns fixed.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for columns fixed.
     """
     problem, instance = form.problem, form.problem.instance
     check_indexed(problem, "gms in indexed layout", "the scalar layout")

@@ -72,11 +72,7 @@ WIDTH: Final = 160
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
-    """The bytes of the GAMS file in scalar layout, block by block.
-
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
-    levels.
-    """
+    """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,)."""
     problem, names = form.problem, form.names
     blocks = {
         "variables": _variables(form),

@@ -39,9 +39,8 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
     """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
 
     Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has
-    None there.
-    start: a field whose complete point is set as the value of every variable. Raises InstanceError when it is
-    on another instance.
+    None there. start: a field whose complete point is set as the value of every variable. Raises
+    InstanceError when it is on another instance.
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
     point = None if start is None else problem.point(start)

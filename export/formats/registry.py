@@ -78,9 +78,8 @@ class Format:
     """A file format: what it carries and how it is written.
 
     degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
-    first;
-    starts: whether a starting point has a place in it; default: whether it is written when no format is asked
-    for.
+    first; starts: whether a starting point has a place in it; default: whether it is written when no format
+    is asked for.
     """
 
     name: str

@@ -42,10 +42,7 @@ def loaded(path: Path, log: Path | None = None, **options: str | float) -> Any:
 
 
 def set_options(highs: Any, **options: str | float) -> None:
-    """Set options by name.
-
-    Another number of threads than that of an earlier solve in this process counts too.
-    """
+    """Set options by name; another number of threads than that of an earlier solve counts too."""
     for option, value in options.items():
         highs.setOptionValue(option, value)
     if options.get("threads"):
@@ -53,10 +50,7 @@ def set_options(highs: Any, **options: str | float) -> None:
 
 
 def solved(highs: Any, path: Path) -> Any:
-    """The model once its search is over.
-
-    Raises SolverError, with the file of the model, when that is an error.
-    """
+    """The model once its search is over. Raises SolverError, with its file, when that is an error."""
     if highs.run() == highspy.HighsStatus.kError:
         raise SolverError("HiGHS answers with an error (model status Not Set)", file=path)
     return highs
@@ -75,10 +69,7 @@ def dual_bound(highs: Any) -> float | None:
 
 
 def run(job: Job) -> RunEnd:
-    """How the solve of the job ended; its solution file and its log are there.
-
-    Raises SolverError, OutputError.
-    """
+    """How the solve of the job ended; solution and log are there. Raises SolverError, OutputError."""
     highs = loaded(job.model, job.log, mip_rel_gap=job.limits.gap, threads=job.limits.threads)
     if job.start is not None:
         highs.setSolution(_start(highs, job.problem, job.start))

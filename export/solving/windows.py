@@ -120,10 +120,7 @@ def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
 
 
 def _solved(task: _Task) -> _Found | None:
-    """A window, solved by an external solver from the file that is written for it.
-
-    None where there was no time for it.
-    """
+    """A window, solved from the file that is written for it; None where there was no time for it."""
     deadline = task.deadline.within(_SECONDS)
     if deadline.later(-_SHORTEST).passed():
         return None
@@ -210,10 +207,7 @@ class _State:
         self._open[:] = True
 
     def _try(self, field: CrossField, free: Bools) -> bool:
-        """Go on from a field, its angles and jumps brought up to date, if it is lower.
-
-        Then windows near by are open again.
-        """
+        """Whether a field, brought up to date, is lower: then go on from it, windows near by open again."""
         state = FreeField.of(field)
         settle(state, Solver())
         better = state.bounded()

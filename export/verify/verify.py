@@ -71,10 +71,9 @@ class Check:
     """What became of a file at a program: reading it, or solving it with one of its solvers.
 
     problem: instance and formulation. program: its name, or that of the solver. objective: recomputed at the
-    solver's point; bound: its dual bound;
-    energy: the objective again, with every other column at the value that follows from angles and jumps.
-    group: where it is equal, so is the optimum; relaxes: the group of which the file holds a relaxation,
-    whose optimum is no higher.
+    solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
+    that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the group of
+    which the file holds a relaxation, whose optimum is no higher.
     """
 
     problem: str
@@ -253,10 +252,7 @@ class _Bench:
     solved: set[tuple[str, str]] = field(default_factory=set)
 
     def checks(self, subject: _Subject) -> Iterator[Check]:
-        """What the program makes of a file: of reading it, and of each of its solvers.
-
-        Two files of the same problem are solved once.
-        """
+        """What the program and its solvers make of a file; files of the same problem are solved once."""
         read = self._read(subject)
         yield read
         if self.seconds is None:
@@ -369,10 +365,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
-    """The point by name, integers rounded; a column that the solver does not tell is at zero.
-
-    And what is wrong with it.
-    """
+    """The point by name, integers rounded, what is not told at zero; and what is wrong with it."""
     names = np.array([name.encode() for name in names_of(column_names(problem))])
     values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
     point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
@@ -400,10 +393,7 @@ def _against(check: Check, checks: list[Check]) -> Check:
 
 
 def _beside_others(check: Check, checks: list[Check]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem.
-
-    Empty when it does not.
-    """
+    """How a proven optimum or a bound contradicts the best point of the same problem; empty when not."""
     best = _best(checks, check.group)
     if best is None:
         return ""
@@ -415,10 +405,7 @@ def _beside_others(check: Check, checks: list[Check]) -> str:
 
 
 def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
-    """How the proven optimum of a relaxation lies above a point of the problem itself.
-
-    Empty when it does not.
-    """
+    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when not."""
     best = _best(checks, check.relaxes)
     lower = check.objective if check.proven else check.bound
     if best is None or lower is None or lower <= best or same(lower, best):

@@ -31,10 +31,7 @@ def version() -> str:
 
 
 def at_start(path: Path) -> dict[str, Any]:
-    """What the library says of an .nl file: statistics, bounds, and values at its starting point.
-
-    Leaves a .json beside it.
-    """
+    """What the library says of an .nl file, with values at its start; leaves a .json beside it."""
     done = subprocess.run(
         [executable("asl"), str(path.with_suffix(""))],
         check=False,

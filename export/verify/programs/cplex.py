@@ -37,10 +37,7 @@ def _load(path: Path) -> Any:
 
 
 def read(path: Path) -> Meaning:
-    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times.
-
-    Quadratic rows come after the others.
-    """
+    """The file as CPLEX reads it, quadratic rows last; its parser of decimals is an ulp off at times."""
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:

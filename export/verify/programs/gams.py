@@ -47,11 +47,7 @@ def version() -> str:
 
 
 def _system(solver: str) -> Path:
-    """The folder of GAMS.
-
-    For BARON a copy of it, by links where that works, with BARON's files and its entry in the table of
-    solvers.
-    """
+    """The folder of GAMS; for BARON a copy, by links where that works, with BARON's files and its entry."""
     base, baron = _package("gamspy_base"), _package("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
@@ -112,10 +108,7 @@ def our_name(name: str) -> str:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The GAMS model as CONVERT translates it and CasADi reads it.
-
-    Columns that stand in no term are not in GAMS's model.
-    """
+    """The GAMS model as CONVERT translates it and CasADi reads it; columns in no term are not there."""
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():

@@ -37,9 +37,6 @@ def executable(name: str) -> str:
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
-    """Names of columns and of rows of an .nl file, from the .col and .row beside it.
-
-    That of the objective is left out.
-    """
+    """Names of columns and rows of an .nl file, from the .col and .row beside it, the objective left out."""
     columns, rows = (path.with_suffix(suffix).read_text().split() for suffix in (".col", ".row"))
     return columns, [name for name in rows if name != "obj"]

@@ -44,10 +44,7 @@ class Meaning:
 
     @classmethod
     def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
-        """The model of these columns and rows.
-
-        `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out.
-        """
+        """The model; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
         for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
             found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
             given |= {f"{name}_at": found.at, name: found.value}
