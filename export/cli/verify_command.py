@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...models.errors import InputError
+from .inputs import known
 from .options import Json, Quiet, Seconds
 from .output import complain, progress, say, say_json, show_table
 
@@ -41,11 +41,9 @@ def verify_command(
     from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
 
-    for name in program or ():
-        if name not in PROGRAMS:
-            raise InputError(f"there is no program {name!r}; choose one of {', '.join(PROGRAMS)}")
+    programs = known(program, PROGRAMS, "program")
     with progress(quiet=quiet) as show:
-        found = verify(folder, seconds=time_limit if solve else None, programs=program, progress=show)
+        found = verify(folder, seconds=time_limit if solve else None, programs=programs, progress=show)
     if as_json:
         say_json(found.document())
     elif not quiet:

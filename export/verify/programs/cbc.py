@@ -7,7 +7,6 @@ names, in the same order, by its table of all rows and columns.
 from __future__ import annotations
 
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
 from ...solutions.readers.text import RawSolution, Status
 from . import highs as highs_program
-from .protocol import NotTold, Refused, executable
+from .protocol import NotTold, Refused, started
 from .reading import Meaning, told
 
 
@@ -26,9 +25,7 @@ def version() -> str:
 
 
 def _run(*arguments: str) -> str:
-    done = subprocess.run(
-        [executable("cbc"), *arguments], check=False, capture_output=True, text=True, errors="replace"
-    )
+    done = started("cbc", *arguments)
     return done.stdout + done.stderr
 
 

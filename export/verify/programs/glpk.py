@@ -7,7 +7,6 @@ is a row there as well, and columns are indexed: alpha[1,2].
 from __future__ import annotations
 
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +16,7 @@ import numpy as np
 from ...solutions.readers.text import RawSolution, Status
 from ...solvers_table import PROGRAMS
 from ...writing.terms import listed
-from .protocol import Refused, executable
+from .protocol import Refused, started
 from .reading import Evaluation, Meaning, Points, told
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
@@ -26,10 +25,7 @@ _OBJECTIVE: Final = "energy"
 
 def version() -> str:
     """Its version."""
-    said = subprocess.run(
-        [executable("glpk"), "--version"], check=False, capture_output=True, text=True
-    ).stdout
-    found = re.search(r"(\d+\.\d+)", said)
+    found = re.search(r"(\d+\.\d+)", started("glpk", "--version").stdout)
     return found[1] if found else "unknown"
 
 
@@ -38,13 +34,7 @@ def _run(path: Path, *arguments: str) -> str:
     given = [_KINDS[kind], str(path)]
     if kind == "mod":
         given += ["--data", str(path.with_suffix(".dat"))]
-    done = subprocess.run(
-        [executable("glpk"), *given, *arguments],
-        check=False,
-        capture_output=True,
-        text=True,
-        errors="replace",
-    )
+    done = started("glpk", *given, *arguments)
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if line.startswith(str(path))]
         raise Refused(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")

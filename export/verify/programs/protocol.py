@@ -14,6 +14,7 @@ and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 from ...solvers_table import PROGRAMS
@@ -31,9 +32,10 @@ class TooLarge(Exception):  # noqa: N818 - it is an answer
     """A file beyond the size of a program's free edition."""
 
 
-def executable(name: str) -> str:
-    """The path of a program's executable."""
-    return shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs
+def started(name: str, *arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """How a run of a program's executable ended, and what it said."""
+    command = [shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs, *arguments]
+    return subprocess.run(command, check=False, capture_output=True, text=True, errors="replace", cwd=folder)
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
