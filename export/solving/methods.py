@@ -83,6 +83,10 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
+def _tell_nobody(_text: str) -> None:
+    pass
+
+
 @dataclass(frozen=True, eq=False)
 class Request:
     """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
@@ -97,7 +101,7 @@ class Request:
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
     solver: str | None = None
-    progress: Progress = lambda _: None
+    progress: Progress = _tell_nobody
 
 
 @dataclass(frozen=True)
