@@ -9,8 +9,8 @@ import sys
 from typing import Final
 
 from ...models.errors import SolverError
+from ..formats.nl import Layout
 from ..solutions.readers.ampl import write_ampl_sol
-from ..writing.nl_layout import Layout
 from .child import ChildExit, run_child
 from .job import Job, RunEnd
 

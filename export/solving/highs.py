@@ -69,7 +69,10 @@ def dual_bound(highs: Any) -> float | None:
 
 
 def run(job: Job) -> RunEnd:
-    """How the solve of the job ended; solution and log are there. Raises SolverError, OutputError."""
+    """How the solve of the job ended; its solution file and its log are there.
+
+    Raises SolverError, OutputError.
+    """
     highs = loaded(job.model, job.log, mip_rel_gap=job.limits.gap, threads=job.limits.threads)
     if job.start is not None:
         highs.setSolution(_start(highs, job.problem, job.start))
