@@ -1,5 +1,4 @@
-"""Crossfield: from a rough concept sketch to optimization instances,
-and from solvers' answers back to a cross field.
+"""From a concept sketch to optimization instances, and from solvers' answers back to a cross field.
 
 The verbs are imported on first use, so that `import crossfield` itself takes milliseconds.
 """

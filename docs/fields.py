@@ -25,7 +25,7 @@ from typing import Any, Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.bundle.manifest import write_all
-from crossfield.export.verify.verify import Finding, verify
+from crossfield.export.verify.verify import Check, verify
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.search.box_qp import fitted
@@ -318,7 +318,7 @@ def proofs() -> str:
                 f"{found:.7f}",
                 f"{seconds:.1f}",
                 f"{best.objective:.7f}" if best else f"at least {bound:.7f}" if bound else "",
-                f"{best.consumer}, {best.seconds:.1f} s" if best else "none",
+                f"{best.program}, {best.seconds:.1f} s" if best else "none",
                 "yes" if same else "no" if best else "open",
             ]
         )
@@ -332,19 +332,19 @@ def proofs() -> str:
     )
 
 
-def optimum(instance: Instance, start: CrossField) -> tuple[Finding | None, float | None]:
-    """The finding of the first prover that closes `miqp-exact`, or None;
+def optimum(instance: Instance, start: CrossField) -> tuple[Check | None, float | None]:
+    """The check of the first prover that closes `miqp-exact`, or None;
     and the best dual bound of all that were asked.
     """
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
         write_all(instance, folder, ["miqp-exact"], ["mps"], start=start)
         for prover in PROVERS:
-            for finding in verify(folder, seconds=PROOF_SECONDS, consumers=[prover]).findings:
-                if finding.step == "solve" and finding.proven:
-                    return finding, finding.bound
-                if finding.step == "solve" and finding.bound is not None:
-                    bounds.append(finding.bound)
+            for check in verify(folder, seconds=PROOF_SECONDS, programs=[prover]).checks:
+                if check.step == "solve" and check.proven:
+                    return check, check.bound
+                if check.step == "solve" and check.bound is not None:
+                    bounds.append(check.bound)
     return None, max(bounds, default=None)
 
 

@@ -19,7 +19,7 @@ from crossfield.export.bundle.manifest import write_all
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.verify.verify import Finding, Verdict, Verification, verify
+from crossfield.export.verify.verify import Check, Verdict, Verification, verify
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import markdown, said
@@ -51,12 +51,10 @@ class Run:
     facet: str
     result: Verification
 
-    def of(self, formulation: str) -> list[Finding]:
+    def of(self, formulation: str) -> list[Check]:
         """Its solves of a formulation."""
-        found = (
-            f for f in self.result.findings if f.problem.endswith(f" {formulation}") and f.step == "solve"
-        )
-        return sorted(found, key=lambda f: (f.consumer, f.file))
+        found = (f for f in self.result.checks if f.problem.endswith(f" {formulation}") and f.step == "solve")
+        return sorted(found, key=lambda f: (f.program, f.file))
 
     def optimum(self, formulation: str) -> float:
         """The best proven value."""
@@ -73,19 +71,19 @@ def run(gauge: Gauge, facet: str, formulations: tuple[str, ...], seconds: float)
     return Run(gauge, facet, found)
 
 
-def route(finding: Finding) -> list[str]:
+def route(check: Check) -> list[str]:
     """A row about a solve."""
-    title = SOLVERS[finding.consumer].title
-    value = "" if finding.objective is None else f"{finding.objective:.9f}"
-    bound = "" if finding.bound is None else f"{finding.bound:.9f}"
+    title = SOLVERS[check.program].title
+    value = "" if check.objective is None else f"{check.objective:.9f}"
+    bound = "" if check.bound is None else f"{check.bound:.9f}"
     words = {
         Verdict.AGREES: "optimal",
         Verdict.LIMIT: f"gave up after {SECONDS:g} s",
-        Verdict.REFUSED: f"refused: {finding.reason}",
-        Verdict.NOT_TRIED: f"not tried: {finding.reason}",
-    }.get(finding.verdict, f"{finding.verdict}: {finding.reason}")
-    seconds = "" if finding.seconds is None else f"{finding.seconds:.1f}"
-    return [title, finding.file.rpartition(".")[2], value, bound, seconds, words]
+        Verdict.REFUSED: f"refused: {check.reason}",
+        Verdict.NOT_TRIED: f"not tried: {check.reason}",
+    }.get(check.verdict, f"{check.verdict}: {check.reason}")
+    seconds = "" if check.seconds is None else f"{check.seconds:.1f}"
+    return [title, check.file.rpartition(".")[2], value, bound, seconds, words]
 
 
 def routes(main: Run) -> list[str]:
@@ -109,7 +107,7 @@ def routes(main: Run) -> list[str]:
             agree,
             markdown(("solver", "file", "objective", "bound", "s", "result"), [route(f) for f in tried]),
         ]
-        reasons = sorted({f"- {SOLVERS[f.consumer].title}: {f.verdict}: {f.reason}." for f in rest})
+        reasons = sorted({f"- {SOLVERS[f.program].title}: {f.verdict}: {f.reason}." for f in rest})
         parts += ["\n".join(reasons)] if reasons else []
     return parts
 
@@ -132,7 +130,7 @@ def same_problem(main: Run) -> str:
 
 def in_short(main: Run, runs: list[Run]) -> str:
     """How many files were read, how many as meant, and for how many formulations an optimum is proven."""
-    found = [f for each in runs for f in each.result.findings if f.step == "read"]
+    found = [f for each in runs for f in each.result.checks if f.step == "read"]
     read = sum(f.verdict == Verdict.AGREES for f in found)
     wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
     values = [
@@ -177,7 +175,7 @@ def readings(runs: list[Run]) -> str:
     """How many files each program read, and with what result."""
     rows = []
     for name, entry in PROGRAMS.items():
-        found = [f for each in runs for f in each.result.findings if f.consumer == name and f.step == "read"]
+        found = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
         counts = [
             str(sum(f.verdict == verdict for f in found))
             for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)
@@ -250,9 +248,9 @@ def main() -> None:
         ),
     ]
     (DOCS / "validation.md").write_text("\n\n".join(parts) + "\n")
-    bad = [finding for each in runs for finding in each.result.bad]
+    bad = [check for each in runs for check in each.result.bad]
     print(
-        f"{time.perf_counter() - begin:.0f} s, {len(bad)} findings that should not be",
+        f"{time.perf_counter() - begin:.0f} s, {len(bad)} checks with something wrong",
         *bad,
         sep="\n",
         file=sys.stderr,

@@ -2,7 +2,7 @@
 
     bottle_n024.instance.json (or .npz)              the instance, once per folder
     bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
-    bottle_n024.milp-mccormick.manifest.json         what these are; all that is needed, with the instance, to read a solution
+    bottle_n024.milp-mccormick.manifest.json         what these are; reads a solution, with the instance
 
 Names come from the instance and the formulation alone, so that a later export replaces an earlier one.
 """
@@ -13,7 +13,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +38,7 @@ from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
 from ..solvers_table import smallest, takers
 from ..writing.canonical import Canonical
+from .starts import write_starts
 
 FORMAT: Final = "crossfield-manifest"
 VERSION: Final = 1
@@ -63,7 +64,7 @@ class Manifest:
         return self.path.parent
 
     def instance(self) -> Instance:
-        """The instance beside the manifest. Raises InputError when it is missing, InstanceError when it is another one."""
+        """The instance beside the manifest. Raises InputError, and InstanceError for another instance."""
         path = self.folder / self.document["instance"]["file"]
         instance = read_instance(path)
         if instance.sha256 != self.document["instance"]["sha256"]:
@@ -111,7 +112,7 @@ class Manifest:
 
 
 def read_manifest(path: str | Path) -> Manifest:
-    """The manifest in a file. Raises InputError when it cannot be read, InstanceError when it breaks its schema."""
+    """The manifest in a file. Raises InputError, and InstanceError when it breaks its schema."""
     try:
         document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
@@ -132,109 +133,18 @@ def write_problem(
     compress: bool = False,
     jobs: int = 1,
 ) -> Manifest:
-    """The manifest of the set of files now in the folder: the problem in each of the formats, and the instance.
+    """The manifest of the files now in the folder: the problem in each of the formats, and the instance.
 
-    What a format cannot carry is listed in the manifest as refused. dialects: by format. jobs: formats
-    written at once. Raises OutputError, and InputError for an unknown format and for a problem that no
-    manifest records: with columns fixed, or with products lifted beforehand.
+    What a format cannot carry is listed in the manifest as refused. The other arguments are those of
+    `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no manifest
+    records: with columns fixed, or with products lifted beforehand.
     """
-    _check_recordable(problem)
-    with _pool(jobs) as pool:
-        return _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress).begin(
-            problem
-        )()
-
-
-@contextmanager
-def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that write files: nearly all the time is spent in NumPy, zlib and hashlib, where threads run side by side.
-
-    After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
-    whole.
-    """
-    with ThreadPoolExecutor(checked(jobs)) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-@dataclass(frozen=True)
-class _Sets:
-    """What sets of files have in common: threads, folder, formats, start, dialects by format, and whether files are compressed."""
-
-    pool: ThreadPoolExecutor
-    folder: Path
-    formats: tuple[str, ...]
-    start: CrossField | None
-    dialects: dict[str, str]
-    compress: bool
-
-    def __post_init__(self) -> None:
-        """Check that the formats are known."""
-        for name in self.formats:
-            if name not in FORMATS:
-                raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
-
-    def begin(self, problem: Problem) -> Callable[[], Manifest]:
-        """Hand the files of a problem to the threads; a function that waits for them and gives their manifest."""
-        stem = self.folder / f"{problem.instance.name}.{problem.name}"
-        files = {name: self._submit(problem, stem, name) for name in self.formats}
-
-        def manifest() -> Manifest:
-            written: list[Written] = []
-            refused: dict[str, str] = {}
-            for name, file in files.items():
-                try:
-                    written.append(file.result())
-                except UnsupportedByFormatError as error:
-                    refused[name] = str(error)
-            document = _document(problem, _instance_file(problem.instance, self.folder), written, refused)
-            path = stem.with_name(f"{stem.name}.manifest.json")
-            write_bytes(path, _as_bytes(document))
-            return Manifest(document, path)
-
-        return manifest
-
-    def _submit(self, problem: Problem, stem: Path, name: str) -> Future[Written]:
-        path = stem.with_name(f"{stem.name}{FORMATS[name].suffix}{'.gz' if self.compress else ''}")
-        return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
-
-
-def _check_recordable(problem: Problem) -> None:
     if not is_recordable(problem):
-        raise InputError(
-            f"a manifest cannot record {problem.name} with columns fixed or products lifted; write it as a single file"
-        )
-
-
-def is_recordable(problem: Problem) -> bool:
-    """Whether formulation, options and jumps say all of a problem: no columns are fixed and no products were lifted beforehand."""
-    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
-    return plain.sha256 == problem.sha256
-
-
-def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
-    """The manifest, now in the folder with the instance, of a problem of which one format was just written there.
-
-    Files of the same problem that a manifest there lists stay listed. Raises OutputError.
-    """
-    path = folder / f"{problem.instance.name}.{problem.name}.manifest.json"
-    document = _document(problem, _instance_file(problem.instance, folder), [written], {})
-    try:
-        earlier = read_manifest(path).document
-    except CrossfieldError:
-        earlier = {"sha256": ""}
-    if earlier["sha256"] == problem.sha256:
-        others = [file for file in earlier["files"] if file["name"] not in written.files]
-        document |= {"files": others + document["files"], "refused": earlier["refused"]}
-    write_bytes(path, _as_bytes(document))
-    return Manifest(document, path)
-
-
-def _as_bytes(document: dict[str, Any]) -> bytes:
-    return (json.dumps(document, indent=1) + "\n").encode()
+        what = f"{problem.name} with columns fixed or products lifted"
+        raise InputError(f"a manifest cannot record {what}; write it as a single file")
+    sets = _Sets(problem.instance, Path(folder), tuple(formats), start, {}, dialects or {}, compress)
+    with sets.threads(jobs):
+        return sets.begin(problem)()
 
 
 def write_all(
@@ -250,40 +160,128 @@ def write_all(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Manifest]:
-    """The manifests of all the sets of files now in the folder: every formulation in every format it can be written to.
+    """The manifests of the files now in the folder: every formulation in every format that carries it.
 
-    start: a field, for starting points and for the jumps of `qp-fixed`; without one, `fixed_jumps` says
-    which.
-    options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. jobs: files written
-    at once.
-    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
-    .gz.
-    progress: called with each name. Raises InputError for an unknown format, FormulationError for an unknown
-    formulation, InstanceError for a start on another instance, and OutputError.
+    start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`; without
+    one, `fixed_jumps` says which. options: facet, stroke_norm, beta_norm, relax, each used where a
+    formulation has it. dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms.
+    compress: model files as .gz. jobs: files written at once. progress: called with each name. Raises
+    InputError for an unknown format, FormulationError for an unknown formulation, InstanceError for a start
+    on another instance, and OutputError.
     """
+    sets = _Sets(instance, Path(folder), tuple(formats), start, options or {}, dialects or {}, compress)
     manifests = []
-    with _pool(jobs) as pool:
-        sets = _Sets(pool, make_folder(folder), tuple(formats), start, dialects or {}, compress)
-        waiting = {}
-        for name in formulations:
-            waiting[name] = sets.begin(_formulated(instance, name, start, options or {}))
+    with sets.threads(jobs):
+        waiting = {name: sets.begin(sets.problem(name)) for name in formulations}
         for name in list(waiting):
             progress(name)
             manifests.append(waiting.pop(name)())
     return manifests
 
 
-def _formulated(instance: Instance, name: str, start: CrossField | None, options: dict[str, Any]) -> Problem:
-    recipe = FORMULATIONS.get(name)
-    chosen = {key: value for key, value in options.items() if recipe is None or key in recipe.settable}
-    return formulate(instance, name, p=fixed_jumps(instance, name, start), **chosen)
+@dataclass(eq=False)
+class _Sets:
+    """What the sets of files of an instance have in common; dialects by format."""
+
+    instance: Instance
+    folder: Path
+    formats: tuple[str, ...]
+    start: CrossField | None
+    options: dict[str, Any]
+    dialects: dict[str, str]
+    compress: bool
+    pool: ThreadPoolExecutor = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Check that the formats are known."""
+        for name in self.formats:
+            if name not in FORMATS:
+                raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+
+    @contextmanager
+    def threads(self, jobs: int) -> Iterator[None]:
+        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run side by side.
+
+        After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
+        whole.
+        """
+        with ThreadPoolExecutor(checked(jobs)) as self.pool:
+            make_folder(self.folder)
+            try:
+                yield
+            except BaseException:
+                self.pool.shutdown(cancel_futures=True)
+                raise
+
+    def problem(self, name: str) -> Problem:
+        """A formulation of the instance, with those of the options that it has."""
+        recipe = FORMULATIONS.get(name)
+        chosen = {
+            key: value for key, value in self.options.items() if recipe is None or key in recipe.settable
+        }
+        return formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.start), **chosen)
+
+    def begin(self, problem: Problem) -> Callable[[], Manifest]:
+        """A function that waits for the files of a problem, which the threads now write: their manifest."""
+        stem = f"{self.instance.name}.{problem.name}"
+        files = {name: self._submit(problem, stem, name) for name in self.formats}
+
+        def manifest() -> Manifest:
+            written: list[Written] = []
+            refused: dict[str, str] = {}
+            for name, file in files.items():
+                try:
+                    written.append(file.result())
+                except UnsupportedByFormatError as error:
+                    refused[name] = str(error)
+            if self.start is not None:
+                write_starts(problem, self.start, self.folder, stem)
+            return _kept(_document(problem, self.folder, written, refused), self.folder)
+
+        return manifest
+
+    def _submit(self, problem: Problem, stem: str, name: str) -> Future[Written]:
+        path = self.folder / f"{stem}{FORMATS[name].suffix}{'.gz' if self.compress else ''}"
+        return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
+
+
+def is_recordable(problem: Problem) -> bool:
+    """Whether formulation, options and jumps say all of a problem: no column is fixed, no product lifted."""
+    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
+    return plain.sha256 == problem.sha256
+
+
+def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+    """The manifest now in the folder, with the instance, of a problem that was just written in one format.
+
+    Files of the same problem that a manifest there lists stay listed. Raises OutputError.
+    """
+    document = _document(problem, folder, [written], {})
+    try:
+        earlier = read_manifest(_path(document, folder)).document
+    except CrossfieldError:
+        earlier = {"sha256": ""}
+    if earlier["sha256"] == problem.sha256:
+        others = [file for file in earlier["files"] if file["name"] not in written.files]
+        document |= {"files": others + document["files"], "refused": earlier["refused"]}
+    return _kept(document, folder)
+
+
+def _path(document: dict[str, Any], folder: Path) -> Path:
+    return folder / f"{document['instance']['name']}.{document['formulation']}.manifest.json"
+
+
+def _kept(document: dict[str, Any], folder: Path) -> Manifest:
+    path = _path(document, folder)
+    write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
+    return Manifest(document, path)
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
-    """The jumps that a formulation takes as data, None where it has them as variables: those of `start`, by default of the improved greedy field.
+    """The jumps that a formulation takes as data; None where it has them as variables.
 
-    Everything that writes or solves a formulation by its name asks here, so that its files and its solutions
-    are of one problem.
+    They are those of `start`, by default of the improved greedy field. Everything that writes or solves a
+    formulation by its name asks here, so that its files and its solutions are of one problem.
     """
     recipe = FORMULATIONS.get(name)
     if recipe is None or not recipe.fixed:
@@ -306,7 +304,7 @@ def _instance_file(instance: Instance, folder: Path) -> str:
 
 
 def _document(
-    problem: Problem, instance_file: str, written: list[Written], refused: dict[str, str]
+    problem: Problem, folder: Path, written: list[Written], refused: dict[str, str]
 ) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
     form = Canonical(problem)
@@ -320,7 +318,7 @@ def _document(
         "version": VERSION,
         "generator": generator(),
         "instance": {
-            "file": instance_file,
+            "file": _instance_file(instance, folder),
             "name": instance.name,
             "gauge": instance.gauge,
             "sha256": instance.sha256,
@@ -341,13 +339,8 @@ def _document(
         },
         "columns": _columns(problem),
         "rows": [
-            {
-                "name": family.family.tag,
-                "over": family.family.over,
-                "count": family.count,
-                "paper": family.family.paper,
-            }
-            for family in problem.rows
+            {"name": row.family.tag, "over": row.family.over, "count": row.count, "paper": row.family.paper}
+            for row in problem.rows
         ],
         "jumps": _nonzero(problem),
         "sha256": problem.sha256,

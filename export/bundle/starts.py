@@ -3,7 +3,7 @@
     layout
     list    .mst   lines `name value`                                  Gurobi: model.read(...), or InputFile
     cplex   .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
-    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: --read_solution_file, readSolution
+    highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: read_solution_file, readSolution
     scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
     slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
@@ -39,7 +39,7 @@ from ..writing.sink import save
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A complete point of a problem as a format holds it: names and values of all columns, ONE included, and its objective."""
+    """A complete point of a problem as a format holds it."""
 
     problem: Problem
     point: Floats
@@ -113,7 +113,7 @@ def _scip(start: Start) -> Iterator[bytes]:
 
 
 def _objective_variables(start: Start) -> dict[str, float]:
-    """The variables that stand for an objective in SCIP, at what is not linear in it; none where nothing is."""
+    """The variables that stand for an objective in SCIP, at what is not linear in it, if anything is."""
     problem, point = start.problem, start.point
     if problem.objective_degree < 2:
         return {}
@@ -142,9 +142,10 @@ STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solve
 
 
 def start_of(problem: Problem, field: CrossField) -> Start:
-    """The complete point of a field in the columns of the LP and MPS files; those of the .nl file where LP and MPS hold nothing.
+    """The complete point of a field in the columns of the LP and MPS files.
 
-    Raises InstanceError when the field is on another instance.
+    In those of the .nl file where LP and MPS hold nothing. Raises InstanceError when the field is on another
+    instance.
     """
     try:
         held = carried(problem, FORMATS["mps"])
@@ -161,32 +162,34 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
-    taking = takes(problem, solver)
-    if taking.answer == "no":
-        raise UnsupportedBySolverError(f"{solver} does not take {problem.name}: {taking.reason}")
     start = start_of(problem, field)
-    if STARTS[solver].convex and not start.problem.convex:
-        raise UnsupportedBySolverError(
-            f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
-        )
+    refusal = _refusal(problem, start, solver)
+    if refusal:
+        raise UnsupportedBySolverError(refusal)
     save(Path(path), LAYOUTS[STARTS[solver].layout](start))
     return start.objective
 
 
 def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
-    """The files now in the folder, by solver: `stem.gurobi.mst` and so on, for the solvers that take the problem.
+    """The files now in the folder, by solver that takes the problem: `stem.gurobi.mst` and so on.
 
     None for a problem without integers, where these files mean nothing. Raises as `write_start`.
     """
     if not problem.integer.any():
         return {}
-    convex = start_of(problem, field).problem.convex
-    solvers = [
-        name
-        for name, entry in STARTS.items()
-        if takes(problem, name).answer != "no" and (convex or not entry.convex)
-    ]
+    start = start_of(problem, field)
+    solvers = [name for name in STARTS if not _refusal(problem, start, name)]
     paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
     for name, path in paths.items():
-        write_start(problem, field, path, name)
+        save(path, LAYOUTS[STARTS[name].layout](start))
     return paths
+
+
+def _refusal(problem: Problem, start: Start, solver: str) -> str:
+    """Why a solver does not start from a point of the problem, empty where it does."""
+    taking = takes(problem, solver)
+    if taking.answer == "no":
+        return f"{solver} does not take {problem.name}: {taking.reason}"
+    if STARTS[solver].convex and not start.problem.convex:
+        return f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
+    return ""

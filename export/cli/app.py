@@ -194,7 +194,6 @@ def export_command(
     from ...models.field.file import read_field
     from ...models.formulations.catalogue import FORMULATIONS
     from ..bundle.manifest import write_all
-    from ..bundle.starts import write_starts
     from ..formats.registry import DEFAULTS, FORMATS
 
     formulations, formats = (
@@ -216,12 +215,6 @@ def export_command(
             jobs=jobs,
             progress=show,
         )
-        if field is not None:
-            show("starting points")
-            for manifest in manifests:
-                write_starts(
-                    manifest.problem(), field, output, manifest.path.name.removesuffix(".manifest.json")
-                )
     if as_json:
         say_json([manifest.document for manifest in manifests])
     elif not quiet:
@@ -256,8 +249,8 @@ def read_command(
             "--tolerance",
             metavar="X",
             min=0,
-            help="How far the answer may break a row or a bound, and how far, relatively, its objective may be"
-            " off, before it is refused.",
+            help="How far the answer may break a row or a bound, and how far, relatively, its objective"
+            " may be off, before it is refused.",
         ),
     ] = 1e-5,
     quiet: Quiet = False,
@@ -300,8 +293,7 @@ def draw_command(
     output: Output,
     *,
     kind: Annotated[
-        str | None,
-        typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds."),
+        str | None, typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds.")
     ] = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,

@@ -4,97 +4,40 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from typing import Any, Final
 
 from typer.core import TyperCommand
 
 
-def _formulations() -> Iterable[str]:
-    from ...models.formulations.catalogue import FORMULATIONS
-
-    return FORMULATIONS
-
-
-def _formats() -> Iterable[str]:
-    from ..formats.registry import FORMATS
-
-    return FORMATS
+def _of(
+    module: str, table: str, chosen: Callable[[Any], Iterable[str]] = list
+) -> Callable[[], Iterable[str]]:
+    """The names in a table of a module, or what is chosen of it, imported when they are asked for."""
+    return lambda: chosen(getattr(import_module(module, __package__), table))
 
 
-def _default_formats() -> Iterable[str]:
-    from ..formats.registry import DEFAULTS
-
-    return DEFAULTS
-
-
-def _methods() -> Iterable[str]:
-    from ..solving.methods import METHODS
-
-    return METHODS
-
-
-def _methods_of_a_run() -> Iterable[str]:
-    from ..solving.methods import METHODS
-
-    return (method.name for method in METHODS.values() if method.in_runs)
-
-
-def _solvers() -> Iterable[str]:
-    from ..solvers_table import DRIVEN
-
-    return DRIVEN
-
-
-def _programs() -> Iterable[str]:
-    from ..solvers_table import PROGRAMS
-
-    return PROGRAMS
-
-
-def _answers() -> Iterable[str]:
-    """The programs whose solution files are read: a description begins with the program."""
-    from ..solutions.readers.registry import READERS
-
-    return dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in READERS)
-
-
-def _samples() -> Iterable[str]:
-    from ...models.sketch.samples import SAMPLES
-
-    return SAMPLES
-
-
-def _size() -> Iterable[str]:
-    from ...models.sketch.read import DEFAULT_SIZE
-
-    return [str(DEFAULT_SIZE)]
-
-
-def _pictures() -> Iterable[str]:
-    from ..pictures.draw import KINDS
-
-    return KINDS
-
-
-def _rungs() -> Iterable[str]:
-    from ..library.plan.spec import RUNGS
-
-    return RUNGS
-
-
-NAMES: Final[dict[str, Callable[[], Iterable[str]]]] = {
-    "formulations": _formulations,
-    "formats": _formats,
-    "default formats": _default_formats,
-    "methods": _methods,
-    "methods of a run": _methods_of_a_run,
-    "solvers": _solvers,
-    "programs": _programs,
-    "answers": _answers,
-    "samples": _samples,
-    "size": _size,
-    "pictures": _pictures,
-    "rungs": _rungs,
+NAMES: Final = {
+    "formulations": _of("...models.formulations.catalogue", "FORMULATIONS"),
+    "formats": _of("..formats.registry", "FORMATS"),
+    "default formats": _of("..formats.registry", "DEFAULTS"),
+    "methods": _of("..solving.methods", "METHODS"),
+    "methods of a run": _of(
+        "..solving.methods",
+        "METHODS",
+        lambda methods: [each.name for each in methods.values() if each.in_runs],
+    ),
+    "solvers": _of("..solvers_table", "DRIVEN"),
+    "programs": _of("..solvers_table", "PROGRAMS"),
+    "answers": _of(  # a description begins with the program
+        "..solutions.readers.registry",
+        "READERS",
+        lambda readers: dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in readers),
+    ),
+    "samples": _of("...models.sketch.samples", "SAMPLES"),
+    "size": _of("...models.sketch.read", "DEFAULT_SIZE", lambda size: [str(size)]),
+    "pictures": _of("..pictures.draw", "KINDS"),
+    "rungs": _of("..library.plan.spec", "RUNGS"),
 }
 """What stands in braces in a help, and where its names come from."""
 

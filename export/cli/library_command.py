@@ -156,14 +156,7 @@ def submit_command(
 
     with progress(quiet=quiet) as show:
         happened = submit_point(
-            file,
-            folder,
-            entry=entry,
-            solver=solver,
-            version=version,
-            seconds=seconds,
-            by=by,
-            progress=show,
+            file, folder, entry=entry, solver=solver, version=version, seconds=seconds, by=by, progress=show
         )
     if not quiet:
         say(str(happened))

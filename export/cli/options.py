@@ -149,19 +149,13 @@ NlForm = Annotated[
 Names = Annotated[
     list[str] | None,
     typer.Option(
-        "-f",
-        "--formulation",
-        metavar="NAME",
-        help="{formulations}; all by default, may be repeated.",
+        "-f", "--formulation", metavar="NAME", help="{formulations}; all by default, may be repeated."
     ),
 ]
 Formats = Annotated[
     list[str] | None,
     typer.Option(
-        "-F",
-        "--format",
-        metavar="NAME",
-        help="{formats}; {default formats} by default, may be repeated.",
+        "-F", "--format", metavar="NAME", help="{formats}; {default formats} by default, may be repeated."
     ),
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]

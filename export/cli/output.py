@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..solutions.solution import Solution
     from ..solving.run import Report
 
-Progress = Callable[[str], None]
-
 WIDTH: Final = 80
 """Columns that tables are made for; a wider terminal is used where it helps."""
 
@@ -33,20 +31,19 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Progress]:
+def progress(*, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
 
     Raises InterruptedRunError for a Ctrl-C that nobody caught.
     """
     from rich.console import Console
-    from rich.progress import Progress as Bar
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     shown = console.is_terminal and not quiet
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     try:
-        with Bar(*columns, console=console, transient=True, disable=not shown) as bar:
+        with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
             task = bar.add_task("starting")
             yield lambda text: bar.update(task, description=text)
     except KeyboardInterrupt as stop:
@@ -141,15 +138,8 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
     for document in documents:
         sizes, counts = _sizes(document), document["counts"]
         written = [f"{sizes[name] / 1e3:.0f}" if name in sizes else "-" for name in names]
-        rows.append(
-            [
-                document["formulation"],
-                document["class"],
-                str(counts["columns"]),
-                str(counts["rows"]),
-                *written,
-            ]
-        )
+        size = [str(counts["columns"]), str(counts["rows"])]
+        rows.append([document["formulation"], document["class"], *size, *written])
     show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
@@ -159,13 +149,8 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
 
 def _sizes(document: dict[str, Any]) -> dict[str, int]:
     """Bytes of the model file of each format."""
-    return {
-        entry["format"]: entry["bytes"] for entry in document["files"] if not _is_list_of_names(entry["name"])
-    }
-
-
-def _is_list_of_names(name: str) -> bool:
-    return name.removesuffix(".gz").endswith((".row", ".col"))
+    lists = (".row", ".col", ".row.gz", ".col.gz")
+    return {file["format"]: file["bytes"] for file in document["files"] if not file["name"].endswith(lists)}
 
 
 _ONLY_IF_ANY: Final = (
@@ -205,11 +190,8 @@ def _text(value: object) -> str:
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
     """Print the tables of formulations, formats, solvers and readers, and which go together."""
     formulations = tables["formulations"][1]
-    show_table(
-        "formulations",
-        ("name", "paper", "class", "summary"),
-        _cells(formulations, ("name", "paper", "class", "summary")),
-    )
+    columns = ("name", "paper", "class", "summary")
+    show_table("formulations", columns, _cells(formulations, columns))
     formats, solvers = tables["formats"], tables["solvers"]
     names = [row["name"] for row in formats[1]]
     carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]

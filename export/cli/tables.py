@@ -33,10 +33,7 @@ def tables() -> Tables:
             ("formulation", *DRIVEN),
             [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
         ),
-        "externals": (
-            ("formulation", *SOLVERS),
-            [_external_row(problem) for problem in smallest_problems()],
-        ),
+        "externals": (("formulation", *SOLVERS), [_external_row(problem) for problem in smallest_problems()]),
         "methods": (
             ("name", "summary"),
             [{"name": method.name, "summary": method.summary} for method in METHODS.values()],

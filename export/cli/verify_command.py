@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...models.errors import InputError
+from .inputs import known
 from .options import Json, Quiet, Seconds
 from .output import complain, progress, say, say_json, show_table
 
@@ -22,11 +22,11 @@ def verify_command(
         bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")
     ] = False,
     time_limit: Seconds = 10.0,
-    consumer: Annotated[
+    program: Annotated[
         list[str] | None,
         typer.Option(
-            "-c",
-            "--consumer",
+            "-p",
+            "--program",
             metavar="NAME",
             help="{programs}; all that are installed by default, may be repeated.",
         ),
@@ -36,34 +36,32 @@ def verify_command(
 ) -> None:
     """Hand every exported file to every solver that is installed, and compare what it reads with the problem.
 
-    All findings go to verify.json in the folder. The exit code is 1 when something differs.
+    All results go to verify.json in the folder. The exit code is 1 when something differs.
     """
     from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
 
-    for name in consumer or ():
-        if name not in PROGRAMS:
-            raise InputError(f"there is no consumer {name!r}; choose one of {', '.join(PROGRAMS)}")
+    programs = known(program, PROGRAMS, "program")
     with progress(quiet=quiet) as show:
-        found = verify(folder, seconds=time_limit if solve else None, consumers=consumer, progress=show)
+        found = verify(folder, seconds=time_limit if solve else None, programs=programs, progress=show)
     if as_json:
         say_json(found.document())
     elif not quiet:
         _show(found)
-    for finding in found.bad:
-        complain(f"{finding.file}: {finding.consumer}: {finding.verdict}: {finding.reason}")
+    for check in found.bad:
+        complain(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
     if not found.ok:
         raise typer.Exit(1)
 
 
 def _show(found: Verification) -> None:
     """Print how many files each program read and solved, how that ended, and what is absent."""
-    verdicts = list(dict.fromkeys(finding.verdict for finding in found.findings))
+    verdicts = list(dict.fromkeys(check.verdict for check in found.checks))
     columns = ("program", "step", *map(str, verdicts))
     rows = []
-    for consumer, step in dict.fromkeys((finding.consumer, finding.step) for finding in found.findings):
-        mine = [f.verdict for f in found.findings if (f.consumer, f.step) == (consumer, step)]
-        rows.append([consumer, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
+    for program, step in dict.fromkeys((check.program, check.step) for check in found.checks):
+        mine = [f.verdict for f in found.checks if (f.program, f.step) == (program, step)]
+        rows.append([program, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
     show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
     for name, how in found.absent.items():
         say(f"absent: {name}; {how}")

@@ -26,14 +26,14 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import VARIABLES, IndexSet, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.names import name_length
-from ..writing.records import Decimals, Piece, Pieces, Words, number, render, table, words
+from ..writing.records import Decimals, Pieces, Words, number, render, table, words
 from .indexed import Indexed, check_indexed, described
 
 SECOND: Final = "r - north[h], c + east[h]"
@@ -103,7 +103,7 @@ def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
 def _listed(
     instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
 ) -> Iterator[bytes]:
-    """One element a line, its index and its values: `1 2 u 0.3`; only the elements `at`, when they are given."""
+    """One element a line, its index and values: `1 2 u 0.3`; only the elements `at`, when they are given."""
     rows, columns = _place(instance, over)
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:
@@ -134,11 +134,11 @@ def _label(instance: Instance, block: Block) -> str:
     return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
 
 
-def _described(family: Bound) -> dict[str, str]:
+def _described(family: PlacedFamily) -> dict[str, str]:
     return described(_Ampl, family, SENSES) | {"domain": _domain(family)}
 
 
-def _domain(family: Bound) -> str:
+def _domain(family: PlacedFamily) -> str:
     """The set of a family, with a condition for rows that are needed only for one parity of a bound."""
     over, only = family.family.over, family.family.only
     if only is None:
@@ -155,7 +155,3 @@ class _Ampl(Indexed):
 
     def exact(self, constant: sp.Expr) -> str:
         return str(constant).replace("**", "^")
-
-    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
-        return [*bracketed, f"^{exponent}".encode()]

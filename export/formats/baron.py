@@ -1,7 +1,7 @@
-"""BARON's own format, for polynomials up to degree 4 (it has exp, log and powers, but no trigonometric functions: B1).
+"""BARON's own format, for polynomials up to degree 4: it has no trigonometric functions (B1).
 
     // comment
-    BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default), in this order (B2)
+    BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default) (B2)
     LOWER_BOUNDS{                            every finite bound, those of binaries aside
     alpha_00_00: 0;
     }
@@ -9,7 +9,7 @@
     EQUATIONS c14_00_00_u, ...;
     c14_00_00_u: s_00_00_u - alpha_00_00 ... >= 0;    constants on the right (B4)
     OBJ: minimize
-     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, squares kept, one summand a line; negative numbers in brackets (B6)
+     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, one summand a line; (-1) in brackets (B6)
     STARTING_POINT{ ... }
 
 Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of
@@ -24,10 +24,10 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
-from ..writing.expressions import wrapped
+from ..writing.expressions import Language, wrapped
 from ..writing.names import Names
 from ..writing.records import Piece, Tagged, render, scalar_when_constant, signed, words
 from .gams_scalar import Scalar, declared
@@ -82,7 +82,7 @@ def _assigned(name: Tagged, values: Floats) -> Iterator[bytes]:
         yield from render([name, b": ", words(scalar_when_constant(values)), b";\n"], len(values))
 
 
-def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     terms = [_monomial(term, names) for term in (*family.of_degree(1), *family.of_degree(2))]
     sense = f" {family.family.sense} ".encode()
     parts = [names.row(family), b":", *(piece for term in terms for piece in term), sense]
@@ -100,11 +100,9 @@ def _monomial(term: Term, names: Names) -> list[Piece]:
 
 
 class _Baron(Scalar):
-    """The language of one family: that of scalar GAMS, with powers of its own."""
+    """The language of one family: that of scalar GAMS, but for powers."""
 
-    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
-        return [*bracketed, f"^{exponent}".encode()]
+    power = Language.power
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:

@@ -1,10 +1,10 @@
-"""GAMS, indexed layout: sets, data and the equations in the paper's notation; the text grows with the data alone.
+"""GAMS, indexed layout: sets, data and equations in the paper's notation; only the data grow.
 
-    r / 00*05 /, c / 00*07 /                 rows and columns of the grid; labels padded as in our names: alpha('01','04') is alpha_01_04
+    r / 00*05 /, c / 00*07 /                 rows and columns, padded: alpha('01','04') is alpha_01_04
     I(r,c) / 00.(02*07) ... /                pixels, one run a line; S_c(r,c) stroke pixels, where w > 0
-    E(r,c,side)                              pairs: side u or r is the upper or right neighbour, s('01','04','u') is s_01_04_u
-    north(side), east(side)                  the way to pixel j: alpha_i is alpha(r,c), alpha_j is alpha(r-north(side),c+east(side))
-    c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, printed from its declaration
+    E(r,c,side)                              pairs, upper or right: s('01','04','u') is s_01_04_u
+    north(side), east(side)                  to pixel j: alpha_j is alpha(r-north(side),c+east(side))
+    c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, from its declaration
 
 GAMS computes windows and jump bounds from theta by our formulas, in the same doubles. Lag and lead count
 places in an ordered set, hence the padded labels in their natural order; a neighbour outside the grid has no
@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import VARIABLES, IndexSet
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -40,11 +40,9 @@ SECOND: Final = "r-north(side),c+east(side)"
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
-    """The bytes of the GAMS file in indexed layout, block by block.
+    """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,).
 
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
-    levels. Raises UnsupportedByFormatError for a weight that solvers would drop, and for a problem with
-    columns fixed.
+    Raises UnsupportedByFormatError for a weight that solvers would drop, and for columns fixed.
     """
     problem, instance = form.problem, form.problem.instance
     check_indexed(problem, "gms in indexed layout", "the scalar layout")
@@ -131,7 +129,8 @@ def _start(problem: Problem, start: Floats) -> Iterator[bytes]:
         if block.count:
             yield f"Parameter start_{block.name}({DOMAINS[block.over]}) /\n".encode()
             yield from _data(keys(problem.instance, block.over), start[block.columns])
-            yield f"/;\n{block.name}.l({SETS[block.over]}) = start_{block.name}({SETS[block.over]});\n".encode()
+            over = SETS[block.over]
+            yield f"/;\n{block.name}.l({over}) = start_{block.name}({over});\n".encode()
 
 
 def _results(problem: Problem) -> Iterator[bytes]:
@@ -139,8 +138,8 @@ def _results(problem: Problem) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
             domain, side = DOMAINS[block.over], " '_' side.tl:0" if block.over == "pairs" else ""
-            name = f"'{block.name}_' r.tl:0 '_' c.tl:0{side}"
-            yield f"loop({SETS[block.over]}({domain}), put {name} ',' {block.name}.l({domain}):0 /);\n".encode()
+            name, value = f"'{block.name}_' r.tl:0 '_' c.tl:0{side}", f"{block.name}.l({domain}):0"
+            yield f"loop({SETS[block.over]}({domain}), put {name} ',' {value} /);\n".encode()
 
 
 def _variable(block: Block) -> dict[str, str]:
@@ -163,7 +162,7 @@ def _bound(expression: sp.Expr, over: IndexSet) -> str:
     return _Gams(over, SETS[over]).bound(expression)
 
 
-def _described(family: Bound) -> dict[str, str]:
+def _described(family: PlacedFamily) -> dict[str, str]:
     domain = DOMAINS[family.family.over]
     controls = f"{SETS[family.family.over]}({domain})"
     return described(_Gams, family, SENSES) | {"domain": domain, "controls": controls}
@@ -193,7 +192,7 @@ def _exact(constant: sp.Expr) -> str:
     return text if denominator == 1 else f"{text}/{denominator}"
 
 
-def _condition(family: Bound) -> str:
+def _condition(family: PlacedFamily) -> str:
     """For rows that are needed only for one parity of a bound."""
     if family.family.only is None:
         return ""

@@ -1,13 +1,13 @@
-"""GAMS, scalar layout, as instance libraries have it: one variable a column, one equation a row, under our own names.
+"""GAMS, scalar layout, as instance libraries have it: a variable a column, an equation a row, our names.
 
-    Variables objvar;                        the objective is a free scalar (G10), obj.. objvar =e= one summand a line (G6)
-    Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; lists are wrapped, no line starts
-                                             with `*`, which would make it a comment (G6)
-    c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); negative numbers in brackets (G2, G3)
-    alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   both bounds of every column (G7), -inf and +inf (G12), .fx where equal
+    Variables objvar;                        a free scalar (G10); obj.. objvar =e= one summand a line (G6)
+    Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; no line of a list
+                                             starts with `*`, which would make it a comment (G6)
+    c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); (-1) in brackets (G2, G3)
+    alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   of every column (G7), -inf and +inf (G12), .fx where equal
     alpha_00_00.l = 0.3;                     the start
     solve m using minlp minimizing objvar;   the type by what is in the model (G9)
-    $ifThen set RESULTS ... $endIf           after `gams x.gms --RESULTS=x.csv`: the answer as lines name,value
+    $ifThen set RESULTS ... $endIf           with `--RESULTS=x.csv` the answer as lines name,value
 
 Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is
 a cosine. Numbers are shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No
@@ -31,7 +31,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
@@ -72,11 +72,7 @@ WIDTH: Final = 160
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
-    """The bytes of the GAMS file in scalar layout, block by block.
-
-    header: lines of comment, without the comment sign. start: values of all columns (columns,), written as
-    levels.
-    """
+    """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,)."""
     problem, names = form.problem, form.names
     blocks = {
         "variables": _variables(form),
@@ -112,7 +108,7 @@ def bracketed(values: Floats) -> Texts:
 class Scalar(Language):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
-    def __init__(self, family: Bound, names: Names) -> None:
+    def __init__(self, family: PlacedFamily, names: Names) -> None:
         self._family = family
         self._names = names
 
@@ -157,11 +153,7 @@ def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]
         start += count
 
 
-KEYWORDS: Final = {
-    "continuous": b"Variables",
-    "binary": b"Binary Variables",
-    "integer": b"Integer Variables",
-}
+KEYWORDS: Final = {"continuous": b"Variables", "binary": b"Binary Variables", "integer": b"Integer Variables"}
 
 
 def _variables(form: Canonical) -> Iterator[bytes]:
@@ -186,14 +178,7 @@ def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
     for family in problem.rows:
         language, relation = Scalar(family, names), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
-        parts = [
-            names.row(family),
-            b".. ",
-            *left,
-            SENSES[family.family.sense],
-            *right,
-            b";\n",
-        ]
+        parts = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 
 
@@ -211,12 +196,7 @@ def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[s
     for suffix in suffixes:
         values = (block.upper if suffix == "up" else block.lower)[at]
         text = words(scalar_when_constant(values), bounds) if len(at) else b""
-        parts += [
-            name,
-            f".{suffix} = ".encode(),
-            text,
-            b"; " if suffix == "lo" else b";\n",
-        ]
+        parts += [name, f".{suffix} = ".encode(), text, b"; " if suffix == "lo" else b";\n"]
     return parts
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 import sympy as sp
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.problem import Bound, Problem
+from ...models.formulations.problem import PlacedFamily, Problem
 from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet
 from ..writing.expressions import Language, wrapped
 from ..writing.records import Piece, check_coefficients
@@ -66,7 +66,7 @@ class Indexed(Language):
         return _text(self.alone(expression))
 
 
-def described(language: type[Indexed], family: Bound, senses: Mapping[str, bytes]) -> dict[str, str]:
+def described(language: type[Indexed], family: PlacedFamily, senses: Mapping[str, bytes]) -> dict[str, str]:
     """A family as templates print it: its tag, where it stands in the paper, and its text."""
     declared = family.family
     words = language(declared.over)

@@ -2,16 +2,16 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
 
     \ comment
     Minimize
-     obj_sha256_1a2b3c4d5e6f: + 7 ONE  Gurobi takes this label for the model's name and repeats it in its solution, GLPK as the objective's
-     + 2 s_00_00_u                     every column, in order, also with cost 0: fixes the order of columns (L16, L31)
+     obj_sha256_1a2b3c4d5e6f: + 7 ONE  repeated in the solutions of Gurobi and GLPK
+     + 2 s_00_00_u                     every column, also with cost 0: fixes their order (L16, L31)
      + [
-     + 4 d_00_00_u ^2                  twice the coefficient, because of / 2 (L9, L12); no blank after the caret (L34)
+     + 4 d_00_00_u ^2                  twice the coefficient, for the / 2 (L9, L12); no blank after ^ (L34)
      ] / 2
     Subject To
      c14_00_00_u: + 1 s_00_00_u ... >= 0
      c16_00_00_u: + 1 t_00_00_u + [ + 2 beta_00_00 * p1_00_00_u ] >= 0      no / 2 in rows (L10)
     Bounds
-     0 <= s_00_00_u <= +inf            both bounds of every column (L17, L22), before the next two sections (L6)
+     0 <= s_00_00_u <= +inf            both bounds of every column (L17, L22), before the next two (L6)
     Generals / Binaries                never Integers (L5)
     End
 
@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...models.formulations.problem import Block, Bound
+from ...models.formulations.problem import Block, PlacedFamily
 from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names
 from ..writing.records import Piece, Pieces, bounds, render, scalar_when_constant, signed, words
@@ -76,7 +76,7 @@ def _objective(form: Canonical) -> Iterator[bytes]:
     yield b" ] / 2\n"
 
 
-def _rows(family: Bound, names: Names) -> Iterator[bytes]:
+def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     parts: list[Piece] = [b" ", names.row(family), b":"]
     for term in family.of_degree(1):
         parts += [b" ", words(coefficient(term), signed), b" ", names.at(family, term.symbols[0])]

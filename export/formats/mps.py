@@ -1,11 +1,12 @@
 """Free MPS, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC and GLPK read alike.
 
-    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated by Gurobi, Xpress and GLPK in their solutions; FREE is for CBC (M20)
+    NAME ring_sha256_1a2b3c4d5e6f FREE   repeated in solutions; FREE is for CBC (M20)
     ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
-    COLUMNS                            ` column row value`, one pair a line, `obj 0` for columns without cost (M19);
+    COLUMNS                            ` column row value`, one pair a line; `obj 0` without a cost (M19);
         MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
     RHS                                set name RHS1; no entry for the objective (M4), no RANGES (M11)
-    BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP, LO + PL, MI then UP
+    BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP,
+                                       LO + PL, MI then UP
     QUADOBJ                            one triangle of the Hessian: x'Qx/2 (M13)
     QCMATRIX row                       both triangles, without one-half (M16), after BOUNDS (M17)
     ENDATA
@@ -19,21 +20,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.names import Names, problem_name
-from ..writing.records import (
-    OnlyWhere,
-    Piece,
-    Pieces,
-    Tagged,
-    number,
-    render,
-    scalar_when_constant,
-    words,
-)
+from ..writing.records import OnlyWhere, Piece, Pieces, Tagged, number, render, scalar_when_constant, words
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
 
@@ -64,7 +56,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 
 
 def _columns(form: Canonical) -> Iterator[bytes]:
-    """Matrix entries column by column; a record is a column with all its entries, the cost first, then by row."""
+    """Matrix entries column by column; a record is a column: its cost first, then by row."""
     problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
     markers = 0
@@ -88,7 +80,7 @@ def _columns(form: Canonical) -> Iterator[bytes]:
             yield b" ONE c_ONE 1\n"
 
 
-def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
     """The lines of a column of a block for the rows of a family, in the order of rows."""
     chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
     lines = [line for term in chosen for line in _incident(family, term)]
@@ -102,8 +94,8 @@ def _entries(family: Bound, block: Block, name: Tagged, rows: Tagged) -> Iterato
             yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
-def _incident(family: Bound, term: Term) -> list[tuple[int, Ints | None, Term]]:
-    """Rows of a family in which a column of the term's block stands: (rank among them, row of each column or -1, term).
+def _incident(family: PlacedFamily, term: Term) -> list[tuple[int, Ints | None, Term]]:
+    """Rows of a family in which a column of the term's block stands: (rank, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
     the right one, so that the rows of a pixel are those of its pairs to the left, upwards, to the right and
@@ -128,7 +120,7 @@ def _inverse(index: Ints, count: int) -> Ints:
 
 
 def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
-    """Number of the pair of each pixel with its left, upper, right and lower neighbour, -1 where there is none."""
+    """Number of the pair of each pixel with its left, upper, right and lower neighbour; -1: none."""
     upper, right = grid.pair_number
     left, lower = np.full_like(right, -1), np.full_like(upper, -1)
     left[:, 1:], lower[:-1] = right[:, :-1], upper[1:]
@@ -190,7 +182,7 @@ def _objective_matrix(form: Canonical) -> Iterator[bytes]:
     )
 
 
-def _row_matrices(family: Bound, names: Names) -> Iterator[bytes]:
+def _row_matrices(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     products = family.of_degree(2)
     if not products:
         return

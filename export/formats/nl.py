@@ -27,21 +27,13 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Bound, Term
+from ...models.formulations.problem import PlacedFamily, Term
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, name_length
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
-from ..writing.records import (
-    Decimals,
-    Pieces,
-    Raw,
-    check_coefficients,
-    render,
-    scalar_when_constant,
-    words,
-)
+from ..writing.records import Decimals, Pieces, Raw, check_coefficients, render, scalar_when_constant, words
 
 __all__ = ["Layout", "generate"]
 
@@ -195,7 +187,7 @@ def _objective(layout: Layout, code: Encoder) -> Iterator[bytes]:
         yield from render(_tree(layout, code, family, family.family.body), family.count, padded=code.padded)
 
 
-def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
+def _tree(layout: Layout, code: Encoder, family: PlacedFamily, expression: sp.Expr) -> Pieces:
     """The expression in prefix notation; parts free of columns become one number."""
     if is_data(family, expression):
         return code.constant(family.data(expression))
@@ -212,7 +204,7 @@ def _tree(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> 
     return [*code.operator(_FUNCTIONS[expression.func]), *_tree(layout, code, family, expression.args[0])]
 
 
-def _chain(layout: Layout, code: Encoder, family: Bound, expression: sp.Expr) -> Pieces:
+def _chain(layout: Layout, code: Encoder, family: PlacedFamily, expression: sp.Expr) -> Pieces:
     """A sum or a product, its parts free of columns joined into one number in front."""
     data, others = split(family, expression)
     rest = [_tree(layout, code, family, part) for part in others]
@@ -271,8 +263,8 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
             )
 
 
-def _entries(family: Bound) -> list[tuple[sp.Symbol, Floats | float]]:
-    """Symbols and coefficients of a row in J: linear terms, and 0 for columns that are only in nonlinear ones."""
+def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
+    """Symbols and coefficients of a row in J: linear terms, and 0 for what is only in nonlinear ones."""
     linear = {term.symbols[0]: coefficient(term) for term in family.of_degree(1)}
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 

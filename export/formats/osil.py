@@ -1,13 +1,13 @@
 """OSiL, the XML format of COIN-OR's Optimization Services, for SCIP and OSSolverService.
 
     <variables numberOfVariables="7">
-    <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            every attribute always: defaults are lb 0, ub INF (O1); types C, B, I
+    <var name="alpha_00_00" type="C" lb="0" ub="1.57"/>            C, B, I; no attribute is left out (O1)
     <objectives> <obj maxOrMin="min" constant="0.3"> <coef idx="0">-1</coef>
     <constraints> <con name="c14_00_00_u" lb="0" ub="INF"/>        constants on the right
     <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
     <quadraticCoefficients>
-    <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               the full coefficient, without one-half; idx -1 is the objective (O1, O2)
-    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms of the objective beyond quadratic, as declared, one <nl> (O2)
+    <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               not halved; -1 is the objective (O1, O2)
+    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       what is beyond quadratic, in one <nl> (O2)
 
 What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
 Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
@@ -28,7 +28,7 @@ from typing import Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.expressions import is_data, split
@@ -88,12 +88,13 @@ _LETTER: Final = {"continuous": "C", "binary": "B", "integer": "I"}
 
 def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
     lower, upper = (words(scalar_when_constant(end), ends) for end in (block.lower, block.upper))
-    parts: Pieces = [b'<var name="', names.of(block), f'" type="{kind}" lb="'.encode(), lower, b'" ub="', upper, b'"/>\n']  # fmt: skip
+    kind_lower = f'" type="{kind}" lb="'.encode()
+    parts: Pieces = [b'<var name="', names.of(block), kind_lower, lower, b'" ub="', upper, b'"/>\n']
     yield from render(parts, block.count)
 
 
 def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """Columns (k, degree) and coefficients (k,) of the objective's terms up to quadratic, each set of columns once."""
+    """Columns (k, degree), each set once, and coefficients (k,) of the objective's terms up to quadratic."""
     nonlinear = problem.objective_degree > 2
     index, value = _beside_nonlinear(problem, degree) if nonlinear else problem.merged_objective(degree)
     if degree:
@@ -116,12 +117,13 @@ def _objective(problem: Problem) -> Iterator[bytes]:
     index, cost = _coefficients(problem, 1)
     constant = float(_coefficients(problem, 0)[1].sum())
     yield b'<objectives numberOfObjectives="1">\n'
-    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" numberOfObjCoef="{len(cost)}" constant="{number(constant)}">\n'.encode()
+    counts = f'numberOfObjCoef="{len(cost)}" constant="{number(constant)}"'
+    yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {counts}>\n'.encode()
     yield from render([b'<coef idx="', Decimals(index[:, 0]), b'">', words(cost), b"</coef>\n"], len(cost))
     yield b"</obj>\n</objectives>\n"
 
 
-def _constraints(family: Bound, names: Names) -> Iterator[bytes]:
+def _constraints(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     limit = words(scalar_when_constant(family.limit))
     lower: Piece = b"-INF" if family.family.sense == "<=" else limit
     upper: Piece = b"INF" if family.family.sense == ">=" else limit
@@ -189,7 +191,7 @@ def _nonlinear(problem: Problem) -> Iterator[bytes]:
     yield b"</sum>\n</nl>\n</nonlinearExpressions>\n"
 
 
-def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _tree(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """An expression as nodes; parts free of columns become one number."""
     if is_data(family, expression):
         return _constant(family, expression)
@@ -203,7 +205,7 @@ def _tree(family: Bound, expression: sp.Expr) -> list[Piece]:
     return _node(b"cos", _tree(family, expression.args[0]))
 
 
-def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _chain(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     """A sum or a product, its parts free of columns joined into one number in front."""
     data, others = split(family, expression)
     constant = [] if data is None else _constant(family, data)
@@ -211,7 +213,7 @@ def _chain(family: Bound, expression: sp.Expr) -> list[Piece]:
     return _node(b"sum" if expression.is_Add else b"product", inside)
 
 
-def _constant(family: Bound, expression: sp.Expr) -> list[Piece]:
+def _constant(family: PlacedFamily, expression: sp.Expr) -> list[Piece]:
     return [b'<number value="', words(family.data(expression)), b'"/>']
 
 

@@ -18,7 +18,7 @@ import pyomo.environ as pyo
 import sympy as sp
 
 from ...models.field.field import CrossField
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import IndexSet, pixel_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -39,9 +39,8 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
     """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
 
     Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has
-    None there.
-    start: a field whose complete point is set as the value of every variable. Raises InstanceError when it is
-    on another instance.
+    None there. start: a field whose complete point is set as the value of every variable. Raises
+    InstanceError when it is on another instance.
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
     point = None if start is None else problem.point(start)
@@ -60,7 +59,7 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
 
 
 def places(instance: Instance, over: IndexSet) -> list[Place]:
-    """Where the elements of an index set lie: (row, column), for a pair of its first pixel and then its side."""
+    """Where the elements of an index set lie: (row, column), for a pair of its first pixel, and its side."""
     grid = instance.grid
     at = pixel_of(instance, over)
     coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]
@@ -87,7 +86,7 @@ def _variables(block: Block, index: list[Place], domain: Any, point: Floats | No
     return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
 
 
-def _constraints(family: Bound, columns: list[Any]) -> pyo.Constraint:
+def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:
     """The rows of a family, left and right side as declared."""
     declared = places(family.problem.instance, family.family.over)
     index = [declared[element] for element in family.elements.tolist()]
@@ -100,7 +99,7 @@ def _constraints(family: Bound, columns: list[Any]) -> pyo.Constraint:
     return pyo.Constraint(index, rule=lambda _, *place: rows[place])
 
 
-def _values(family: Bound, expression: sp.Expr, columns: list[Any]) -> Iterator[Any]:
+def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> Iterator[Any]:
     """The expression at each element, over Pyomo variables where a symbol means a column."""
     symbols = sorted(expression.free_symbols, key=str)
     evaluate = sp.lambdify(symbols, expression, modules=[_FUNCTIONS, "math"])
@@ -110,7 +109,7 @@ def _values(family: Bound, expression: sp.Expr, columns: list[Any]) -> Iterator[
     )
 
 
-def _arguments(family: Bound, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
+def _arguments(family: PlacedFamily, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
     """What a symbol means at each element: a Pyomo variable or a number."""
     if symbol in family.variables:
         return [columns[column] for column in family.columns(symbol).tolist()]

@@ -1,17 +1,19 @@
-"""QPLIB's own format, for what is at most quadratic: lines of numbers, each thing in its place, comments after `#`.
+"""QPLIB's own format, for what is at most quadratic: lines of numbers in a fixed order, comments after `#`.
 
-    tiny # ...                     name of the instance; the lines of the header follow the first lines as comments
-    CGL # ...                      type of objective (L linear, D convex diagonal, C convex, Q any), variables (C continuous, M with
-                                   binaries, G with integers), rows (B none, L linear, Q any)
+    tiny # ...                     name of the instance; the header stands in comments of the first lines
+    CGL # ...                      type of objective (L linear, D convex diagonal, C convex, Q any), of
+                                   variables (C continuous, M with binaries, G with integers), of rows
+                                   (B none, L linear, Q any)
     minimize
     n; m                           numbers of variables and, unless there are none, rows
     count, then `i j value`        the objective's Q, unless it is linear; below the diagonal or on it
-    default, count, `i value`      a vector: its usual value, how many differ, and those; here the objective's b
+    default, count, `i value`      a vector: its usual value, how many differ, and those; here b
     constant
-    count, then `k i j value`      Q of the rows, when one is quadratic; count, then `k j value`: their linear terms
+    count, then `k i j value`      Q of the rows, when one is quadratic
+    count, then `k j value`        linear terms of the rows
     infinity                       a bound of this size is none
-    vectors                        left and right sides (with rows), lower and upper bounds, integer or not (with integers),
-                                   start, duals of rows (with rows), duals of bounds
+    vectors                        left and right sides (with rows), lower and upper bounds, integer or not
+                                   (with integers), start, duals of rows (with rows), duals of bounds
     count, then `i name`           names of variables, and of rows
 
 Everything counts from 1. Objective and rows are x'Qx/2 + bx with a *lower triangular* Q, not the triangle of
@@ -32,7 +34,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.problem import Bound
+from ...models.formulations.problem import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.curvature import probtype
@@ -115,7 +117,7 @@ def _rows(form: Canonical) -> Iterator[bytes]:
             first += family.count
 
 
-def _row_terms(family: Bound, degree: int, first: int) -> Iterator[bytes]:
+def _row_terms(family: PlacedFamily, degree: int, first: int) -> Iterator[bytes]:
     row = Decimals(np.arange(first, first + family.count))
     linear: list[Any] = []
     for term in family.of_degree(degree):

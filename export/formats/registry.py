@@ -78,9 +78,8 @@ class Format:
     """A file format: what it carries and how it is written.
 
     degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
-    first;
-    starts: whether a starting point has a place in it; default: whether it is written when no format is asked
-    for.
+    first; starts: whether a starting point has a place in it; default: whether it is written when no format
+    is asked for.
     """
 
     name: str
@@ -100,11 +99,23 @@ class Format:
 FORMATS: Final = {
     entry.name: entry
     for entry in (
-        Format("nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro", ANY_DEGREE, _nl, ("text", "binary"), starts=True),
-        Format("gms", "GAMS model, self-contained: sets and equations, or scalar", ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True),
+        Format(
+            "nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro",
+            ANY_DEGREE, _nl, ("text", "binary"), starts=True,
+        ),
+        Format(
+            "gms", "GAMS model, self-contained: sets and equations, or scalar",
+            ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True,
+        ),
         Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
-        Format("mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _mps),
-        Format("mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too", ANY_DEGREE, _mod, default=False),
+        Format(
+            "mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
+            2, _mps,
+        ),
+        Format(
+            "mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too",
+            ANY_DEGREE, _mod, default=False,
+        ),
         Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, _osil, default=False),
         Format("qplib", "QPLIB's own format, at most quadratic", 2, _qplib, starts=True, default=False),
         Format("bar", "BARON's own format, polynomials", 4, _bar, starts=True, default=False),
@@ -118,7 +129,7 @@ DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.default
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: the format and dialect, the problem as the file holds it, and per file name, bytes and SHA-256."""
+    """What was written: format, dialect, the problem as the file holds it; size and SHA-256 by file name."""
 
     format: str
     dialect: str
@@ -178,10 +189,14 @@ def _degree(problem: Problem) -> int:
 def header(problem: Problem) -> list[str]:
     """Lines of comment that say what a file holds."""
     formulation, options = problem.formulation, problem.formulation.options
+    name, kept = f"{formulation.name} (section {formulation.paper})", "kept"
+    if options.relax:
+        name, kept = f"continuous relaxation of {name}", "dropped"
+    norms = f"stroke norm {options.stroke_norm}, beta norm {options.beta_norm}"
     lines = [
-        f"{generator()}: {'continuous relaxation of ' if options.relax else ''}{formulation.name} (section {formulation.paper}), {problem.problem_class}, {formulation.summary}",
+        f"{generator()}: {name}, {problem.problem_class}, {formulation.summary}",
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
-        f"facet {options.facet}, stroke norm {options.stroke_norm}, beta norm {options.beta_norm}, integrality {'dropped' if options.relax else 'kept'}",
+        f"facet {options.facet}, {norms}, integrality {kept}",
     ]
     return lines + ([f"lifted: {formulation.lifted}"] if formulation.lifted else [])
 
@@ -202,9 +217,8 @@ def write(
     entry = format_of(path)
     chosen = entry.dialects[0] if dialect is None else dialect
     if chosen not in entry.dialects:
-        raise InputError(
-            f"{entry.name} has no dialect {chosen!r}; choose one of {', '.join(filter(None, entry.dialects)) or 'none'}"
-        )
+        known = ", ".join(filter(None, entry.dialects)) or "none"
+        raise InputError(f"{entry.name} has no dialect {chosen!r}; choose one of {known}")
     held = carried(problem, entry)
     form = Canonical(held)
     point = held.point(start) if start is not None and entry.starts else None
@@ -219,7 +233,7 @@ def write(
 def _companions(
     path: Path, name: str, form: Canonical, lines: list[str]
 ) -> Iterator[tuple[Path, Iterator[bytes]]]:
-    """The files beside one that is written: names of an .nl, never compressed, and data of a .mod, which are when it is."""
+    """The files beside one: names of an .nl, never compressed, and data of a .mod, compressed as it is."""
     stem = path.name.removesuffix(".gz").removesuffix(f".{name}")
     if name == "nl":
         yield path.with_name(f"{stem}.row"), form.layout.row_file()

@@ -48,10 +48,7 @@ def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
 
 
 def set_options(highs: Any, **options: str | float) -> None:
-    """Set options by name.
-
-    Another number of threads than that of an earlier solve in this process counts too.
-    """
+    """Set options by name; another number of threads than that of an earlier solve counts too."""
     for option, value in options.items():
         highs.setOptionValue(option, value)
     if options.get("threads"):
@@ -59,10 +56,7 @@ def set_options(highs: Any, **options: str | float) -> None:
 
 
 def solved(highs: Any, path: Path) -> Any:
-    """The model once its search is over.
-
-    Raises SolverError, with the file of the model, when that is an error.
-    """
+    """The model once its search is over. Raises SolverError, with its file, when that is an error."""
     if highs.run() == highspy.HighsStatus.kError:
         raise SolverError("HiGHS answers with an error (model status Not Set)", file=path)
     return highs

@@ -18,11 +18,11 @@ from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy
 from ...models.search.improvement import first_field
 from ...models.search.power_field import power_field
-from ...models.search.search import search
+from ...models.search.search import Search, search
 from ..solutions.solution import Solution
 from .job import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
-from .windows import WINDOW_SOLVERS, search_windows
+from .windows import WINDOW_SOLVERS, WindowSearch, search_windows
 
 Progress = Callable[[str], None]
 
@@ -149,11 +149,7 @@ def _search(request: Request) -> Iterator[Candidate]:
         start=request.start,
         progress=_teller(request, deadline, "search", "rounds"),
     )
-    seconds = time.perf_counter() - begin
-    interrupted = found.ended == "interrupted"
-    yield Candidate(
-        "search", found.field, seconds, interrupted=interrupted, counts=(("rounds", found.rounds),)
-    )
+    yield _searched("search", found, begin, rounds=found.rounds)
 
 
 def _windows(request: Request) -> Iterator[Candidate]:
@@ -166,10 +162,14 @@ def _windows(request: Request) -> Iterator[Candidate]:
         jobs=_processes(request),
         progress=_teller(request, deadline, "windows", "windows"),
     )
-    seconds = time.perf_counter() - begin
-    counts = (("windows", found.windows), ("windows_closed", found.closed), ("windows_lower", found.lower))
-    interrupted = found.ended == "interrupted"
-    yield Candidate("windows", found.field, seconds, interrupted=interrupted, counts=counts)
+    counts = {"windows": found.windows, "windows_closed": found.closed, "windows_lower": found.lower}
+    yield _searched("windows", found, begin, **counts)
+
+
+def _searched(method: str, found: Search | WindowSearch, begin: float, **counts: int) -> Candidate:
+    """What a search came to that began at a time of the performance counter."""
+    seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
+    return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
 
 
 def _processes(request: Request) -> int:

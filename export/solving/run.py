@@ -113,7 +113,7 @@ def run(
     """The report of a run.
 
     The folder then holds instance, solver files, the best field, pictures and report.json.
-        DIR/models     every formulation in every format, manifests, the instance
+        DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
@@ -154,7 +154,7 @@ def run(
 
 
 @dataclass
-class _Findings:
+class _Found:
     """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
 
     candidates: list[Candidate] = field(default_factory=list)
@@ -162,9 +162,9 @@ class _Findings:
     interrupted: str = ""
 
 
-def _tried_in_turn(request: Request) -> _Findings:
+def _tried_in_turn(request: Request) -> _Found:
     """What the methods of a run find, one after the other, until one of them is interrupted."""
-    found = _Findings()
+    found = _Found()
     for method in _tried():
         try:
             for candidate in method.find(request):

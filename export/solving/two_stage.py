@@ -40,8 +40,7 @@ def fit_angles(
     """The solution of `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage.
 
     It is the field of least 2-norm energy for these jumps within the windows (section 5 of the paper; a
-    convex QP).
-    folder, limits and errors: as for `solve`.
+    convex QP). folder, limits and errors: as for `solve`.
     """
     return solve(
         formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field
@@ -80,10 +79,9 @@ def two_stage(
     """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
 
     `.milp` and `.qp` are the two, `.field` the one with the jumps of the first and the angles of the second
-    (section 5 of the paper).
-    folder: as for `solve`. start: the first incumbent, the improved greedy field when None. limits: for both
-    stages together.
-    options: facet, stroke_norm, beta_norm. Raises MissingSolverError, SolverError, SolutionError.
+    (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the improved greedy field
+    when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
+    MissingSolverError, SolverError, SolutionError.
     """
     limits = limits or Limits()
     deadline = Deadline.after(limits.seconds)

@@ -26,7 +26,6 @@ from ...models.search.excerpt import Excerpt, excerpt
 from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
-from ..solutions.solution import Solution
 from ..solvers_table import DRIVEN
 from .child import GRACE
 from .job import Limits
@@ -41,7 +40,7 @@ _SECONDS: Final = 5.0  # a window
 _SHORTEST: Final = 0.5  # seconds: with less no solver is started
 _HAND_OVER: Final = 2 * GRACE  # seconds before the end at which solvers end: they may be late by their grace
 
-Progress = Callable[[int, float], object]
+WindowProgress = Callable[[int, float], object]
 """Is told how many windows are solved, and the least energy so far."""
 
 
@@ -86,7 +85,7 @@ def search_windows(
     solver: str = "bonmin",
     seed: int = 0,
     jobs: int = 2,
-    progress: Progress = lambda *_: None,
+    progress: WindowProgress = lambda *_: None,
 ) -> WindowSearch:
     """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
 
@@ -123,10 +122,7 @@ def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
 
 
 def _solved(task: _Task) -> _Found | None:
-    """A window, solved by an external solver from the file that is written for it.
-
-    None where there was no time for it.
-    """
+    """A window, solved from the file that is written for it; None where there was no time for it."""
     deadline = task.deadline.within(_SECONDS)
     if deadline.later(-_SHORTEST).passed():
         return None
@@ -136,11 +132,8 @@ def _solved(task: _Task) -> _Found | None:
     limits = Limits(threads=1).until(deadline)
     with tempfile.TemporaryDirectory(dir=task.folder) as folder:
         found = solve(problem, task.solver, folder, limits=limits, start=piece.field)
-    return _Found(piece, _field_of(found), found.status.startswith("optimal"))
-
-
-def _field_of(found: Solution) -> CrossField | None:
-    return None if found.point is None else found.field
+    answer = None if found.point is None else found.field
+    return _Found(piece, answer, found.status.startswith("optimal"))
 
 
 class _State:
@@ -216,10 +209,7 @@ class _State:
         self._open[:] = True
 
     def _try(self, field: CrossField, free: Bools) -> bool:
-        """Go on from a field, its angles and jumps brought up to date, if it is lower.
-
-        Then windows near by are open again.
-        """
+        """Whether a field, brought up to date, is lower: then go on from it, windows near by open again."""
         state = FreeField.of(field)
         settle(state, Solver())
         better = state.bounded()

@@ -1,4 +1,4 @@
-"""What a model file means to a program, compared with the problem: names, types, bounds, coefficients, and values at points."""
+"""What a model file means to a program, compared with the problem: in its algebra, or at points."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def names_of_rows(problem: Problem) -> list[str]:
 
 
 def of_problem(problem: Problem) -> Meaning:
-    """What an LP or MPS file of the problem should mean, from the problem's arrays: ONE is its last column."""
+    """What an LP or MPS file of the problem should mean, from its arrays: ONE is the last column."""
     form = Canonical(problem)
     one = [ONE.decode()] * form.has_one
     n, ones = problem.columns, np.ones(len(one))
@@ -75,7 +75,7 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
 
 
 def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
-    """What differs between the algebra of a file and the problem, the first thing only; empty when nothing does.
+    """What first differs between the algebra of a file and the problem; empty when nothing does.
 
     tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
     compared as well.
@@ -98,7 +98,9 @@ def difference(found: Meaning, problem: Problem, tolerance: float, points: Float
     )
 
 
-_NUMBERS: Final = ("integer", "lower", "upper", "costs", "quadratic", "row_lower", "row_upper", "matrix", "row_quadratic")  # fmt: skip
+_NUMBERS: Final = (
+    "integer", "lower", "upper", "costs", "quadratic", "row_lower", "row_upper", "matrix", "row_quadratic",
+)  # fmt: skip
 
 
 def _names_differ(found: Sequence[str], expected: Sequence[str], kind: str) -> str:
@@ -140,7 +142,7 @@ def _value_difference(what: str, found: Floats, expected: Floats, accuracy: floa
 
 
 def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -> str:
-    """What differs between the behaviour of a file and the problem, the first thing only; empty when nothing does."""
+    """What first differs between the behaviour of a file and the problem; empty when nothing does."""
     columns, rows = names_of(column_names(problem)), names_of_rows(problem)
     lacking = set(columns) - set(found.columns) if found.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]

@@ -1,11 +1,11 @@
 """Every written file handed to every free program: read, compared, evaluated, and on request solved.
 
-For a folder that `export` wrote: each manifest gives its problem, each file goes to each consumer of its
+For a folder that `export` wrote: each manifest gives its problem, each file goes to each program of its
 format. What a program reads is compared with the problem by name: sense, constant, costs, quadratic terms,
 types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it: the point is
 checked against the problem, its energy computed again, and the optima of one problem compared with each other
 across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes
-silently: what was not tried is a finding, with its reason.
+silently: what was not tried is told as well, with its reason.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ READING_SECONDS: Final = 60.0
 
 
 class Verdict(StrEnum):
-    """How a file fared with a consumer."""
+    """How a file fared with a program."""
 
     AGREES = "agrees"
     LIMIT = "time limit"
@@ -67,18 +67,18 @@ _BAD: Final = frozenset({Verdict.DIFFERS, Verdict.FAILED})
 
 
 @dataclass(frozen=True)
-class Finding:
-    """What became of a file at a consumer: reading it, or solving it with one of its solvers.
+class Check:
+    """What became of a file at a program: reading it, or solving it with one of its solvers.
 
-    problem: instance and formulation. objective: recomputed at the solver's point; bound: its dual bound;
-    energy: the objective again, with every other column at the value that follows from angles and jumps.
-    group: where it is equal, so is the optimum; relaxes: the group of which the file holds a relaxation,
-    whose optimum is no higher.
+    problem: instance and formulation. program: its name, or that of the solver. objective: recomputed at the
+    solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
+    that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the group of
+    which the file holds a relaxation, whose optimum is no higher.
     """
 
     problem: str
     file: str
-    consumer: str
+    program: str
     step: str
     verdict: Verdict
     reason: str = ""
@@ -93,35 +93,35 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verification:
-    """All findings, the versions of the programs that took part, and how to install those that are absent."""
+    """All checks, the versions of the programs that took part, and how to install those that are absent."""
 
     folder: Path
-    findings: list[Finding] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
     versions: dict[str, str] = field(default_factory=dict)
     absent: dict[str, str] = field(default_factory=dict)
 
     @property
-    def bad(self) -> list[Finding]:
-        """The findings that should not be."""
-        return [finding for finding in self.findings if finding.verdict in _BAD]
+    def bad(self) -> list[Check]:
+        """The checks that something is wrong with."""
+        return [check for check in self.checks if check.verdict in _BAD]
 
     @property
     def ok(self) -> bool:
-        """Whether no consumer differs or failed."""
+        """Whether no program differs or failed."""
         return not self.bad
 
     def document(self) -> dict[str, Any]:
         """The content of verify.json."""
         return {
             "format": "crossfield-verification",
-            "version": 1,
+            "version": 2,
             "generator": generator(),
             "ok": self.ok,
             "versions": self.versions,
             "absent": self.absent,
-            "findings": [
+            "checks": [
                 {key: value for key, value in asdict(each).items() if value not in (None, "")}
-                for each in self.findings
+                for each in self.checks
             ],
         }
 
@@ -130,7 +130,6 @@ class Verification:
 class _Subject:
     """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
 
-    manifest: Manifest
     problem: Problem
     held: Problem
     name: str
@@ -138,22 +137,11 @@ class _Subject:
     path: Path
     points: Path
 
-    def finding(
-        self, consumer: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any
-    ) -> Finding:
+    def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
         group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
-        return Finding(
-            _title(self.problem),
-            self.name,
-            consumer,
-            step,
-            verdict,
-            reason,
-            **numbers,
-            group=group,
-            relaxes=relaxes,
-        )
+        told = (_title(self.problem), self.name, program, step, verdict, reason)
+        return Check(*told, **numbers, group=group, relaxes=relaxes)
 
 
 def _title(problem: Problem) -> str:
@@ -164,72 +152,63 @@ def verify(
     folder: str | Path,
     *,
     seconds: float | None = None,
-    consumers: list[str] | None = None,
+    programs: list[str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Verification:
-    """What became of all the files in a folder at all the consumers that are here.
+    """What became of all the files in a folder at all the programs that are installed.
 
-    Also written there as verify.json. seconds: for each solve; None: nothing is solved. consumers: names, all
-    by default. progress: called with each file and consumer. Raises InputError when the folder holds no
+    Also written there as verify.json. seconds: for each solve; None: nothing is solved. programs: names, all
+    by default. progress: called with each file and program. Raises InputError when the folder holds no
     manifest, and what reading manifests raises.
     """
     folder = Path(folder)
-    wanted = [PROGRAMS[name] for name in consumers or PROGRAMS]
+    wanted = [PROGRAMS[name] for name in programs or PROGRAMS]
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
     found = Verification(folder, absent={each.name: each.install for each in wanted if not each.present})
     with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
         subjects, broken = _subjects(manifests, Path(temporary))
-        found.findings.extend(broken)
-        for consumer in (each for each in wanted if each.present):
-            chosen = [subject for subject in subjects if subject.format in consumer.formats]
-            with Worker(consumer.name, Path(temporary) / consumer.name) as worker:
-                bench = _Bench(consumer, worker, Path(temporary) / consumer.name / "result.npz", seconds)
-                found.versions[consumer.name] = worker.ask({"step": "version"}, READING_SECONDS)["words"]
+        found.checks.extend(broken)
+        for program in (each for each in wanted if each.present):
+            chosen = [subject for subject in subjects if subject.format in program.formats]
+            with Worker(program.name, Path(temporary) / program.name) as worker:
+                bench = _Bench(program, worker, Path(temporary) / program.name / "result.npz", seconds)
+                found.versions[program.name] = worker.ask({"step": "version"}, READING_SECONDS)["words"]
                 for subject in chosen:
-                    progress(f"{subject.name}: {consumer.title}")
-                    found.findings.extend(bench.findings(subject))
-    found.findings[:] = compared(found.findings)
+                    progress(f"{subject.name}: {program.title}")
+                    found.checks.extend(bench.checks(subject))
+    found.checks[:] = compared(found.checks)
     write_bytes(folder / RESULT, (json.dumps(found.document(), indent=1) + "\n").encode())
     return found
 
 
-def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject], list[Finding]]:
-    """The files that are as the manifests say, and findings about those that are not."""
+def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject], list[Check]]:
+    """The files that are as the manifests say, and failed checks of those that are not."""
     subjects: list[_Subject] = []
-    broken: list[Finding] = []
+    broken: list[Check] = []
     for number, manifest in enumerate(manifests):
         problem = manifest.problem()
         place = temporary / f"set{number}"
         place.mkdir()
         for entry in manifest.document["files"]:
-            source = manifest.folder / entry["name"]
+            about, source = (_title(problem), entry["name"], "", "read"), manifest.folder / entry["name"]
             if not source.is_file() or sha256_of(source) != entry["sha256"]:
                 words = "is not the file that the manifest describes; export again"
-                broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.FAILED, words))
+                broken.append(Check(*about, Verdict.FAILED, words))
                 continue
             path = _unpacked(source, place)
-            if path.suffix == FORMATS[entry["format"]].suffix:
-                held = carried(problem, FORMATS[entry["format"]])
-                if entry["lifted"] != held.formulation.lifted:
-                    said, holds = entry["lifted"], held.formulation.lifted
-                    words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
-                    broken.append(Finding(_title(problem), entry["name"], "", "read", Verdict.DIFFERS, words))
-                points = place / f"points_{len(held.blocks)}.npz"
-                if not points.exists():
-                    save(_points(held), points)
-                subjects.append(
-                    _Subject(
-                        manifest,
-                        problem,
-                        held,
-                        entry["name"],
-                        entry["format"],
-                        path,
-                        points,
-                    )
-                )
+            if path.suffix != FORMATS[entry["format"]].suffix:
+                continue
+            held = carried(problem, FORMATS[entry["format"]])
+            said, holds = entry["lifted"], held.formulation.lifted
+            if said != holds:
+                words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
+                broken.append(Check(*about, Verdict.DIFFERS, words))
+            points = place / f"points_{len(held.blocks)}.npz"
+            if not points.exists():
+                save(_points(held), points)
+            subjects.append(_Subject(problem, held, entry["name"], entry["format"], path, points))
     return subjects, broken
 
 
@@ -264,7 +243,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """A consumer at work: its child process, where that leaves arrays, and seconds for a solve."""
+    """A program at work: its child process, where that leaves arrays, and seconds for a solve."""
 
     program: Program
     worker: Worker
@@ -272,11 +251,8 @@ class _Bench:
     seconds: float | None
     solved: set[tuple[str, str]] = field(default_factory=set)
 
-    def findings(self, subject: _Subject) -> Iterator[Finding]:
-        """What the consumer makes of a file: of reading it, and of each of its solvers.
-
-        Two files of the same problem are solved once.
-        """
+    def checks(self, subject: _Subject) -> Iterator[Check]:
+        """What the program and its solvers make of a file; files of the same problem are solved once."""
         read = self._read(subject)
         yield read
         if self.seconds is None:
@@ -289,61 +265,56 @@ class _Bench:
 
     def _ask(self, subject: _Subject, step: str, seconds: float, **more: Any) -> dict[str, Any]:
         self.result.unlink(missing_ok=True)
-        task = {
-            "step": step,
-            "path": str(subject.path),
-            "points": str(subject.points),
-            "result": str(self.result),
-        }
-        return self.worker.ask(task | {"seconds": seconds} | more, seconds)
+        paths = {"path": subject.path, "points": subject.points, "result": self.result}
+        task = {"step": step, "seconds": seconds} | {name: str(path) for name, path in paths.items()} | more
+        return self.worker.ask(task, seconds)
 
-    def _read(self, subject: _Subject) -> Finding:
+    def _read(self, subject: _Subject) -> Check:
         algebra = subject.format in self.program.algebra
         refusal = _refusal(self.program.name, subject, "read")
         answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
-        if answer["kind"] != "done":
-            return self._unread(subject, answer, refusal)
-        if refusal:
-            words = f"it was read, though {refusal}"
-            return subject.finding(self.program.name, "read", Verdict.DIFFERS, words)
+        if answer["kind"] == "done":
+            wrong = f"it was read, though {refusal}" if refusal else self._difference(subject, algebra)
+            verdict, words = (Verdict.DIFFERS if wrong else Verdict.AGREES), wrong
+        elif answer["kind"] == "too large":
+            verdict, words = Verdict.NOT_TRIED, self._too_large(subject)
+        elif answer["kind"] == "not told":
+            verdict, words = Verdict.NOT_TRIED, answer["words"]
+        elif answer["kind"] == "refused" and refusal:
+            verdict, words = Verdict.REFUSED, refusal
+        else:
+            verdict, words = Verdict.FAILED, answer["words"]
+        return subject.check(self.program.name, "read", verdict, words)
+
+    def _difference(self, subject: _Subject, algebra: bool) -> str:
+        """What the program read otherwise than the problem has it; empty when nothing."""
         points = load(Points, subject.points)
         if algebra:
             model = load(Meaning, self.result)
-            wrong = difference(model, subject.held, self.program.tolerance, points.values)
-        else:
-            wrong = evaluation_difference(load(Evaluation, self.result), subject.held, points)
-        return subject.finding(self.program.name, "read", Verdict.DIFFERS if wrong else Verdict.AGREES, wrong)
-
-    def _unread(self, subject: _Subject, answer: dict[str, Any], refusal: str) -> Finding:
-        if answer["kind"] == "too large":
-            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, self._too_large(subject))
-        if answer["kind"] == "not told":
-            return subject.finding(self.program.name, "read", Verdict.NOT_TRIED, answer["words"])
-        if answer["kind"] == "refused" and refusal:
-            return subject.finding(self.program.name, "read", Verdict.REFUSED, refusal)
-        return subject.finding(self.program.name, "read", Verdict.FAILED, answer["words"])
+            return difference(model, subject.held, self.program.tolerance, points.values)
+        return evaluation_difference(load(Evaluation, self.result), subject.held, points)
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
         return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
 
-    def _solve(self, subject: _Subject, solver: str) -> Finding:
-        refusal = _refusal(solver, subject, "solve")
-        if refusal:
-            return subject.finding(solver, "solve", Verdict.REFUSED, refusal)
-        local = _refusal(solver, subject, "local")
-        if local:
-            return subject.finding(solver, "solve", Verdict.NOT_TRIED, local)
+    def _solve(self, subject: _Subject, solver: str) -> Check:
+        def told(verdict: Verdict, words: str) -> Check:
+            return subject.check(solver, "solve", verdict, words)
+
+        if refusal := _refusal(solver, subject, "solve"):
+            return told(Verdict.REFUSED, refusal)
+        if local := _refusal(solver, subject, "local"):
+            return told(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
-            reason = f"{SOLVERS[solver].title} is not installed: {missing}"
-            return subject.finding(solver, "solve", Verdict.NOT_TRIED, reason)
+            return told(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
         assert self.seconds is not None
         begin = time.perf_counter()
         answer = self._ask(subject, "solve", self.seconds, solver=solver)
         if answer["kind"] == "too large":
-            return subject.finding(solver, "solve", Verdict.NOT_TRIED, self._too_large(subject))
+            return told(Verdict.NOT_TRIED, self._too_large(subject))
         if answer["kind"] != "done":
-            return subject.finding(solver, "solve", Verdict.FAILED, answer["words"])
+            return told(Verdict.FAILED, answer["words"])
         return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
 
 
@@ -353,13 +324,13 @@ def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
     return "" if refusal is None else refusal.reason
 
 
-def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Finding:
+def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Check:
     """What a solver's answer is worth: its point checked, objective and energy computed again."""
     held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
     if not len(answer.values):
         limit = answer.status == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
-        return subject.finding(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
+        return subject.check(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
     point, wrong = _point(held, answer)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
@@ -374,24 +345,16 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
     if wrong:
-        return subject.finding(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
-    return subject.finding(
-        solver,
-        "solve",
-        Verdict.AGREES if proven else Verdict.LIMIT,
-        "" if proven else answer.message,
-        proven=proven,
-        **numbers,
-    )
+        return subject.check(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
+    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, answer.message)
+    return subject.check(solver, "solve", verdict, words, proven=proven, **numbers)
 
 
 def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
     """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
     options = problem.formulation.options
-    if (
-        options.relax or options.facet == "printed"
-    ):  # then z need not be p1 beta, and the field is another point
-        return ""
+    if options.relax or options.facet == "printed":
+        return ""  # z need not be p1 beta, and the field is another point
     if same(energy, objective) or (not proven and energy < objective):
         return ""
     return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
@@ -402,16 +365,12 @@ def _finite(value: float | None) -> float | None:
 
 
 def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
-    """The point by name, integers rounded; a column that the solver does not tell is at zero.
-
-    And what is wrong with it.
-    """
+    """The point by name, integers rounded, what is not told at zero; and what is wrong with it."""
     names = np.array([name.encode() for name in names_of(column_names(problem))])
     values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
     point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
-    return np.where(
-        problem.integer & (np.abs(point - np.round(point)) <= ROUND), np.round(point), point
-    ), wrong
+    whole = problem.integer & (np.abs(point - np.round(point)) <= ROUND)
+    return np.where(whole, np.round(point), point), wrong
 
 
 def same(first: float, second: float) -> bool:
@@ -419,57 +378,49 @@ def same(first: float, second: float) -> bool:
     return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
 
 
-def compared(findings: list[Finding]) -> list[Finding]:
-    """The findings; solves whose optimum or bound contradicts the best of their problem are different."""
-    return [_against(finding, findings) for finding in findings]
+def compared(checks: list[Check]) -> list[Check]:
+    """The checks; a solve whose optimum or bound contradicts the best of its problem now differs."""
+    return [_against(check, checks) for check in checks]
 
 
-def _against(finding: Finding, findings: list[Finding]) -> Finding:
-    if finding.step != "solve" or finding.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
-        return finding
-    wrong = _beside_others(finding, findings) or _above_what_it_relaxes(finding, findings)
+def _against(check: Check, checks: list[Check]) -> Check:
+    if check.step != "solve" or check.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
+        return check
+    wrong = _beside_others(check, checks) or _above_what_it_relaxes(check, checks)
     if wrong:
-        return replace(finding, verdict=Verdict.DIFFERS, reason=wrong)
-    return replace(finding, reason=_as_relaxation(finding, findings)) if finding.relaxes else finding
+        return replace(check, verdict=Verdict.DIFFERS, reason=wrong)
+    return replace(check, reason=_as_relaxation(check, checks)) if check.relaxes else check
 
 
-def _beside_others(finding: Finding, findings: list[Finding]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem.
-
-    Empty when it does not.
-    """
-    best = _best(findings, finding.group)
+def _beside_others(check: Check, checks: list[Check]) -> str:
+    """How a proven optimum or a bound contradicts the best point of the same problem; empty when not."""
+    best = _best(checks, check.group)
     if best is None:
         return ""
-    if finding.proven and finding.objective is not None and not same(finding.objective, best):
-        return f"its optimum is {finding.objective:.9g}, another has {best:.9g}"
-    if finding.bound is not None and finding.bound > best and not same(finding.bound, best):
-        return f"its bound {finding.bound:.9g} is above a point of {best:.9g}"
+    if check.proven and check.objective is not None and not same(check.objective, best):
+        return f"its optimum is {check.objective:.9g}, another has {best:.9g}"
+    if check.bound is not None and check.bound > best and not same(check.bound, best):
+        return f"its bound {check.bound:.9g} is above a point of {best:.9g}"
     return ""
 
 
-def _above_what_it_relaxes(finding: Finding, findings: list[Finding]) -> str:
-    """How the proven optimum of a relaxation lies above a point of the problem itself.
-
-    Empty when it does not.
-    """
-    best = _best(findings, finding.relaxes)
-    lower = finding.objective if finding.proven else finding.bound
+def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
+    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when not."""
+    best = _best(checks, check.relaxes)
+    lower = check.objective if check.proven else check.bound
     if best is None or lower is None or lower <= best or same(lower, best):
         return ""
     return f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {best:.9g}"
 
 
-def _as_relaxation(finding: Finding, findings: list[Finding]) -> str:
+def _as_relaxation(check: Check, checks: list[Check]) -> str:
     """What is told of the solve of a relaxation, beside the best point of the problem itself, if any."""
-    best, told = _best(findings, finding.relaxes), f"; {finding.reason}" if finding.reason else ""
-    beside = (
-        f", no higher than {best:.9g} of the problem itself" if best is not None and finding.proven else ""
-    )
+    best, told = _best(checks, check.relaxes), f"; {check.reason}" if check.reason else ""
+    beside = f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
     return f"a relaxation: products lifted without integrality{beside}{told}"
 
 
-def _best(findings: list[Finding], group: str) -> float | None:
+def _best(checks: list[Check], group: str) -> float | None:
     """The least objective that was found in a group."""
-    values = [each.objective for each in findings if each.group == group and each.objective is not None]
+    values = [each.objective for each in checks if each.group == group and each.objective is not None]
     return min(values, default=None)

@@ -64,10 +64,7 @@ class Canonical:
 
     @cached_property
     def costs(self) -> Floats:
-        """Cost of every column, shape (columns,), zero for most.
-
-        Raises UnsupportedByFormatError for an extreme one.
-        """
+        """Cost of every column (columns,). Raises UnsupportedByFormatError for an extreme one."""
         index, coefficient = self.problem.merged_objective(1)
         costs = np.zeros(self.problem.columns)
         costs[index[:, 0]] = coefficient
@@ -75,10 +72,7 @@ class Canonical:
         return costs
 
     def products(self) -> tuple[Ints, Floats]:
-        """The objective's products: columns (k, 2) and coefficients (k,).
-
-        Raises UnsupportedByFormatError for an extreme one.
-        """
+        """The objective's products: columns (k, 2) and coefficients (k,). Raises as `costs`."""
         index, coefficient = self.problem.merged_objective(2)
         check_coefficients(coefficient, "the objective")
         return index, coefficient

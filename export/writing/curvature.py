@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Bound, Problem
+from ...models.formulations.problem import PlacedFamily, Problem
 from .canonical import Canonical
 
 NEGLIGIBLE: Final = 1e-9
@@ -29,7 +29,7 @@ def of_objective(problem: Problem) -> tuple[str, str]:
     return "indefinite", "the objective holds products that are no squares"
 
 
-def _is_convex(family: Bound) -> bool:
+def _is_convex(family: PlacedFamily) -> bool:
     """Whether each summand of a quadratic family has a Hessian without negative eigenvalue."""
     products = family.of_degree(2)
     if not products:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from ...models.formulations.problem import Bound
+from ...models.formulations.problem import PlacedFamily
 from ...models.formulations.symbols import SCALARS, VARIABLES
 from .records import Piece, Pieces
 
@@ -37,9 +37,10 @@ class Language(ABC):
     def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
         """A factor that is data, signed or bracketed like `constant`."""
 
-    @abstractmethod
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        """The power of a base (not bracketed) with an exponent of at least 2."""
+        """The power of a base (not bracketed) with an exponent of at least 2; by default with a caret."""
+        bracketed = base if len(base) == 1 else [b"(", *base, b")"]
+        return [*bracketed, f"^{exponent}".encode()]
 
     def expression(self, expression: sp.Expr) -> list[Piece]:
         """An expression; its first term has a sign only when it is negative."""
@@ -102,12 +103,12 @@ def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
     return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
 
 
-def is_data(family: Bound, expression: sp.Expr) -> bool:
+def is_data(family: PlacedFamily, expression: sp.Expr) -> bool:
     """Whether an expression of a family holds no column."""
     return not expression.free_symbols & set(family.variables)
 
 
-def split(family: Bound, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
+def split(family: PlacedFamily, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
     """A sum or a product in two: its data as one expression (or None), and its other parts in order."""
     data = [part for part in chain.args if is_data(family, part)]
     others = [part for part in chain.args if part not in data]

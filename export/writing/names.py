@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, Bound, Problem
+from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.formulations.symbols import SLOTS, IndexSet, pixel_of
 from ...models.instance.instance import Instance
 from .records import Bytes, Piece, Tagged, Words, digits, filled, table
@@ -27,12 +27,12 @@ OBJECTIVE: Final = b"obj"
 
 
 def problem_name(problem: Problem) -> str:
-    """Name of a problem where solvers repeat it in their solution files: instance and stamp, at most 52 letters, digits and underscores."""
+    """Name that solvers repeat in their solution files: instance and stamp, at most 52 word characters."""
     return f"{problem.instance.name}_{problem.stamp}"
 
 
 class Names:
-    """Names of a problem's columns and rows as pieces of records: a tag, and words for where the elements lie.
+    """Names of columns and rows as pieces of records: a tag, and words for where the elements lie.
 
     The words are the same for all blocks and families over an index set, so that there are few of them and
     each is made once.
@@ -47,12 +47,12 @@ class Names:
         """Names of a block's columns in order."""
         return Tagged(block.name.encode(), self._of(block.over))
 
-    def row(self, family: Bound) -> Tagged:
+    def row(self, family: PlacedFamily) -> Tagged:
         """Names of the rows of a family in order."""
         words = self._of(family.family.over)
         return Tagged(family.family.tag.encode(), words if family.everywhere else words.at(family.elements))
 
-    def at(self, family: Bound, symbol: sp.Symbol) -> Tagged:
+    def at(self, family: PlacedFamily, symbol: sp.Symbol) -> Tagged:
         """Name of the symbol's column at each element of a family."""
         block, (_, way) = family.block(symbol), SLOTS[family.family.over][symbol]
         key = (family.family.over, way, family.family.only)
@@ -116,7 +116,7 @@ def column_names(problem: Problem) -> Bytes:
     )
 
 
-def family_names(family: Bound) -> Bytes:
+def family_names(family: PlacedFamily) -> Bytes:
     """Names of the rows of a family, shape (count, width), no padding."""
     names = element_names(family.problem.instance, family.family.tag, family.family.over)
     return names if family.everywhere else names[family.elements]

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Bound, Problem, Term
+from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
 from ...models.instance.grid import Bools, Ints
 from .names import OBJECTIVE, Names
 from .records import render
@@ -32,17 +32,17 @@ class Layout:
     problem: Problem
 
     @cached_property
-    def nonlinear_rows(self) -> tuple[Bound, ...]:
+    def nonlinear_rows(self) -> tuple[PlacedFamily, ...]:
         """Families of rows that are not linear."""
         return tuple(family for family in self.problem.rows if family.degree > 1)
 
     @cached_property
-    def rows(self) -> tuple[Bound, ...]:
+    def rows(self) -> tuple[PlacedFamily, ...]:
         """Families of rows, nonlinear ones first."""
         return self.nonlinear_rows + tuple(family for family in self.problem.rows if family.degree <= 1)
 
     @cached_property
-    def nonlinear_objective(self) -> tuple[Bound, ...]:
+    def nonlinear_objective(self) -> tuple[PlacedFamily, ...]:
         """Terms of the objective that are not linear."""
         return tuple(family for family in self.problem.objective if family.degree > 1)
 
@@ -99,7 +99,7 @@ class Layout:
         number = np.repeat(np.arange(len(blocks), dtype=np.int8), [block.count for block in blocks])
         return [(blocks[number[self.order[run.start]]], run) for run in runs(number[self.order])]
 
-    def places(self, family: Bound, symbol: sp.Symbol) -> Ints:
+    def places(self, family: PlacedFamily, symbol: sp.Symbol) -> Ints:
         """Place in the file of the symbol's column at each element of a family."""
         places, inside = self.place[family.block(symbol).columns], family.inside(symbol)
         return places if inside is None else places[inside]
@@ -125,6 +125,6 @@ def runs(values: NDArray[Any]) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(cuts)]
 
 
-def nonlinear_terms(family: Bound) -> tuple[Term, ...]:
+def nonlinear_terms(family: PlacedFamily) -> tuple[Term, ...]:
     """The monomials of degree two and more."""
     return tuple(term for term in family.terms or () if term.degree > 1)

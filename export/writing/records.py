@@ -51,7 +51,7 @@ class Part(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Words:
-    """Words of a table (k, width), one per record by its code; without codes the records are the words in order."""
+    """Words of a table (k, width), one per record by its code; without codes, in order."""
 
     table: Bytes
     codes: NDArray[Any] | None
@@ -91,7 +91,7 @@ class Decimals:
         return len(str(int(self.values.max(initial=0))))
 
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
-        """The digits of these records; no padding where all have the same number of digits, as most blocks do."""
+        """The digits of these records; no padding where all have the same number, as in most blocks."""
         values = self.values[start:stop]
         width, least = len(str(int(values.max()))), len(str(int(values.min())))
         out = digits(values, width)
@@ -165,7 +165,7 @@ def filled(parts: Pieces, count: int) -> Bytes:
 
 
 class _Template:
-    """The pieces of a record, and the matrix of bytes of the block at hand: literals stay, holes are filled anew.
+    """The pieces of a record and the bytes of the block at hand: literals stay, holes are filled anew.
 
     A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
     which is rare.
@@ -306,7 +306,7 @@ def number(value: float) -> str:
 
 
 def numbers(values: Floats) -> Texts:
-    """The shortest texts that read back as exactly these doubles, as `number` has them; made by Python's own loop over a list."""
+    """The shortest texts that read back as exactly these doubles, as `number` has them."""
     whole = (np.rint(values) == values) & (np.abs(values) < MOST)
     texts = np.zeros(len(values), dtype="S24")
     for chosen, given in ((whole, values[whole].astype(np.int64)), (~whole, values[~whole])):
@@ -339,7 +339,7 @@ def scalar_when_constant(values: Floats) -> Floats | float:
 
 
 def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
-    """Numbers in ascending order, all of `values` among them, and the place of each; no sorting for few whole ones."""
+    """Ascending numbers, all of `values` among them, and the place of each; few whole ones are not sorted."""
     least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, -1.0)
     few = 0 <= most - least < _FEW and max(-least, most) < MOST
     if few and (values == np.rint(values)).all():
@@ -356,9 +356,13 @@ def check_coefficients(values: Floats | float, where: str) -> None:
         worst = float(size[wrong][0])
         remedy = _LARGER if worst < LEAST else _SMALLER
         raise UnsupportedByFormatError(
-            f"{where} has the coefficient {worst!r}; readers drop or refuse what is outside [1e-9, 1e15): {remedy}"
+            f"{where} has the coefficient {worst!r}; "
+            f"readers drop or refuse what is outside [1e-9, 1e15): {remedy}"
         )
 
 
-_LARGER: Final = "make w, w_strokes or w_beta larger (0 leaves a term out), or the direction of a stroke that is nearly horizontal exactly 0"
+_LARGER: Final = (
+    "make w, w_strokes or w_beta larger (0 leaves a term out), "
+    "or the direction of a stroke that is nearly horizontal exactly 0"
+)
 _SMALLER: Final = "make w_strokes or w_beta smaller"

@@ -43,7 +43,7 @@ _TAIL: Final = b"\x03\0"
 
 
 def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
-    """Number of bytes and SHA-256 of the file now at `path`, compressed when it ends in .gz. Raises OutputError."""
+    """Size and SHA-256 of the file now at `path`, compressed when it ends in .gz. Raises OutputError."""
     digest, size = hashlib.sha256(), 0
 
     def hash_all(share: list[bytes]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,3 +27,15 @@ def terms(at: Iterable[Sequence[int]], value: Iterable[float], *, indices: int, 
     total = np.zeros(len(unique))
     np.add.at(total, inverse.ravel(), given)
     return Terms(unique[total != 0], total[total != 0])
+
+
+def listed(entries: Sequence[tuple[Any, ...]], *, indices: int, products: int = 0) -> Terms:
+    """The terms of entries (index, ..., coefficient)."""
+    at, value = [entry[:-1] for entry in entries], [entry[-1] for entry in entries]
+    return terms(at, value, indices=indices, products=products)
+
+
+def of_triangle(row: Ints, column: Ints, value: Floats) -> Terms:
+    """The terms of x'Qx/2, of which one triangle is given."""
+    halved = np.where(row == column, value / 2, value)
+    return terms(np.stack([row, column], axis=1), halved, indices=2, products=2)

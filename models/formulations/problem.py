@@ -57,7 +57,7 @@ class Term:
     and its coefficient (a number or one per element).
     """
 
-    family: Bound
+    family: PlacedFamily
     symbols: tuple[sp.Symbol, ...]
     coefficient: Coefficient
 
@@ -75,8 +75,8 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class Bound:
-    """A family bound to an instance: where its elements are and which columns its symbols mean.
+class PlacedFamily:
+    """A family placed on an instance: where its elements are and which columns its symbols mean.
 
     elements: indices into the family's index set, shape (count,). `terms` is None for what is no polynomial.
     """
@@ -321,18 +321,18 @@ class Problem:
         return np.concatenate([np.full(block.count, block.integer) for block in self.blocks.values()])
 
     @cached_property
-    def objective(self) -> tuple[Bound, ...]:
+    def objective(self) -> tuple[PlacedFamily, ...]:
         """Terms of the objective bound to the instance, empty ones left out."""
-        return self._bind(self.formulation.objective)
+        return self._placed(self.formulation.objective)
 
     @cached_property
-    def rows(self) -> tuple[Bound, ...]:
+    def rows(self) -> tuple[PlacedFamily, ...]:
         """Families of rows bound to the instance, in row order, empty ones left out."""
-        return self._bind(self.formulation.rows)
+        return self._placed(self.formulation.rows)
 
-    def _bind(self, families: tuple[Family, ...]) -> tuple[Bound, ...]:
-        bound = (Bound(family, self, self._elements(family)) for family in families)
-        return tuple(family for family in bound if family.count)
+    def _placed(self, families: tuple[Family, ...]) -> tuple[PlacedFamily, ...]:
+        placed = (PlacedFamily(family, self, self._elements(family)) for family in families)
+        return tuple(family for family in placed if family.count)
 
     def _elements(self, family: Family) -> Ints:
         if family.only is None:
@@ -562,7 +562,7 @@ def lifted(problem: Problem) -> Problem:
 __all__ = [
     "FORMULATIONS",
     "Block",
-    "Bound",
+    "PlacedFamily",
     "Problem",
     "Term",
     "Violation",

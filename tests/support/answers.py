@@ -1,4 +1,4 @@
-"""Solution files that real solvers wrote for two small instances: what each claims, and the problems they are of."""
+"""Solution files of real solvers for two small instances: what each claims, and their problems."""
 
 from functools import cache
 
@@ -137,6 +137,6 @@ def problem(name):
 
 
 def problem_of(path):
-    """The problem that a file is of; its name comes first after the solver's, and in GAMS after that of its solver."""
+    """The problem that a file is of, named after its solver, in GAMS after that of GAMS's solver."""
     words = path.stem.split("_")
     return next((word for word in words if word in OPTIMA), None)

@@ -13,9 +13,9 @@ import numpy as np
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.solving.nl_model import read_nl
 from crossfield.export.verify.comparison import of_problem
-from crossfield.export.verify.programs import asl as consumer_asl
-from crossfield.export.verify.programs import highs as consumer_highs
-from crossfield.export.verify.programs import scip as consumer_scip
+from crossfield.export.verify.programs import asl as asl_program
+from crossfield.export.verify.programs import highs as highs_program
+from crossfield.export.verify.programs import scip as scip_program
 from crossfield.export.verify.programs.reading import Meaning as Model
 from crossfield.models.instance.grid import Floats
 
@@ -32,17 +32,17 @@ __all__ = [
     "scip_columns",
 ]
 
-by_highs = consumer_highs.read
-by_scip = consumer_scip.read
+by_highs = highs_program.read
+by_scip = scip_program.read
 by_casadi = read_nl
-scip_columns = consumer_scip.columns
+scip_columns = scip_program.columns
 
 
 def by_gurobi(path: Path) -> Model:
     """The file as Gurobi reads it; needs gurobipy."""
-    from crossfield.export.verify.programs import gurobi as consumer_gurobi
+    from crossfield.export.verify.programs import gurobi as gurobi_program
 
-    return consumer_gurobi.read(path)
+    return gurobi_program.read(path)
 
 
 def browser() -> str | None:
@@ -59,13 +59,13 @@ OTHERS = {
         "apt install chromium chromium-driver",
     ),
 }
-"""Programs that are no consumers of `verify`: a sign that they are here, their names,
+"""Programs that `verify` does not know: a sign that they are here, their names,
 and what to do where they are not.
 """
 
 
 def absence(program: str) -> str:
-    """Why tests that need a consumer or another program cannot run, in a line; nothing where it is here."""
+    """Why tests that need one of these programs cannot run, in a line; nothing where it is here."""
     if program in OTHERS:
         present, title, remedy = OTHERS[program]
     else:
@@ -79,7 +79,7 @@ def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """
-    said = consumer_asl.at_start(path)
+    said = asl_program.at_start(path)
     statistics, values = said["problem statistics"], said["initial evaluations"]
     columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
     goal = values["objective function"]["0"]

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.formulations.problem import Bound, Problem
+from ....models.formulations.problem import PlacedFamily, Problem
 from ....models.instance.grid import Floats
 from ...writing.canonical import Canonical
 from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
@@ -60,7 +60,7 @@ def _kind(degree: int) -> int:
     return 0 if degree <= 1 else 1 if degree == 2 else 2 if degree < 99 else 3
 
 
-def _nonlinear_variables(family: Bound) -> int:
+def _nonlinear_variables(family: PlacedFamily) -> int:
     """Columns that stand in nonlinear terms of each row of a family."""
     if family.terms is None:
         return len(family.variables)

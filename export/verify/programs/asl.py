@@ -9,14 +9,13 @@ from __future__ import annotations
 import json
 import re
 import struct
-import subprocess
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from ....models.instance.grid import Floats
-from .protocol import Refused, executable, file_names
+from .protocol import Refused, file_names, started
 from .reading import Evaluation, Points
 
 _TOLD: Final = 1e-5
@@ -25,27 +24,17 @@ _TOLD: Final = 1e-5
 
 def version() -> str:
     """Its version, and that of the library."""
-    said = subprocess.run([executable("asl"), "-v"], check=False, capture_output=True, text=True)
+    said = started("asl", "-v")
     found = re.search(r"Version (\S+).*ASL\((\d+)\)", said.stdout + said.stderr)
     return f"{found[1]} (ASL {found[2]})" if found else "unknown"
 
 
 def at_start(path: Path) -> dict[str, Any]:
-    """What the library says of an .nl file: statistics, bounds, and values at its starting point.
-
-    Leaves a .json beside it.
-    """
-    done = subprocess.run(
-        [executable("asl"), str(path.with_suffix(""))],
-        check=False,
-        capture_output=True,
-        text=True,
-        cwd=path.parent,
-    )
+    """What the library says of an .nl file, with values at its start; leaves a .json beside it."""
+    done = started("asl", str(path.with_suffix("")), folder=path.parent)
     if done.returncode:
-        raise Refused(
-            f"gjh_asl_json ends with code {done.returncode}: {(done.stdout + done.stderr).strip()[-200:]}"
-        )
+        words = (done.stdout + done.stderr).strip()[-200:]
+        raise Refused(f"gjh_asl_json ends with code {done.returncode}: {words}")
     said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text())
     return said
 

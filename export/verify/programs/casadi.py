@@ -1,4 +1,4 @@
-"""CasADi's reader of .nl as a consumer, and the solvers that come with CasADi: Ipopt and Bonmin."""
+"""CasADi as a reader of .nl, and the solvers that come with CasADi: Ipopt and Bonmin."""
 
 from __future__ import annotations
 

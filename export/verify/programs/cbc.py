@@ -1,4 +1,4 @@
-"""CBC's executable as a consumer of LP and MPS. It knows nothing of products: hand it linear models only.
+"""CBC's executable as a reader of LP and MPS. It knows nothing of products: hand it linear models only.
 
 What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the
 names, in the same order, by its table of all rows and columns.
@@ -7,15 +7,14 @@ names, in the same order, by its table of all rows and columns.
 from __future__ import annotations
 
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
 from ...solutions.readers.text import RawSolution, Status
-from . import highs as consumer_highs
-from .protocol import NotTold, Refused, executable
+from . import highs as highs_program
+from .protocol import NotTold, Refused, started
 from .reading import Meaning, told
 
 
@@ -26,9 +25,7 @@ def version() -> str:
 
 
 def _run(*arguments: str) -> str:
-    done = subprocess.run(
-        [executable("cbc"), *arguments], check=False, capture_output=True, text=True, errors="replace"
-    )
+    done = started("cbc", *arguments)
     return done.stdout + done.stderr
 
 
@@ -44,7 +41,7 @@ def read(path: Path) -> Meaning:
     said = _run(str(path), "export", copy.name, "printi", "all", "solution", listed.name)
     if re.search(r"ERROR|too many errors|not valid", said) or not copy.exists():
         raise Refused(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', said)[:1])}")
-    model = consumer_highs.read(copy)
+    model = highs_program.read(copy)
     names = [line.removeprefix("**").split()[1] for line in listed.read_text().splitlines()[1:]]
     if len(names) != len(model.rows) + len(model.columns):
         raise NotTold("CBC leaves out of its export what its presolve removes, and its numbers have no names")

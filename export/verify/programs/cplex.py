@@ -1,4 +1,4 @@
-"""CPLEX as a consumer of LP and MPS, through its Python API.
+"""CPLEX as a reader of LP and MPS, through its Python API.
 
 The community edition solves up to 1000 columns and rows.
 """
@@ -13,12 +13,11 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, terms
+from ...writing.terms import Terms, listed
 from .protocol import Refused, TooLarge
-from .reading import Meaning, told
+from .reading import Meaning, infinite, told
 
 _SIZE_LIMIT = 1016
-_INFINITY = 1e20
 
 
 def version() -> str:
@@ -38,10 +37,7 @@ def _load(path: Path) -> Any:
 
 
 def read(path: Path) -> Meaning:
-    """The file as CPLEX reads it, whose parser of decimals is an ulp off at times.
-
-    Quadratic rows come after the others.
-    """
+    """The file as CPLEX reads it, quadratic rows last; its parser of decimals is an ulp off at times."""
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
@@ -54,8 +50,8 @@ def read(path: Path) -> Meaning:
     return Meaning.of(
         columns.get_names(),
         [*plain.get_names(), *products.get_names()],
-        lower=_infinite(columns.get_lower_bounds()),
-        upper=_infinite(columns.get_upper_bounds()),
+        lower=infinite(columns.get_lower_bounds()),
+        upper=infinite(columns.get_upper_bounds()),
         integer=[kind in "BI" for kind in (columns.get_types() if mixed else "C" * columns.get_num())],
         costs=goal.get_linear(),
         row_lower=np.where(senses == "L", -np.inf, limits),
@@ -66,16 +62,11 @@ def read(path: Path) -> Meaning:
     )
 
 
-def _infinite(values: list[float]) -> Any:
-    given = np.array(values)
-    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
-
-
 def _hessian(goal: Any) -> Terms:
     """The quadratic terms, from both triangles of x'Qx/2."""
     lines = goal.get_quadratic() if goal.get_num_quadratic_nonzeros() else []
-    entries = [(i, j, q) for i, line in enumerate(lines) for j, q in zip(*line.unpack(), strict=True)]
-    return terms([e[:2] for e in entries], [e[2] / 2 for e in entries], indices=2, products=2)
+    entries = [(i, j, q / 2) for i, line in enumerate(lines) for j, q in zip(*line.unpack(), strict=True)]
+    return listed(entries, indices=2, products=2)
 
 
 def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
@@ -87,10 +78,7 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
         for row, part in triples
         for i, j, a in zip(part.ind1, part.ind2, part.val, strict=True)
     ]
-    return (
-        terms([e[:2] for e in linear], [e[2] for e in linear], indices=2),
-        terms([e[:3] for e in cubes], [e[3] for e in cubes], indices=3, products=2),
-    )
+    return listed(linear, indices=2), listed(cubes, indices=3, products=2)
 
 
 def solve(path: Path, seconds: float, _solver: str) -> RawSolution:

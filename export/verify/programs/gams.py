@@ -18,7 +18,7 @@ from typing import Final
 from ....models.errors import SolutionError
 from ...solutions.readers.registry import read_raw
 from ...solutions.readers.text import RawSolution, Status
-from . import casadi as consumer_casadi
+from . import casadi as casadi_program
 from .protocol import Refused, TooLarge
 from .reading import Evaluation, Points, told
 
@@ -43,15 +43,11 @@ def version() -> str:
     """Its version, and that of CasADi, which evaluates what CONVERT writes."""
     from importlib.metadata import version as installed
 
-    return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {consumer_casadi.version()})"
+    return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {casadi_program.version()})"
 
 
 def _system(solver: str) -> Path:
-    """The folder of GAMS.
-
-    For BARON a copy of it, by links where that works, with BARON's files and its entry in the table of
-    solvers.
-    """
+    """The folder of GAMS; for BARON a copy, by links where that works, with BARON's files and its entry."""
     base, baron = _package("gamspy_base"), _package("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
@@ -112,15 +108,12 @@ def our_name(name: str) -> str:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The GAMS model as CONVERT translates it and CasADi reads it.
-
-    Columns that stand in no term are not in GAMS's model.
-    """
+    """The GAMS model as CONVERT translates it and CasADi reads it; columns in no term are not there."""
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():
         raise Refused("CONVERT wrote no .nl")
-    found = consumer_casadi.evaluate(Path("out.nl").resolve(), points, our_name)
+    found = casadi_program.evaluate(Path("out.nl").resolve(), points, our_name)
     return replace(found, may_lack=True, rounding=1e-14)
 
 

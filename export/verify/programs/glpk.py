@@ -1,4 +1,4 @@
-"""GLPK's executable as a consumer of LP, MPS and AMPL models with their data. It takes linear models only.
+"""GLPK's executable as a reader of LP, MPS and AMPL models with their data. It takes linear models only.
 
 What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
 is a row there as well, and columns are indexed: alpha[1,2].
@@ -7,7 +7,6 @@ is a row there as well, and columns are indexed: alpha[1,2].
 from __future__ import annotations
 
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,8 +15,8 @@ import numpy as np
 
 from ...solutions.readers.text import RawSolution, Status
 from ...solvers_table import PROGRAMS
-from ...writing.terms import terms
-from .protocol import Refused, executable
+from ...writing.terms import listed
+from .protocol import Refused, started
 from .reading import Evaluation, Meaning, Points, told
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
@@ -26,10 +25,7 @@ _OBJECTIVE: Final = "energy"
 
 def version() -> str:
     """Its version."""
-    said = subprocess.run(
-        [executable("glpk"), "--version"], check=False, capture_output=True, text=True
-    ).stdout
-    found = re.search(r"(\d+\.\d+)", said)
+    found = re.search(r"(\d+\.\d+)", started("glpk", "--version").stdout)
     return found[1] if found else "unknown"
 
 
@@ -38,13 +34,7 @@ def _run(path: Path, *arguments: str) -> str:
     given = [_KINDS[kind], str(path)]
     if kind == "mod":
         given += ["--data", str(path.with_suffix(".dat"))]
-    done = subprocess.run(
-        [executable("glpk"), *given, *arguments],
-        check=False,
-        capture_output=True,
-        text=True,
-        errors="replace",
-    )
+    done = started("glpk", *given, *arguments)
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if line.startswith(str(path))]
         raise Refused(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")
@@ -82,7 +72,7 @@ def read(path: Path) -> Meaning:
         costs=costs,
         row_lower=row_lower,
         row_upper=row_upper,
-        matrix=terms([e[:2] for e in rest], [e[2] for e in rest], indices=2),
+        matrix=listed(rest, indices=2),
     )
     return _without_objective(model, path) if path.suffix == ".mod" else model
 

@@ -1,4 +1,4 @@
-"""Gurobi as a consumer of LP and MPS, through gurobipy. Its free licence ends at 2000 columns and rows."""
+"""Gurobi as a reader of LP and MPS, through gurobipy. Its free licence ends at 2000 columns and rows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import gurobipy
 import numpy as np
 
 from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, terms
+from ...writing.terms import Terms, listed
 from .protocol import Refused, TooLarge
 from .reading import Meaning, told
 
@@ -52,9 +52,7 @@ def read(path: Path) -> Meaning:
             costs=model.getAttr("Obj", variables),
             row_lower=np.where(senses == "<", -np.inf, limits),
             row_upper=np.where(senses == ">", np.inf, limits),
-            quadratic=terms(
-                [entry[:2] for entry in square], [entry[2] for entry in square], indices=2, products=2
-            ),
+            quadratic=listed(square, indices=2, products=2),
             matrix=matrix,
             row_quadratic=cubes,
         )
@@ -62,19 +60,14 @@ def read(path: Path) -> Meaning:
 
 def _rows(model: Any, plain: list[Any], products: list[Any]) -> tuple[Terms, Terms]:
     sparse = model.getA().tocoo()
-    at, value = list(zip(sparse.row.tolist(), sparse.col.tolist(), strict=True)), sparse.data.tolist()
-    cubes: list[tuple[int, int, int]] = []
-    factors: list[float] = []
+    linear = list(zip(sparse.row.tolist(), sparse.col.tolist(), sparse.data.tolist(), strict=True))
+    cubes = []
     for place, row in enumerate(products, start=len(plain)):
         expression = model.getQCRow(row)
-        for first, second, coefficient in _products(expression):
-            cubes.append((place, first, second))
-            factors.append(coefficient)
+        cubes += [(place, *product) for product in _products(expression)]
         rest = expression.getLinExpr()
-        for term in range(rest.size()):
-            at.append((place, rest.getVar(term).index))
-            value.append(rest.getCoeff(term))
-    return terms(at, value, indices=2), terms(cubes, factors, indices=3, products=2)
+        linear += [(place, rest.getVar(term).index, rest.getCoeff(term)) for term in range(rest.size())]
+    return listed(linear, indices=2), listed(cubes, indices=3, products=2)
 
 
 def _products(expression: Any) -> list[tuple[int, int, float]]:

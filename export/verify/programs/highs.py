@@ -1,4 +1,4 @@
-"""HiGHS as a consumer of LP and MPS. It reads no quadratic rows, and solves no MIQP."""
+"""HiGHS as a reader of LP and MPS. It reads no quadratic rows, and solves no MIQP."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ....models.errors import SolverError
 from ...solutions.readers.text import RawSolution, Status
 from ...solving import highs as driver
-from ...writing.terms import terms
+from ...writing.terms import of_triangle, terms
 from .protocol import Refused
 from .reading import Meaning, told
 
@@ -42,8 +42,7 @@ def read(path: Path) -> Meaning:
     given["matrix"] = terms(np.stack([row, column], axis=1), value, indices=2)
     if hessian.dim_:
         column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
-        halved = np.where(row == column, value / 2, value)
-        given["quadratic"] = terms(np.stack([row, column], axis=1), halved, indices=2, products=2)
+        given["quadratic"] = of_triangle(row, column, value)
     return Meaning.of(list(lp.col_names_), list(lp.row_names_), **given)
 
 

@@ -14,6 +14,7 @@ and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 from ...solvers_table import PROGRAMS
@@ -31,15 +32,13 @@ class TooLarge(Exception):  # noqa: N818 - it is an answer
     """A file beyond the size of a program's free edition."""
 
 
-def executable(name: str) -> str:
-    """The path of a program's executable."""
-    return shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs
+def started(name: str, *arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """How a run of a program's executable ended, and what it said."""
+    command = [shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs, *arguments]
+    return subprocess.run(command, check=False, capture_output=True, text=True, errors="replace", cwd=folder)
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
-    """Names of columns and of rows of an .nl file, from the .col and .row beside it.
-
-    That of the objective is left out.
-    """
+    """Names of columns and rows of an .nl file, from the .col and .row beside it, the objective left out."""
     columns, rows = (path.with_suffix(suffix).read_text().split() for suffix in (".col", ".row"))
     return columns, [name for name in rows if name != "obj"]

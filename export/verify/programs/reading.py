@@ -44,10 +44,7 @@ class Meaning:
 
     @classmethod
     def of(cls, columns: list[str], rows: list[str], **given: Any) -> Self:
-        """The model of these columns and rows.
-
-        `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out.
-        """
+        """The model; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
         for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
             found = given.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
             given |= {f"{name}_at": found.at, name: found.value}
@@ -134,6 +131,12 @@ class Points:
         return self.values[:, places(self.names, columns)]
 
 
+def infinite(values: Sequence[float]) -> Floats:
+    """Bounds, infinite from 1e20 on, as CPLEX and Xpress have it."""
+    given = np.array(values, dtype=float)
+    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
+
+
 def told(
     status: Status,
     words: str,
@@ -148,6 +151,7 @@ def told(
     return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
 
 
+_INFINITY: Final = 1e20
 _TOLD: Final = "the program itself"
 T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
 

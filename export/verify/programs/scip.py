@@ -1,4 +1,4 @@
-"""SCIP as a consumer of LP, MPS, .nl and OSiL, through PySCIPOpt.
+"""SCIP as a reader of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
 A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
 variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is
@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, terms
+from ...writing.terms import Terms, listed
 from .protocol import Refused, file_names
 from .reading import Evaluation, Meaning, Points, told
 
@@ -93,10 +93,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
         square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
         linear += [(place, number[v.name], cost) for v, _, cost in squares]
         linear += [(place, number[v.name], value) for v, value in rest if v.name in number]
-    return (
-        terms([e[:2] for e in linear], [e[2] for e in linear], indices=2),
-        terms([e[:3] for e in square], [e[3] for e in square], indices=3, products=2),
-    )
+    return listed(linear, indices=2), listed(square, indices=3, products=2)
 
 
 def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
@@ -116,7 +113,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     columns, row_names = file_names(path) if path.suffix == ".nl" else (points.names, list(rows))
     ours = [v for name, v in variables.items() if name not in _OBJECTIVE_COLUMNS]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
-    row_lower, row_upper = _limits([_row_limits(scip, rows[name]) for name in row_names])
+    row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in map(rows.get, row_names)])
     given = points.of(columns)
     return Evaluation(
         [v.name for v in ours],
@@ -139,10 +136,6 @@ def _objective(scip: Any, variables: dict[str, Any], columns: list[str], points:
     for place in range(points.random, len(given)):
         values[place] = _agreed(scip, variables, columns, given[place], float(points.objective[place]))
     return values
-
-
-def _row_limits(scip: Any, row: Any) -> tuple[float, float]:
-    return scip.getLhs(row), scip.getRhs(row)
 
 
 def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Xpress as a consumer of LP and MPS, through its Python API. The community edition is limited in size."""
+"""Xpress as a reader of LP and MPS, through its Python API. The community edition is limited in size."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ with warnings.catch_warnings(action="ignore"):  # it tells which licence it uses
     import xpress
 
 from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import terms
+from ...writing.terms import Terms, listed, of_triangle, terms
 from .protocol import Refused, TooLarge
-from .reading import Meaning, told
+from .reading import Meaning, infinite, told
 
-_INFINITY = 1e20
 _ROWS, _COLUMNS = 1, 2
 
 
@@ -51,46 +50,36 @@ def read(path: Path) -> Meaning:
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
     row = np.repeat(np.arange(m), np.diff(start))
-    cubes, factors = _row_products(model)
-    hessian = _hessian(model, n)
     return Meaning.of(
         list(model.getNameList(_COLUMNS, 0, n - 1)),
         list(model.getNameList(_ROWS, 0, m - 1)),
-        lower=_infinite(model.getLB(0, n - 1)),
-        upper=_infinite(model.getUB(0, n - 1)),
+        lower=infinite(model.getLB(0, n - 1)),
+        upper=infinite(model.getUB(0, n - 1)),
         integer=[kind in "BI" for kind in model.getColType(0, n - 1)],
         costs=model.getObj(0, n - 1),
         row_lower=np.where(kinds == "L", -np.inf, limits),
         row_upper=np.where(kinds == "G", np.inf, limits),
-        quadratic=hessian,
+        quadratic=_hessian(model, n),
         matrix=terms(np.stack([row, column], axis=1), value, indices=2),
-        row_quadratic=terms(cubes, factors, indices=3, products=2),
+        row_quadratic=_row_products(model),
     )
 
 
-def _infinite(values: list[float]) -> Any:
-    given = np.array(values, dtype=float)
-    return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
-
-
-def _hessian(model: Any, n: int) -> Any:
+def _hessian(model: Any, n: int) -> Terms:
     """The quadratic terms, from the upper triangle of x'Qx/2."""
     start, column, value = (np.array(part) for part in model.getMQObj(0, n - 1))
-    row = np.repeat(np.arange(n), np.diff(start)) if len(value) else np.zeros(0, int)
-    halved = np.where(row == column, value / 2, value) if len(value) else np.zeros(0)
-    return terms(np.stack([row, column.astype(int)], axis=1), halved, indices=2, products=2)
+    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(start) if len(value) else 0)
+    return of_triangle(row, column.astype(np.int32), value.astype(float))
 
 
-def _row_products(model: Any) -> tuple[list[tuple[int, int, int]], list[float]]:
+def _row_products(model: Any) -> Terms:
     """The products of rows, from one triangle of x'Qx."""
-    cubes: list[tuple[int, int, int]] = []
-    factors: list[float] = []
-    for row in model.getQRows():
-        first, second, value = model.getQRowQMatrixTriplets(row)
-        for i, j, q in zip(first, second, value, strict=True):
-            cubes.append((int(row), int(i), int(j)))
-            factors.append(q if i == j else 2 * q)
-    return cubes, factors
+    entries = [
+        (int(row), int(i), int(j), q if i == j else 2 * q)
+        for row in model.getQRows()
+        for i, j, q in zip(*model.getQRowQMatrixTriplets(row), strict=True)
+    ]
+    return listed(entries, indices=3, products=2)
 
 
 _STATUS = {
@@ -109,7 +98,7 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
         model.setControl(option, value)
-    # Before the search: when it is cut short, the names are those of the presolved model, and the values of the whole one.
+    # Before the search: one that is cut short has the names of the presolved model, but values of the whole.
     names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
         _, found = model.optimize()

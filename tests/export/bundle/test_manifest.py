@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from cases import make_field, make_instance, make_problem
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
+from crossfield.export.bundle.starts import STARTS
 from crossfield.export.formats.registry import DEFAULTS, format_of, write
 from crossfield.models.errors import (
     FormulationError,
@@ -77,7 +78,8 @@ def test_contents(tmp_path):
     for entry in document["files"]:
         data = (tmp_path / entry["name"]).read_bytes()
         assert (entry["bytes"], entry["sha256"]) == (len(data), hashlib.sha256(data).hexdigest())
-    expected = {*names, "tiny.instance.json", "tiny.milp-mccormick.manifest.json"}
+    starts = {f"tiny.milp-mccormick.{solver}{entry.suffix}" for solver, entry in STARTS.items()}
+    expected = {*names, *starts, "tiny.instance.json", "tiny.milp-mccormick.manifest.json"}
     assert {path.name for path in tmp_path.iterdir()} == expected
 
 

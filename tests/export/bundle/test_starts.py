@@ -1,4 +1,4 @@
-"""Files of starting points: each solver takes ours as a feasible incumbent with the objective that we computed."""
+"""Files of starting points: each solver takes ours as a feasible incumbent with our objective."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every kind of bad input, through the command line: exit code 1, one line that says where and what, nothing left behind."""
+"""Bad input of every kind, on the command line: exit code 1, one line that says where and what, no files."""
 
 import json
 import re
@@ -55,7 +55,7 @@ def instance():
 
 @pytest.fixture
 def exported(tmp_path, instance):
-    """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest, and the instance elsewhere."""
+    """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest; the instance elsewhere."""
     cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", ["nl", "mps"])
     return tmp_path / "set"
 
@@ -98,10 +98,15 @@ def png_header(width, height):
 
 def entity_bomb():
     doubled = "".join(f'<!ENTITY e{k} "&e{k - 1};&e{k - 1};">' for k in range(1, 40))
-    return f'<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY e0 "ha">{doubled}]>{SVG.format("<text>&e39;</text>" + STROKES)}'
+    return with_entities(f'<!ENTITY e0 "ha">{doubled}', "e39")
 
 
-EXTERNAL = f'<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY e SYSTEM "file:///etc/hostname">]>{SVG.format("<text>&e;</text>" + STROKES)}'
+def with_entities(declared: str, used: str) -> str:
+    drawing = SVG.format(f"<text>&{used};</text>" + STROKES)
+    return f'<?xml version="1.0"?><!DOCTYPE svg [{declared}]>{drawing}'
+
+
+EXTERNAL = with_entities('<!ENTITY e SYSTEM "file:///etc/hostname">', "e")
 SKETCHES = {
     "empty.png": (b"", "empty"),
     "words.png": (b"these are words", "not a whole picture"),
@@ -257,12 +262,30 @@ def test_what_is_not_there_is_refused_with_a_hint(tmp_path, refused):
 
 
 NAMES = {
-    "formulation": (["export", "-f", "milp-mccormick", "-f", "milp"], "there is no formulation 'milp'; choose one of minlp-parity, "),
-    "format": (["export", "-F", "nl", "-F", "xyz"], "there is no format 'xyz'; choose one of nl, gms, lp, mps"),
+    "formulation": (
+        ["export", "-f", "milp-mccormick", "-f", "milp"],
+        "there is no formulation 'milp'; choose one of minlp-parity, ",
+    ),
+    "format": (
+        ["export", "-F", "nl", "-F", "xyz"],
+        "there is no format 'xyz'; choose one of nl, gms, lp, mps",
+    ),
     "formulation to solve": (["solve", "-f", "milp"], "there is no formulation 'milp'"),
-    "solver": (["solve", "-f", "milp-mccormick", "--solver", "gurobi"], "there is no solver 'gurobi'; choose one of highs, ipopt, bonmin"),
-    "class": (["solve", "-f", "minlp-cubic"], "minlp-cubic is a non-convex MINLP, which is not for highs (HiGHS reads an MIQP, but does not solve it)"),
-    "pair": (["solve", "-f", "milp-mccormick", "--solver", "ipopt"], "not for ipopt (Ipopt drops integrality; relax it, or fix the jumps)"),
+    "solver": (
+        ["solve", "-f", "milp-mccormick", "--solver", "gurobi"],
+        "there is no solver 'gurobi'; choose one of highs, ipopt, bonmin",
+    ),
+    "class": (
+        ["solve", "-f", "minlp-cubic"],
+        (
+            "minlp-cubic is a non-convex MINLP, which is not for highs "
+            "(HiGHS reads an MIQP, but does not solve it)"
+        ),
+    ),
+    "pair": (
+        ["solve", "-f", "milp-mccormick", "--solver", "ipopt"],
+        "not for ipopt (Ipopt drops integrality; relax it, or fix the jumps)",
+    ),
     "option": (["solve", "-f", "qp-fixed", "--relax"], "qp-fixed has no option relax"),
 }  # fmt: skip
 
@@ -473,7 +496,8 @@ def test_a_missing_solver_is_named(tmp_path, instance, package, formulation):
     done = in_child(*arguments, prelude=f"sys.modules[{package!r}] = None")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
-        f"crossfield: {solver} needs the Python package {package}, which is not installed; pip install {package}\n"
+        f"crossfield: {solver} needs the Python package {package}, which is not installed; "
+        f"pip install {package}\n"
     )
     assert listing(tmp_path) == before
 
@@ -533,7 +557,9 @@ def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, wh
         assert "choose another folder" in line
 
 
-FULL = "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\nresource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
+FULL = """import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"""
 DISK = {
     "instance": (["instance", "mouse"], "out.json", 1000),
     "export": (["export", "mouse", "--size", "10", "-f", "milp-mccormick"], "out", 30_000),

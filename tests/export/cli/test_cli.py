@@ -1,4 +1,4 @@
-"""The command line as a user finds it: verbs, exit codes, progress, tables, JSON, and the same bytes twice."""
+"""The command line as a user finds it: verbs, exit codes, progress, tables, JSON, the same bytes twice."""
 
 import json
 import os
@@ -272,7 +272,10 @@ def test_wrong_usage_leaves_with_2(arguments, tmp_path, monkeypatch, capsys):
 
 
 def test_help_loads_nothing_heavy():
-    code = "import sys; from crossfield.export.cli.app import invoke; invoke(['--help']); print(*sorted(sys.modules), file=sys.stderr)"
+    code = (
+        "import sys; from crossfield.export.cli.app import invoke; invoke(['--help']); "
+        "print(*sorted(sys.modules), file=sys.stderr)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stderr.split()}
     assert not loaded & {

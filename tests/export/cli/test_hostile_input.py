@@ -1,4 +1,4 @@
-"""Inputs made to cost time, memory or trust: each is read or refused with a CrossfieldError, and none costs more than its size asks for."""
+"""Inputs made to cost time, memory or trust: each is read or refused, at no more than its size asks for."""
 
 import io
 import json
@@ -37,7 +37,10 @@ def drawn(shape, count=1):
 
 ZIGZAG = "".join(f"L{k % 60} {k % 40}" for k in range(200))
 COSTLY_SVG = {
-    **{f"style of {text!r}": styled(text * 60_000) for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "\\", '"')},
+    **{
+        f"style of {text!r}": styled(text * 60_000)
+        for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "\\", '"')
+    },
     "a selector of many": styled(",".join(f".c{k}" for k in range(20_000)) + "{stroke:red}"),
     "uses of one path": drawn(f'<path id="p" stroke="black" d="M0 0{ZIGZAG}"/>' + '<use href="#p"/>' * 2000),
     "rules and paths": SVG.format(
@@ -51,9 +54,12 @@ COSTLY_SVG = {
     "closed subpaths": drawn('<path stroke="black" d="M5 5' + "L3 4z" * 20_000 + '"/>'),
     "a point list without blanks": drawn('<polyline stroke="black" points="' + "1" * 100_000 + '"/>'),
     "a colour of digits": drawn('<path stroke="rgb(' + "1" * 50_000 + '" d="M5 5L9 9"/>'),
-    "a transform that never closes": drawn('<path stroke="black" transform="' + "translate(" * 40_000 + '" d="M5 5L9 9"/>'),
+    "a transform that never closes": drawn(
+        '<path stroke="black" transform="' + "translate(" * 40_000 + '" d="M5 5L9 9"/>'
+    ),
     "uses of uses": SVG.format(
-        f'<g id="a0">{STROKES}</g>' + "".join(f'<g id="a{k + 1}"><use href="#a{k}"/></g>' for k in range(9000))
+        f'<g id="a0">{STROKES}</g>'
+        + "".join(f'<g id="a{k + 1}"><use href="#a{k}"/></g>' for k in range(9000))
     ).encode(),
 }  # fmt: skip
 
@@ -115,7 +121,8 @@ def peak():
     status = Path("/proc/self/status")
     if status.exists():
         return int(status.read_text().split("VmHWM:")[1].split()[0]) // 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (1 << 20 if sys.platform == "darwin" else 1 << 10)
+    unit = 1 << 20 if sys.platform == "darwin" else 1 << 10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // unit
 
 resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 for path in sys.argv[1:]:
@@ -129,7 +136,7 @@ for path in sys.argv[1:]:
 
 
 def read_by_child(*paths):
-    """What is said of each file by a process that reads them one after the other and has 60 s of processor time, and its memory in MB."""
+    """What a process says of each file that has 60 s of processor time for them all, and its memory in MB."""
     done = subprocess.run(
         [sys.executable, "-c", READER, *map(str, paths)], check=False, capture_output=True, text=True
     )
@@ -161,7 +168,7 @@ def test_drawings_that_ask_for_much_work_do_not_get_it(tmp_path):
 
 @pytest.mark.slow
 def test_small_files_do_not_take_much_memory(tmp_path):
-    """Before: 3046, 1559, 772 and 1094 MB. The picture comes last, because memory is counted from the start of the process."""
+    """Before: 3046, 1559, 772 and 1094 MB. The picture comes last: memory is that of the whole process."""
     files = {
         "extra.npz": archive_with("extra", (1 << 29,), "|u1", 1 << 29),
         "mask.npz": archive_with("mask", (20_000, 40_000), "|b1", 800 << 20),
@@ -216,7 +223,9 @@ STRANGE_SVG = {
     "data that ends in em": ('<path stroke="black" d="M1 1 L5em"/>', "its numbers cannot be read"),
     "a number and em": ('<path stroke="black" d="M1 1 L5 5em"/>', [1, 1, 5, 5]),
     "an unknown unit": ('<circle stroke="black" r="1vw"/>', "its length '1vw' cannot be read"),
-    "digits in a style": (f'<path style="stroke-width:{"1" * 5000}" stroke="black" d="M1 1 L5 5"/>', [1, 1, 5, 5]),
+    "digits in a style": (
+        f'<path style="stroke-width:{"1" * 5000}" stroke="black" d="M1 1 L5 5"/>', [1, 1, 5, 5]
+    ),
     "a smooth curve after another kind": (
         '<path stroke="black" d="M0 0Q2 2 4 0S6 3 9 0" />',
         [0, 0, 9, 0],
@@ -246,7 +255,10 @@ def test_pages_without_extent_are_refused(tmp_path):
 
 
 def test_numbers_of_thousands_of_digits_in_a_specification_are_refused(tmp_path):
-    head = 'format = "crossfield-library-spec"\nversion = 1\ntitle = "t"\n[[sketches]]\nname = "a"\nsample = "mouse"\n'
+    head = (
+        'format = "crossfield-library-spec"\nversion = 1\ntitle = "t"\n'
+        '[[sketches]]\nname = "a"\nsample = "mouse"\n'
+    )
     for number in ("9" * 5000, "9" * 4000, "0x" + "f" * 5000):
         (tmp_path / "spec.toml").write_text(f"{head}[rungs.tiny]\nsizes = [{number}]\n")
         with pytest.raises(InputError, match=r"spec\.toml: ") as caught:

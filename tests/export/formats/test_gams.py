@@ -1,4 +1,4 @@
-"""Both GAMS layouts, read back by GAMS itself: compiled, translated by CONVERT, evaluated by CasADi, solved."""
+"""Both GAMS layouts, read back by GAMS: compiled, translated by CONVERT, evaluated by CasADi, solved."""
 
 from __future__ import annotations
 
@@ -61,7 +61,8 @@ for path, points in json.load(sys.stdin):
     evaluate = casadi.Function("fg", [x], [read.f, casadi.vertcat(*read.g)])
     found = [evaluate(point) for point in points]
     row = lambda values: casadi.DM(values).full().ravel().tolist()
-    answers.append({"f": [float(f) for f, _ in found], "g": [row(g) for _, g in found], "x_lb": row(read.x_lb), "x_ub": row(read.x_ub), "g_lb": row(read.g_lb),
+    answers.append({"f": [float(f) for f, _ in found], "g": [row(g) for _, g in found],
+                    "x_lb": row(read.x_lb), "x_ub": row(read.x_ub), "g_lb": row(read.g_lb),
                     "g_ub": row(read.g_ub), "discrete": list(read.discrete)})
 json.dump(answers, open(sys.argv[1], "w"))
 """
@@ -291,7 +292,7 @@ def test_optimum_is_that_of_another_solver(
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_exact_convex_model_has_the_energy_of_its_field(gams_executable: str, tmp_path: Path, layout: str):
-    """The point of `miqp-exact`, solved by CPLEX, costs the same in (8), and no more than any field we try."""
+    """The point of `miqp-exact` by CPLEX costs the same in (8), and no more than any field we try."""
     problem = make_problem("miqp-exact", make_instance((2, 3)))
     value, point = solved(gams_executable, tmp_path, problem, layout, "miqcp=cplex")
     field = problem.field(point)
@@ -302,7 +303,7 @@ def test_exact_convex_model_has_the_energy_of_its_field(gams_executable: str, tm
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_one_pixel(gams_executable: str, tmp_path: Path, layout: str):
-    """Stroke at 120 degrees: gauge box forces beta = 30 degrees and alpha = 90; with gauge strokes nothing is forced."""
+    """Stroke at 120 degrees: gauge box forces beta = 30 degrees and alpha = 90; gauge strokes nothing."""
     for gauge, expected in (("box", (np.pi / 2, np.pi / 6)), ("strokes", (2 * np.pi / 3, 0.0))):
         instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge=gauge)
         _, point = solved(gams_executable, tmp_path, make_problem("minlp-quartic", instance), layout)
@@ -351,7 +352,8 @@ def test_jump_bounds_computed_by_gams_are_ours(gams_executable: str, tmp_path: P
     theta = rng.integers(0, 24, len(pixels)) * np.pi / 24
     instance = Instance("steps", mask, pixels, theta, np.ones(len(pixels)), gauge=gauge)
     model = text_of(make_problem("minlp-parity", instance), "indexed").partition(b"solve m")[0]
-    put = b"File out / bounds.txt /; put out; loop(E(r,c,side), put p.lo(r,c,side):0:0 ' ' p.up(r,c,side):0:0 /);\n"
+    values = b"p.lo(r,c,side):0:0 ' ' p.up(r,c,side):0:0"
+    put = b"File out / bounds.txt /; put out; loop(E(r,c,side), put %b /);\n" % values
     (tmp_path / "x.gms").write_bytes(model + put)
     subprocess.run([gams_executable, "x.gms", "lo=0"], cwd=tmp_path, check=True)
     bounds = np.loadtxt(tmp_path / "bounds.txt", dtype=int)
@@ -359,7 +361,7 @@ def test_jump_bounds_computed_by_gams_are_ours(gams_executable: str, tmp_path: P
 
 
 def test_no_lists_of_names_end_open(gams_executable: str, tmp_path: Path):
-    """Declarations that end on the last place of a line, before and after it (n pixels for n from 8 to 28)."""
+    """Declarations that end on the last place of a line, before and after it: of 8 to 28 pixels."""
     for count in range(8, 29, 5):
         problem = make_problem("miqp-mccormick", make_instance(mask=[[True] * count]), relax=True)
         _, point = solved(gams_executable, tmp_path, problem, "scalar")

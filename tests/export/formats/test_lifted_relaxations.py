@@ -1,4 +1,4 @@
-"""With integrality dropped, a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
+"""Without integrality a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ LIFTED = ("minlp-quartic", "minlp-cubic")
 
 @pytest.fixture(scope="module")
 def two():
-    """Two pixels whose strokes pull p1 between 0 and 1: there the hull of the product is larger than the product."""
+    """Two pixels whose strokes pull p1 between 0 and 1, where the hull of the product is larger than it."""
     mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
     return cf.Instance("two", mask, pixels, [0.5, 2.2], [1.0, 1.0], w_beta=1.0, gauge="box")
 
@@ -62,7 +62,7 @@ def test_no_other_relaxation_is_called_the_same_problem(written):
 
 
 def test_the_hull_is_larger(two):
-    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible there and lower than any point of the products."""
+    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible and lower than any of the products."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     lifted = cf.solve(problem, "highs")
     assert lifted.violation.worst < 1e-6
@@ -81,7 +81,7 @@ def starts(instance):
 
 
 def test_a_solver_is_chosen_that_reads_the_products(two):
-    """HiGHS would solve the weaker problem of the .mps; it does so when it is asked for, and the facts tell."""
+    """HiGHS would solve the weaker problem of the .mps; it does when it is asked for, and the facts tell."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
@@ -91,13 +91,13 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 @pytest.mark.slow
 @pytest.mark.oracles
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
-    """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, and a contradiction if both were called optima of one problem."""
+    """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
     if not PROGRAMS["scip"].present:
         pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
-    found = verify(tmp_path, seconds=4.0, consumers=["scip", "highs"])
+    found = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
     assert found.bad == []
-    solves = {f.file.rpartition(".")[2]: f for f in found.findings if f.step == "solve" and f.objective}
+    solves = {f.file.rpartition(".")[2]: f for f in found.checks if f.step == "solve" and f.objective}
     weak, whole = solves["mps"], solves["nl"]
     assert weak.relaxes == whole.group != weak.group
     assert weak.objective < whole.objective - 0.04
@@ -114,5 +114,5 @@ def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
     document = json.loads(manifest.path.read_text())
     document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
     manifest.path.write_text(json.dumps(document))
-    (bad,) = verify(tmp_path, consumers=["highs"]).bad
+    (bad,) = verify(tmp_path, programs=["highs"]).bad
     assert "the manifest says" in bad.reason

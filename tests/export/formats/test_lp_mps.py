@@ -341,8 +341,9 @@ def test_glpk_finds_the_same_optimum(suffix: str, small: tuple[Path, float]):
 def test_golden_files(file: str, pixels: int, tmp_path: Path):
     """Small models that people can read, one stroke at 2.5 radians of weight 0.5 on two or three pixels.
 
-    Each was compared with the formulas by hand: signs of (14)-(17) and (22)-(29), pi/2 and pi before p1 and p2, twice the
-    stroke's square in the brackets, jumps 0..3 towards the stroke and -1..1 away from it. HiGHS or SCIP read them as the problem.
+    Each was compared with the formulas by hand: signs of (14)-(17) and (22)-(29), pi/2 and pi before p1 and
+    p2, twice the stroke's square in the brackets, jumps 0..3 towards the stroke and -1..1 away from it. HiGHS
+    or SCIP read them as the problem.
     """
     mask = np.array([[True, True], [True, False]])[: pixels - 1]
     instance = Instance("golden", mask, np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))

@@ -1,8 +1,9 @@
-"""AMPL .mod and .dat, OSiL, QPLIB and BARON files, read by programs and readers that nobody here wrote, and evaluated as text.
+"""AMPL .mod and .dat, OSiL, QPLIB and BARON files, read by the programs of others and evaluated as text.
 
-.mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are parameters: its MathProg is
-a second implementation of the language, and AMPL itself cannot be had for free. .osil: SCIP, and the XML taken at its word. .qplib: pyqplib,
-where it is installed, and a reader after qplib.zib.de/doc.html. .bar: Pyomo's BARON writer, and BARON itself in its free size.
+.mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
+parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
+.osil: SCIP, and the XML taken at its word. .qplib: pyqplib, where it is installed, and a reader after
+qplib.zib.de/doc.html. .bar: Pyomo's BARON writer, and BARON itself in its free size.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
-from crossfield.export.verify.programs import glpk as consumer_glpk
-from crossfield.export.verify.programs import scip as consumer_scip
+from crossfield.export.verify.programs import glpk as glpk_program
+from crossfield.export.verify.programs import scip as scip_program
 from crossfield.export.verify.programs.reading import Meaning, Points
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
@@ -144,7 +145,8 @@ def test_no_record_is_lost_at_the_border_of_a_block(
 def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
     chosen = ["minlp-quartic", "miqcp-bilinear", "milp-mccormick"]
     code = (
-        "import sys; from crossfield.export.bundle.manifest import write_all; from crossfield.models.sketch.samples import sample\n"
+        "import sys; from crossfield.export.bundle.manifest import write_all\n"
+        "from crossfield.models.sketch.samples import sample\n"
         f"write_all(sample('skew', 6), sys.argv[1], {chosen!r}, {MORE!r})"
     )
     here = tmp_path / "here"
@@ -167,24 +169,22 @@ def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
 
 @pytest.mark.oracles
 def test_verify_hands_them_to_their_readers(tmp_path: Path):
-    """SCIP reads every .osil, GLPK the linear .mod; the others are refused as the table states. Nobody is handed .qplib or .bar."""
+    """SCIP reads every .osil, GLPK the linear .mod, as the table states; nobody is handed .qplib or .bar."""
     write_all(tiny(), tmp_path, formats=MORE)
-    found = verify(tmp_path, consumers=["scip", "glpk"], seconds=0.3)
+    found = verify(tmp_path, programs=["scip", "glpk"], seconds=0.3)
     assert found.bad == []
-    read = {(f.consumer, f.file.split(".", 1)[1]): f.verdict for f in found.findings if f.step == "read"}
+    read = {(f.program, f.file.split(".", 1)[1]): f.verdict for f in found.checks if f.step == "read"}
     if PROGRAMS["glpk"].present:
         agrees = {
-            name for (consumer, name), verdict in read.items() if (consumer, verdict) == ("glpk", "agrees")
+            name for (program, name), verdict in read.items() if (program, verdict) == ("glpk", "agrees")
         }
         assert agrees == {"milp-mccormick.mod"}
         assert read["glpk", "minlp-cubic.mod"] == Verdict.REFUSED
-        solved = [f for f in found.findings if (f.consumer, f.step) == ("glpk", "solve") and f.proven]
+        solved = [f for f in found.checks if (f.program, f.step) == ("glpk", "solve") and f.proven]
         assert [f.file for f in solved] == ["small.milp-mccormick.mod"]
-    assert {name for consumer, name in read if consumer == "scip"} == {
-        f"{name}.osil" for name in FORMULATIONS
-    }
-    assert {verdict for (consumer, _), verdict in read.items() if consumer == "scip"} == {Verdict.AGREES}
-    assert not any(f.file.endswith((".qplib", ".bar", ".dat")) for f in found.findings)
+    assert {name for program, name in read if program == "scip"} == {f"{name}.osil" for name in FORMULATIONS}
+    assert {verdict for (program, _), verdict in read.items() if program == "scip"} == {Verdict.AGREES}
+    assert not any(f.file.endswith((".qplib", ".bar", ".dat")) for f in found.checks)
 
 
 # AMPL
@@ -207,7 +207,7 @@ def indexed(problem: Problem) -> Iterator[tuple[str, str, Any]]:
 
 
 def as_parameters(text: str) -> tuple[str, list[str]]:
-    """The model with its variables as parameters, printing `number value` for objective, rows and bounds; and what each number means."""
+    """The model with variables as parameters, which prints `number value`, and what each number means."""
     meaning = ["objective"]
 
     def printed(what: str, domain: str, expression: str) -> str:
@@ -220,7 +220,8 @@ def as_parameters(text: str) -> tuple[str, list[str]]:
 
     def variable(found: re.Match[str]) -> str:
         name, domain, attributes = found.groups()
-        ends.extend((name, domain, end[:2], end[3:]) for end in re.split(r", (?=[<>]=)|(?<=integer), ", attributes.strip()) if end[:1] in set("<>"))  # fmt: skip
+        parts = re.split(r", (?=[<>]=)|(?<=integer), ", attributes.strip())
+        ends.extend((name, domain, end[:2], end[3:]) for end in parts if end[:1] in set("<>"))
         return f"param {name}{domain};"
 
     ends: list[tuple[str, str, str, str]] = []
@@ -236,11 +237,11 @@ def as_parameters(text: str) -> tuple[str, list[str]]:
 
 def as_data(problem: Problem, point: Any) -> str:
     """The values of all columns in the style of a .dat."""
-    blocks = (
-        f"param {name} :=\n" + "".join(f"{place} {point[at]:.17g}\n" for place, at in zip(places, columns, strict=True)) + ";\n"
-        for name, places, columns in indexed(problem)
-    )  # fmt: skip
-    return "".join(blocks) + "end;\n"
+    lines = []
+    for name, places, columns in indexed(problem):
+        values = (f"{place} {point[at]:.17g}" for place, at in zip(places, columns, strict=True))
+        lines += [f"param {name} :=", *values, ";"]
+    return "\n".join([*lines, "end;\n"])
 
 
 @pytest.mark.needs("glpk")
@@ -279,11 +280,11 @@ def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Pa
 def test_glpk_reads_the_linear_ampl_model_as_the_problem(
     label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.chdir(tmp_path)  # where the consumer puts its files
+    monkeypatch.chdir(tmp_path)  # where the program puts its files
     problem = problem_of(label)
     write(problem, tmp_path / "model.mod")
     points = feasible_points(problem)
-    found = consumer_glpk.evaluate(tmp_path / "model.mod", points)
+    found = glpk_program.evaluate(tmp_path / "model.mod", points)
     assert evaluation_difference(found, problem, points) == ""
     assert found.integer.sum() == problem.integer.sum()
 
@@ -309,7 +310,10 @@ def test_an_answer_of_the_ampl_model_is_read_back(tmp_path: Path):
 
 
 def test_the_ampl_model_grows_with_the_data_alone(tmp_path: Path):
-    small, large = (written(make_problem("miqp-exact", make_instance(shape)), tmp_path / f"{shape}.mod") for shape in ("column", "full"))  # fmt: skip
+    small, large = (
+        written(make_problem("miqp-exact", make_instance(shape)), tmp_path / f"{shape}.mod")
+        for shape in ("column", "full")
+    )
     assert re.sub(r"sha256 \w+", "", small) == re.sub(r"sha256 \w+", "", large)
     assert (tmp_path / "column.dat").stat().st_size < (tmp_path / "full.dat").stat().st_size
 
@@ -401,7 +405,7 @@ def osil_model(path: Path) -> tuple[Meaning, Any, float]:
 
 
 def assert_means(model: Meaning, problem: Problem) -> None:
-    """Names, bounds, types and rows are the problem's to the bit; ONE and its row, which LP and MPS have, are not there."""
+    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are not there."""
     expected = of_problem(problem)
     n, m = problem.columns, problem.row_count
     assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
@@ -431,12 +435,18 @@ def test_osil_says_what_the_problem_is(label: str, tmp_path: Path):
     assert_values(values, values_at(problem, points)[0])
 
 
-@for_each("label", [f"{name} gauge=strokes" for name in FORMULATIONS] + [f"{name} shape=pixel" for name in ("minlp-parity", "milp-mccormick")])  # fmt: skip
+@for_each(
+    "label",
+    [
+        *(f"{name} gauge=strokes" for name in FORMULATIONS),
+        *(f"{name} shape=pixel" for name in ("minlp-parity", "milp-mccormick")),
+    ],
+)
 def test_scip_reads_osil_as_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
     write(problem, tmp_path / "model.osil")
     points = feasible_points(problem)
-    found = consumer_scip.evaluate(tmp_path / "model.osil", points)
+    found = scip_program.evaluate(tmp_path / "model.osil", points)
     assert evaluation_difference(found, problem, points) == ""
     assert np.isfinite(found.objective[2:]).all()
 
@@ -447,7 +457,7 @@ def test_scip_notices_a_wrong_osil(tmp_path: Path):
     (tmp_path / "model.osil").write_text(text.replace('<number value="2"/>', '<number value="2.001"/>'))
     points = feasible_points(problem)
     assert "objective" in evaluation_difference(
-        consumer_scip.evaluate(tmp_path / "model.osil", points), problem, points
+        scip_program.evaluate(tmp_path / "model.osil", points), problem, points
     )
 
 
@@ -478,7 +488,7 @@ def test_scip_finds_the_same_optimum_from_osil_as_from_nl(formulation: str, tmp_
 
 
 def qplib_model(text: str) -> tuple[str, Meaning, float]:
-    """Type, coefficients and constant of a QPLIB file, read after qplib.zib.de/doc.html: x'Qx/2 with Q lower triangular."""
+    """Type, coefficients and constant of a QPLIB file, after qplib.zib.de/doc.html: Q below the diagonal."""
     lines = iter([line.split("#")[0].split() for line in text.splitlines()])
     first = lambda: next(lines)[0]  # noqa: E731
     listed = lambda: [next(lines) for _ in range(int(first()))]  # noqa: E731
@@ -507,7 +517,7 @@ def qplib_model(text: str) -> tuple[str, Meaning, float]:
         [[int(i) - 1, int(j) - 1] for i, j, _ in entries], [float(v) for *_, v in entries], indices=2
     )
     infinity = float(first())
-    finite = lambda values: np.where(np.abs(values) >= infinity, np.copysign(np.inf, values), values)  # noqa: E731
+    finite = lambda ends: np.where(np.abs(ends) >= infinity, np.copysign(np.inf, ends), ends)  # noqa: E731
     row_lower, row_upper = (finite(vector(m)), finite(vector(m))) if m else (np.zeros(0), np.zeros(0))
     lower, upper = finite(vector(n)), finite(vector(n))
     integer = vector(n) if letters[1] in "MG" else np.zeros(n)
@@ -601,7 +611,7 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
 
 
 def bar_model(text: str) -> dict[str, Any]:
-    """The sections of a .bar file: kinds of variables, bounds, rows and the objective as expressions in Python."""
+    """The sections of a .bar file: kinds of variables, bounds, rows and objective in Python."""
     text = re.sub(r"//.*", "", text)
     found: dict[str, Any] = {"kind": {}, "rows": {}, "lower": {}, "upper": {}}
     for keyword, listed in re.findall(r"^(\w*VARIABLES)\s([^;]*);", text, re.MULTILINE):
@@ -626,7 +636,7 @@ def python(expression: str) -> Any:
 
 
 def evaluated(model: dict[str, Any], names: list[str], point: Any) -> tuple[float, dict[str, float]]:
-    """Objective, and rows with their right side moved to the left, turned so that they are `>= 0` or `== 0`."""
+    """Objective, and rows with their right side moved to the left and turned to `>= 0` or `== 0`."""
     given = dict(zip(names, point.tolist(), strict=True))
     signs = {"<=": -1.0}
     rows = {
@@ -667,7 +677,7 @@ def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
 
 @for_each("formulation", [name for name in FORMULATIONS if name != "minlp-parity"])
 def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
-    """Kinds, bounds, and at random points objective and rows; Pyomo bounds binaries too, and adds a column ONE_VAR_CONST__."""
+    """Kinds, bounds, and values at random points; Pyomo bounds binaries too, and adds ONE_VAR_CONST__."""
     from crossfield.export.formats.pyomo_model import to_pyomo
 
     problem = make_problem(formulation, make_instance("row"))
@@ -675,14 +685,14 @@ def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
     model = to_pyomo(problem)
     _, key = model.write(str(tmp_path / "theirs.bar"), format="bar")
     symbols = model.solutions.symbol_map[key].bySymbol
-    label = lambda part: re.sub(r"\[(\d+),(\d+),?(\w?)\]", lambda m: "_".join(["", m[1].zfill(2), m[2].zfill(2), *m[3]]), part.name)  # noqa: E731  # fmt: skip
-    known = {symbol: label(part) for symbol, part in symbols.items()}
+    place = lambda m: "_".join(["", m[1].zfill(2), m[2].zfill(2), *m[3]])  # noqa: E731
+    known = {symbol: re.sub(r"\[(\d+),(\d+),?(\w?)\]", place, part.name) for symbol, part in symbols.items()}
     text = re.sub(r"\w+", lambda m: known.get(m[0], m[0]), (tmp_path / "theirs.bar").read_text())
     theirs = bar_model(re.sub(r"minimize\s+", "minimize ", text))
     columns, rows = names(problem)
     used = [name for name in columns if name in theirs["kind"]]
     assert len(used) >= len(columns) - 2
-    merged = lambda found: {name: "VARIABLES" if found["kind"][name] == "POSITIVE_VARIABLES" else found["kind"][name] for name in used}  # noqa: E731  # fmt: skip
+    merged = lambda found: [found["kind"][name].replace("POSITIVE_", "") for name in used]  # noqa: E731
     assert merged(theirs) == merged(ours)
     for point in points_of(problem, 3):
         mine, mine_rows = evaluated(ours, columns, point)

@@ -1,4 +1,4 @@
-"""AMPL .nl files, text and binary, read back by CasADi, the AMPL Solver Library and SCIP, and counted by Pyomo."""
+"""AMPL .nl files, text and binary, read back by CasADi, AMPL's library and SCIP, and counted by Pyomo."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def difference(problem: Problem, point: np.ndarray, column: int) -> tuple[float,
 @for_each("binary", [False, True])
 @for_each("label", CASES)
 def test_scip_sees_the_columns(label: str, binary: bool, tmp_path: Path):
-    """Names from .col, integrality and bounds; SCIP tightens bounds of integers to whole numbers, ours are whole."""
+    """Names from .col, integrality and bounds; SCIP makes bounds of integers whole, and ours are."""
     problem = problem_of(label)
     write(problem, tmp_path / "model.nl", dialect="binary" if binary else "text")
     found = scip_columns(tmp_path / "model.nl")
@@ -114,7 +114,7 @@ def pyomo_text(problem: Problem) -> list[str]:
 
 @for_each("label", CASES)
 def test_header_agrees_with_the_writer_of_pyomo(label: str):
-    """Pyomo counts on its own, from its own expressions; it leaves out alpha of a pixel without stroke and neighbour."""
+    """Pyomo counts on its own; it leaves out alpha of a pixel without stroke and neighbour."""
     problem = problem_of(label)
     grid = problem.instance.grid
     alone = grid.size - len(
@@ -136,10 +136,12 @@ def test_header_of_a_model_that_can_be_counted_by_hand():
     problem = make_problem("miqcp-bilinear", make_instance("row", "box"))
     strokes = len(problem.instance.theta)
     lines = b"".join(nl.generate(Canonical(problem))).decode().splitlines()
-    # 10 angles and 4 each of p1, p2, s, t; for each of the four pairs c14 .. c17 and jlo: p1 = 0 with p2 = -1 is no jump of the box.
+    # 10 angles and 4 each of p1, p2, s, t; for each of the four pairs c14 .. c17 and jlo, for p1 = 0 with
+    # p2 = -1 is no jump of the box.
     assert lines[1].split() == ["26", "20", "1", "0", "0"]
     assert lines[2].split() == ["8", "1"]
-    # In rows and the objective: the beta of four first pixels; in rows alone: p1 of four pairs; objective alone: one beta and the strokes' alpha.
+    # In rows and the objective: the beta of four first pixels; in rows alone: p1 of four pairs; in the
+    # objective alone: one beta and the strokes' alpha.
     assert lines[4].split() == ["8", str(8 + 1 + strokes), "4"]
     assert lines[6].split() == ["0", "4", "0", "4", "0"]
 
@@ -215,8 +217,9 @@ def test_a_weight_too_small_is_refused(tmp_path: Path):
 def test_golden_file():
     """A model of two pixels that people can read: (9) with a stroke at 2.5 radians of weight 0.5.
 
-    Compared with the formula term by term: v0, v1 are alpha, v2, v3 beta, v4 is p1 and v5 p2, for which the window of the stroke
-    leaves 0 and 1. All six are nonlinear in the objective alone, the last two whole. The real solver library reads it.
+    Compared with the formula term by term: v0, v1 are alpha, v2, v3 beta, v4 is p1 and v5 p2, for which the
+    window of the stroke leaves 0 and 1. All six are nonlinear in the objective alone, the last two whole. The
+    real solver library reads it.
     """
     instance = Instance("golden", np.ones((1, 2), bool), np.array([[0, 1]]), np.array([2.5]), np.array([0.5]))
     problem = make_problem("minlp-cubic", instance)

@@ -34,7 +34,7 @@ def refusals(instance, folder):
     ],
 )
 def test_the_advice_of_a_writer_helps(given, better, tmp_path):
-    """A stroke that is nearly horizontal has a tiny cost whatever the weights: its direction is what can be changed."""
+    """A stroke that is nearly horizontal has a tiny cost at all weights; its direction can be changed."""
     told = refusals(one_stroke(**given), tmp_path / "refused")
     assert told
     assert all(

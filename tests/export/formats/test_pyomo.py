@@ -169,7 +169,10 @@ def test_one_pixel_has_empty_components(name: str):
 
 def test_pyomo_is_imported_for_this_alone():
     """The rest of the package starts fast, and works where Pyomo is absent."""
-    wanted = "writing.names, formats.registry, formats.nl, formats.lp, formats.mps, formats.gams_scalar, bundle.manifest, solving.local"
-    imports = ", ".join(f"crossfield.export.{name}" for name in wanted.split(", "))
+    wanted = (
+        "writing.names formats.registry formats.nl formats.lp formats.mps formats.gams_scalar "
+        "bundle.manifest solving.local"
+    )
+    imports = ", ".join(f"crossfield.export.{name}" for name in wanted.split())
     script = f"import sys; sys.modules['pyomo'] = None; import {imports}"
     subprocess.run([sys.executable, "-c", script], check=True)

@@ -1,4 +1,4 @@
-"""A solver in a child process: who is interrupted, killed and let go on, and that none outlives the process that started it."""
+"""A solver in a child process: who is interrupted, killed, let go on, and that none outlives its parent."""
 
 import signal
 import subprocess

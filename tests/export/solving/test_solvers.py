@@ -59,7 +59,7 @@ def formulated(instance, name, *, relax=False):
 
 
 def residual_rows(instance, p):
-    """Matrix and right side of all residuals A, B, R, beta at fixed jumps, and the weight of each: written out by hand."""
+    """Matrix and right side of all residuals A, B, R, beta at fixed jumps, and their weights, by hand."""
     grid = instance.grid
     rows, sides, weights = [], [], []
     for i, j, jump in zip(grid.first, grid.second, p, strict=True):
@@ -117,7 +117,10 @@ def by_enumeration(instance, inner):
 @pytest.mark.parametrize("solver", ["highs", "ipopt", "bonmin"])
 @pytest.mark.parametrize("gauge", ["box", "strokes"])
 def test_one_pixel_has_the_optimum_of_the_hand_calculation(solver, gauge):
-    """A stroke at 120 degrees: in the box alpha = pi/2, and beta minimises (pi/2 + beta - theta)^2 + w_beta beta^2."""
+    """Stroke at 120 degrees in the box: alpha = pi/2.
+
+    There beta minimises (pi/2 + beta - theta)^2 + w_beta beta^2.
+    """
     w_beta = 1e-2
     problem = cf.formulate(one_pixel(gauge, w_beta), "qp-fixed", p=np.zeros(0, int))
     solution = cf.solve(problem, solver)
@@ -323,7 +326,7 @@ def hard():
     "name,solver", [("milp-mccormick", "highs"), ("miqp-exact", "bonmin"), ("milp-mccormick", "bonmin")]
 )
 def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
-    """No solver proves it in hours, and all take the start at once: three seconds or thirty make no difference."""
+    """No solver proves it in hours, and all take the start at once: three seconds are as good as thirty."""
     problem, start = cf.formulate(hard, name), cf.greedy(hard)
     solution = cf.solve(problem, solver, start=start, limits=cf.Limits(3))
     assert solution.status == Status.LIMIT_WITH_POINT
@@ -520,7 +523,7 @@ def test_files_where_the_user_happens_to_be_are_not_run(tmp_path, small, monkeyp
 
 
 def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
-    """Start a command line, wait until its log has the words, interrupt, and give exit code, output and complaints."""
+    """Exit code, output and complaints of a command line that is interrupted once its log has the words."""
     command = [sys.executable, "-m", "crossfield", *map(str, arguments), "-o", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while not any(re.search(words, path.read_text(), re.MULTILINE) for path in folder.rglob(log)):

@@ -1,4 +1,4 @@
-"""Every consumer that is here reads, evaluates and solves what we write; a wrong file, a crash and a hang are noticed."""
+"""Every program that is here reads and solves what we write; wrong files, crashes and hangs are noticed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.readers.text import RawSolution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.verify.programs import worker as consumer_worker
+from crossfield.export.verify.programs import worker as worker_module
 from crossfield.export.verify.programs.reading import load
 from crossfield.export.verify.programs.worker import Worker
 from crossfield.export.verify.verify import Verdict, Verification, same, verify
@@ -43,10 +43,8 @@ each_solver = pytest.mark.parametrize(
 )
 
 
-def each_of(consumers: Iterable[str]) -> pytest.MarkDecorator:
-    return pytest.mark.parametrize(
-        "consumer", [pytest.param(name, marks=needing(name)) for name in consumers]
-    )
+def each_of(programs: Iterable[str]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("program", [pytest.param(name, marks=needing(name)) for name in programs])
 
 
 def on_grid(height: int, width: int, name: str = "small", seed: int = 4) -> Instance:
@@ -86,13 +84,13 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Verifi
 
 @pytest.mark.parametrize("instance", LARGER)
 @each_of(PROGRAMS)
-def test_every_file_means_the_problem(verified: Callable[[str], Verification], consumer: str, instance: str):
-    """Each file of the consumer's formats is read and agrees, or is refused for a reason of the table."""
-    entry, verification = PROGRAMS[consumer], verified(instance)
-    read = {f.file: f.verdict for f in verification.findings if f.consumer == consumer and f.step == "read"}
+def test_every_file_means_the_problem(verified: Callable[[str], Verification], program: str, instance: str):
+    """Each file of the program's formats is read and agrees, or is refused for a reason of the table."""
+    entry, verification = PROGRAMS[program], verified(instance)
+    read = {f.file: f.verdict for f in verification.checks if f.program == program and f.step == "read"}
     files = [path.name for path in verification.folder.iterdir() if path.suffix[1:] in entry.formats]
     assert sorted(read) == sorted(files)
-    refused = {name for name in files if refuses(verification.folder / name, consumer)}
+    refused = {name for name in files if refuses(verification.folder / name, program)}
     assert {name for name, verdict in read.items() if verdict == Verdict.REFUSED} == refused
     assert {verdict for name, verdict in read.items() if name not in refused} == {Verdict.AGREES}
 
@@ -106,22 +104,22 @@ def refuses(path: Path, solver: str) -> bool:
 @pytest.mark.parametrize("instance", LARGER)
 @each_solver
 def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):
-    found = [f for f in verified(instance).findings if f.consumer == solver and f.step == "solve"]
+    found = [f for f in verified(instance).checks if f.program == solver and f.step == "solve"]
     assert found
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.LIMIT, Verdict.REFUSED, Verdict.NOT_TRIED}
     assert all(f.reason for f in found if f.verdict != Verdict.AGREES)
-    for finding in (f for f in found if f.verdict == Verdict.AGREES):
-        others = [f for f in verified(instance).findings if f.group == finding.group and f.proven]
-        assert all(same(finding.objective, other.objective) for other in others)
+    for check in (f for f in found if f.verdict == Verdict.AGREES):
+        others = [f for f in verified(instance).checks if f.group == check.group and f.proven]
+        assert all(same(check.objective, other.objective) for other in others)
 
 
 def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
     write_all(on_grid(1, 2), tmp_path, PROVEN, start=make_field(on_grid(1, 2)))
-    found = [f for f in verify(tmp_path, seconds=250).findings if f.step == "solve"]
+    found = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
     present = {name for name, solver in SOLVERS.items() if not solver.missing}
-    assert {f.consumer for f in found if f.verdict == Verdict.AGREES} == present
+    assert {f.program for f in found if f.verdict == Verdict.AGREES} == present
 
 
 def test_the_result_lies_in_the_folder(verified: Callable[[str], Verification]):
@@ -132,7 +130,7 @@ def test_the_result_lies_in_the_folder(verified: Callable[[str], Verification]):
     assert document["ok"] is True
     assert set(document["versions"]) | set(document["absent"]) == set(PROGRAMS)
     assert all(re.search(r"\d+\.\d+", words) for words in document["versions"].values())
-    assert len(document["findings"]) == len(found.findings)
+    assert len(document["checks"]) == len(found.checks)
 
 
 @pytest.mark.slow
@@ -145,7 +143,7 @@ def test_options_and_packed_files(tmp_path: Path):
     write_all(instance, tmp_path / "options", names, options=chosen, dialects=dialects, compress=True)
     found = verify(tmp_path / "options")
     assert found.bad == []
-    assert {f.consumer for f in found.findings if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
+    assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
 
 
 @pytest.mark.slow
@@ -167,14 +165,16 @@ WRONG = {
     "half": ("miqp-exact", "lp", r"4 d_00_00_r \^2", "2 d_00_00_r ^2"),
     "constant": ("miqp-exact", "lp", r"obj(\w*): \+ \S+ ONE", r"obj\1: + 1 ONE"),
     "double": ("miqp-exact", "mps", r" d_00_00_r d_00_00_r 4", " d_00_00_r d_00_00_r 8"),
-    "product": ("miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"),
+    "product": (
+        "miqcp-bilinear", "mps", r"(QCMATRIX c16_00_00_r\n \S+ \S+ )1\n( \S+ \S+ )1\n", r"\g<1>2\n\g<2>2\n"
+    ),
     "number": ("minlp-quartic", "nl", r"\nn1\.5707963267948966\n", "\nn1.571\n"),
     "limit": ("miqp-exact", "nl", r"\nr\n4 0\n", "\nr\n4 1\n"),
     "groups": ("milp-mccormick", "nl", r"^((?:.*\n){6}) (\d+) (\d+) 0 0 0\n", r"\1 0 0 0 0 0\n"),
     "square": ("minlp-cubic", "gms", r"\+ 2\*", "+ 2.001*"),
     "greater": ("miqp-exact", "gms", r"=l=", "=g="),
 }  # fmt: skip
-"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere where it is a name)."""
+"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere for a name)."""
 
 
 @pytest.fixture(scope="session")
@@ -204,25 +204,25 @@ def forge(manifest: Path, path: Path, data: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_file_is_noticed_by_every_consumer(spoiled: Verification, name: str):
+def test_a_wrong_file_is_noticed_by_every_program(spoiled: Verification, name: str):
     formulation, kind, *_ = WRONG[name]
-    found = {f.consumer: f for f in spoiled.findings if f.problem == f"{name} {formulation}"}
+    found = {f.program: f for f in spoiled.checks if f.problem == f"{name} {formulation}"}
     expected = {entry.name for entry in PROGRAMS.values() if kind in entry.formats and entry.present}
     assert set(found) == expected
     blind = blind_to(name)
-    for consumer, finding in found.items():
-        if finding.verdict == Verdict.REFUSED or consumer in blind:
+    for program, check in found.items():
+        if check.verdict == Verdict.REFUSED or program in blind:
             continue
-        bad = {Verdict.DIFFERS, Verdict.FAILED} | ({Verdict.NOT_TRIED} if consumer == "cbc" else set())
-        assert finding.verdict in bad, (
-            consumer,
-            finding,
+        bad = {Verdict.DIFFERS, Verdict.FAILED} | ({Verdict.NOT_TRIED} if program == "cbc" else set())
+        assert check.verdict in bad, (
+            program,
+            check,
         )  # CBC's export may leave out what its presolve removes
-        assert finding.reason
+        assert check.reason
 
 
 def blind_to(name: str) -> set[str]:
-    """Consumers that tell too few digits to notice: CBC exports some ten."""
+    """Programs that tell too few digits to notice: CBC exports some ten."""
     return {"cost": {"cbc"}}.get(name, set())
 
 
@@ -231,28 +231,28 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
     path = tmp_path / "small.qp-fixed.lp"
     path.write_bytes(path.read_bytes() + b"\n")
     (tmp_path / "small.qp-fixed.mps").unlink()
-    found = verify(tmp_path, consumers=["highs"])
+    found = verify(tmp_path, programs=["highs"])
     assert [f.file for f in found.bad] == ["small.qp-fixed.lp", "small.qp-fixed.mps"]
-    assert all("export again" in f.reason for f in found.findings)
+    assert all("export again" in f.reason for f in found.checks)
     assert not found.ok
 
 
 @needing("scip")
 def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
-    """An understated count of nonlinear variables in a header takes SCIP's process down; the next file is read all the same."""
+    """An understated count of nonlinear variables takes SCIP's process down; the next file is still read."""
     for name in ("crash", "well"):
         write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
     path = tmp_path / "crash.miqcp-bilinear.nl"
     lines = path.read_text().splitlines(keepends=True)
     lines[4] = " 0 0 0\n"
     forge(tmp_path / "crash.miqcp-bilinear.manifest.json", path, "".join(lines).encode())
-    found = {f.problem.split()[0]: f for f in verify(tmp_path, consumers=["scip"]).findings}
+    found = {f.problem.split()[0]: f for f in verify(tmp_path, programs=["scip"]).checks}
     assert found["crash"].verdict in {Verdict.FAILED, Verdict.DIFFERS}
     assert found["well"].verdict == Verdict.AGREES
 
 
 def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A consumer's process that is killed, and one that does not answer: both are answers, and the next task gets a new child."""
+    """A process that is killed, and one that does not answer: both are told, the next task has a new one."""
     with Worker("highs", tmp_path / "highs") as worker:
         assert re.match(r"\d+\.", worker.ask({"step": "version"}, 250)["words"])
         for dead_before_it_is_asked in (False, True):
@@ -263,7 +263,7 @@ def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
                 child.wait()
             assert "SIGKILL" in worker.ask({"step": "version"}, 250)["words"]
             assert worker.ask({"step": "version"}, 250)["kind"] == "done"
-        monkeypatch.setattr(consumer_worker, "GRACE", 0.0)
+        monkeypatch.setattr(worker_module, "GRACE", 0.0)
         late = worker.ask({"step": "version"}, 1e-6)
         assert late["kind"] == "failed"
         assert "took longer" in late["words"]
@@ -271,20 +271,20 @@ def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         assert worker.ask({"step": "version"}, 250)["kind"] == "done"
 
 
-def test_absent_consumers_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
     monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
-    found = verify(tmp_path, consumers=["highs", "xpress"])
+    found = verify(tmp_path, programs=["highs", "xpress"])
     assert found.absent == {"xpress": "pip install xpress"}
-    assert {f.consumer for f in found.findings} == {"highs"}
+    assert {f.program for f in found.checks} == {"highs"}
     assert found.ok
 
 
 def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
-    assert invoke(["verify", str(tmp_path), "--solve", "-c", "highs", "--json"]) == 0
+    assert invoke(["verify", str(tmp_path), "--solve", "-p", "highs", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ok"] is True
-    assert invoke(["verify", str(tmp_path), "-c", "highs"]) == 0
+    assert invoke(["verify", str(tmp_path), "-p", "highs"]) == 0
     assert "verify.json" in capsys.readouterr().out
     path = tmp_path / "small.qp-fixed.lp"
     forge(
@@ -292,9 +292,9 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
         path,
         path.read_bytes().replace(b"<= +1.5", b"<= 1.6").replace(b"<= 1.57", b"<= 1.58"),
     )
-    assert invoke(["verify", str(tmp_path), "-c", "highs", "-q"]) == 1
+    assert invoke(["verify", str(tmp_path), "-p", "highs", "-q"]) == 1
     assert "small.qp-fixed.lp: highs: differs: upper" in capsys.readouterr().err
-    assert invoke(["verify", str(tmp_path), "-c", "nobody"]) == 1
+    assert invoke(["verify", str(tmp_path), "-p", "nobody"]) == 1
     assert invoke(["verify", str(tmp_path / "absent")]) == 1
 
 
@@ -317,17 +317,17 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
 
 
 @each_of(["gurobi", "cplex", "xpress", "gams"])
-def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, consumer: str):
+def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, program: str):
     """A size that no free edition takes; whoever has a licence sees it solved, or the time limit."""
     MASKS.setdefault("wide", ["#" * 16] * 16)
     write_all(make_instance("wide"), tmp_path, ["miqp-mccormick"], ["lp", "gms"])
-    found = verify(tmp_path, seconds=0.1, consumers=[consumer])
+    found = verify(tmp_path, seconds=0.1, programs=[program])
     assert found.ok
-    sized = [f for f in found.findings if "the free edition takes" in f.reason]
+    sized = [f for f in found.checks if "the free edition takes" in f.reason]
     assert all(
         f.verdict == Verdict.NOT_TRIED and re.match(r"\d+ columns and \d+ rows", f.reason) for f in sized
     )
-    assert sized or any(f.step == "solve" for f in found.findings)
+    assert sized or any(f.step == "solve" for f in found.checks)
 
 
 @needing("xpress")
@@ -347,7 +347,7 @@ def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
 
 @pytest.fixture(scope="session")
 def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Worker]]:
-    """A child process of each consumer."""
+    """A child process of each program."""
     folder = tmp_path_factory.mktemp("workers")
     with ExitStack() as stack:
         yield {name: stack.enter_context(Worker(name, folder / name)) for name in PROGRAMS}
@@ -372,12 +372,12 @@ def test_claims_are_true(
     kind: str,
     name: str,
 ):
-    """Who takes a problem is not contradicted; who does not, refuses the file or gives no proven optimum of it."""
+    """Who takes a problem is not contradicted; who does not, refuses the file or proves no optimum."""
     verification = verified("1 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
     taking = takes(problem, solver)
-    found = [f for f in verification.findings if f.problem == f"small {name}" and f.step == "solve"]
-    mine = [f for f in found if f.consumer == solver]
+    found = [f for f in verification.checks if f.problem == f"small {name}" and f.step == "solve"]
+    mine = [f for f in found if f.program == solver]
     if taking.answer == "yes":
         assert {f.verdict for f in mine} & {Verdict.AGREES, Verdict.LIMIT, Verdict.NOT_TRIED}
     elif taking.answer == "no" and (path := verification.folder / f"small.{name}.{taking.format}").exists():

@@ -1,4 +1,4 @@
-"""The canonical form says what the files have: its columns, kinds, limits and orders are those that stand in them."""
+"""The canonical form says what the files have: its columns, kinds, limits and orders are theirs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
 
 
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
-    """All formats go by this rule, but .nl, whose header counts integers within [0, 1]: what is fixed at 0 or 1 too."""
+    """All formats go by this rule but .nl, whose header counts integers within [0, 1], fixed ones too."""
     problem = make_problem("milp-mccormick", make_instance())
     field, free = make_field(problem.instance), np.zeros(problem.instance.grid.size, bool)
     free[:2] = True
@@ -70,7 +70,7 @@ def test_no_rule_of_the_form_stands_anywhere_else():
 
 
 def test_a_writer_imports_nothing_of_another_but_its_language():
-    """gams_scalar is the language of scalar GAMS and BARON; everything else that writers share stands in export/writing."""
+    """gams_scalar is the language of scalar GAMS and BARON; what writers share else is in export/writing."""
     found = {
         (path.name, node.module)
         for path in (EXPORT / "formats").glob("*.py")

@@ -36,8 +36,9 @@ from hypothesis import strategies as st
 from loops import for_each
 
 NASTY = [
-    0.0, -0.0, 1.0, -1.0, 3.0, 0.1, 0.1 + 0.2, 1 / 3, -2 / 3, math.pi, math.pi / 2, 1e-6, 1e-9, -1e-9, 5e-324, 2.2250738585072014e-308,
-    1.7976931348623157e308, 1e15, 1e15 - 1, 999999999999999.9, 1e16, 1e22, 1e23, -1e22, 2.0**53, 123456789012345680.0, 0.30000000000000004, 1e-5, 0.0001,
+    0.0, -0.0, 1.0, -1.0, 3.0, 0.1, 0.1 + 0.2, 1 / 3, -2 / 3, math.pi, math.pi / 2, 1e-6, 1e-9, -1e-9, 5e-324,
+    2.2250738585072014e-308, 1.7976931348623157e308, 1e15, 1e15 - 1, 999999999999999.9, 1e16, 1e22, 1e23,
+    -1e22, 2.0**53, 123456789012345680.0, 0.30000000000000004, 1e-5, 0.0001,
 ]  # fmt: skip
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -178,7 +179,7 @@ def test_pieces_that_some_records_have(block, monkeypatch):
 
 @given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=40), st.booleans())
 def test_any_records_lack_any_pieces(present, whole):
-    """Neighbours, the first and the last piece, all of them; with words of several lengths between. whole: nothing is always there."""
+    """Neighbours, first and last piece, all of them, words of several lengths between; whole: no more."""
     count = len(present)
     key = Words(table([b"%d" % 7**at for at in range(count)]), None)
     first, second, third, last = np.array(present).T
@@ -239,7 +240,7 @@ WRITERS = {
 @for_each("writer", WRITERS)
 @for_each("name", ["miqcp-bilinear", "milp-mccormick", "qp-fixed"])
 def test_blocks_leave_no_seam_in_any_format(name, writer, monkeypatch):
-    """Lines of 3, 4, 5, 7, 8 and 9 pixels: families of k * 4 - 1, k * 4 and k * 4 + 1 records, and one pixel with no pairs."""
+    """Lines of 3, 4, 5, 7, 8 and 9 pixels: families of 4 k - 1, 4 k and 4 k + 1 records; and one pixel."""
     for count in (1, 3, 4, 5, 7, 8, 9):
         instance = Instance(
             "line", np.ones((1, count), bool), np.array([[0, 0]]), np.array([2.5]), np.array([0.5])

@@ -1,4 +1,4 @@
-"""Bytes on their way to a file: whole, hashed as written, compressed in pieces that any reader of gzip takes."""
+"""Bytes on their way to a file: whole, hashed as written, compressed in pieces that any gzip reader takes."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ except OutputError as error:
 
 @pytest.mark.parametrize("shares", [4, 100])
 def test_a_disk_that_takes_no_more_is_an_error_of_output_and_leaves_nothing(shares, tmp_path):
-    """The thread that writes fails, at the end or long before it: files of this process are limited to three shares."""
+    """The thread that writes fails, at the end or long before: files are limited to three shares."""
     command = [sys.executable, "-c", FULL, str(tmp_path / "a.lp"), str(shares)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "a.lp: cannot be written: file too large; free some space" in done.stdout
@@ -94,7 +94,7 @@ def test_pieces_hold_the_chunks(chunks, least):
 
 @pytest.mark.parametrize("piece", [1, 999, 1000, 1001, 10_000])
 def test_a_compressed_file_of_many_pieces_is_one_stream(piece, monkeypatch):
-    """Strict: one gzip member and nothing after it, which readers that know no more than zlib's inflate need."""
+    """Strict: one gzip member and nothing after it, which readers by zlib's inflate alone need."""
     monkeypatch.setattr(sink, "PIECE", piece)
     packed = b"".join(gzipped(cut(TEXT, 100)))
     reader = zlib.decompressobj(16 + zlib.MAX_WBITS)

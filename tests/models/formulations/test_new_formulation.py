@@ -59,9 +59,7 @@ def test_a_toy_formulation_is_one_function(toy, tmp_path):
     write_all(instance, tmp_path / "verified", ["toy"], ["nl", "mps"])
     checked = verify(tmp_path / "verified")
     assert checked.ok
-    assert (
-        sum(finding.verdict is Verdict.AGREES for finding in checked.findings) >= 2
-    )  # HiGHS and CasADi at least
+    assert sum(check.verdict is Verdict.AGREES for check in checked.checks) >= 2  # HiGHS and CasADi at least
 
 
 def test_the_table_is_as_before_when_it_is_gone():
