@@ -42,11 +42,10 @@ class ChildExit(NamedTuple):
 def solved_by(
     module: str, arguments: Iterable[str | float], job: Job, leave_start: Callable[[], object]
 ) -> ChildExit:
-    """How a module of this folder ended that was run as a program; then the solution file of the job is there.
+    """How a module of this folder ended that was run as a program; the job's solution file is there then.
 
     leave_start: makes the start the solution; it is called where the program was stopped before it had one,
-    if the start is feasible.
-    Raises SolverError with the program's last words.
+    if the start is feasible. Raises SolverError with the program's last words.
     """
     # -P: a folder `crossfield` or a file numpy.py where the user happens to be is not meant.
     program = [sys.executable, "-P", "-m", f"{__package__}.{module}", *map(str, arguments)]
