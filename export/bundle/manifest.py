@@ -28,6 +28,7 @@ from ...models.errors import (
 )
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.declaration import Options
 from ...models.formulations.problem import Problem, formulate, lifted
 from ...models.input_limits import MAX_BYTES
 from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
@@ -216,9 +217,8 @@ class _Sets:
     def problem(self, name: str) -> Problem:
         """A formulation of the instance, with those of the options that it has."""
         recipe = FORMULATIONS.get(name)
-        chosen = {
-            key: value for key, value in self.options.items() if recipe is None or key in recipe.settable
-        }
+        unfit = set() if recipe is None else {*Options.__dataclass_fields__} - recipe.settable
+        chosen = {key: value for key, value in self.options.items() if key not in unfit}
         return formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.start), **chosen)
 
     def begin(self, problem: Problem) -> Callable[[], Manifest]:

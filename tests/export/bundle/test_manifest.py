@@ -336,3 +336,14 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
     with pytest.raises(OutputError, match="cannot be made"):
         write_problem(problem, tmp_path / "file", ["lp"])
     assert format_of("a.b.mps.gz").name == "mps"
+
+
+def test_an_option_that_no_formulation_has_is_refused(tmp_path):
+    """One that only some have is used where it is."""
+    instance = make_instance()
+    with pytest.raises(FormulationError, match="there is no option 'nonsense'; the options are facet"):
+        write_all(instance, tmp_path, options={"nonsense": 1})
+    manifests = write_all(
+        instance, tmp_path, ["minlp-cubic", "miqp-exact"], ["nl"], options={"facet": "printed"}
+    )
+    assert [manifest.document["options"]["facet"] for manifest in manifests] == ["hull", "printed"]
