@@ -16,9 +16,7 @@ _HEAD: Final = (
 
 
 def printable(text: str) -> str:
-    """The text on one line, safe for a terminal: control,
-    bidirectional and other invisible characters as their escapes.
-    """
+    """The text on one line, safe for a terminal: invisible characters as their escapes."""
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(map(_visible, line))
 
@@ -30,9 +28,7 @@ def _visible(character: str) -> str:
 
 
 def shortened(text: object, most: int = QUOTED) -> str:
-    """A text from a file for a message: printable,
-    with its middle left out when it is longer than `most` characters.
-    """
+    """A text from a file for a message: printable, its middle left out beyond `most` characters."""
     try:
         whole = str(text)
     except ValueError:  # a whole number of more digits than Python writes

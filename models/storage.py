@@ -56,8 +56,7 @@ def neighbour(path: Path) -> Path:
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove the temporary files and folders that killed processes of this machine have left in a folder;
-    looked for once in a process.
+    """Remove temporary files that killed processes of this machine left in a folder, once a process.
 
     Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and
     of other machines.

@@ -18,8 +18,9 @@ _ITERATIONS: Final = 12  # of the inverse iteration that places the cuts
 
 
 def combed(field: CrossField) -> CrossField:
-    """The same crosses with labels that agree between neighbours: p is even but on cuts,
-    which a singularity or a hole forces.
+    """The same crosses with labels that agree between neighbours: p is even but on cuts.
+
+    Singularities and holes force cuts.
 
     Which labels are exchanged follows the signs of the lowest eigenvector of the signed Laplacian of the
     grid, with signs (-1)^p: its zero lines, the cuts, are short and smooth. In each 4-connected part the line
@@ -53,9 +54,7 @@ def _parts(field: CrossField) -> _Array:
 
 
 def _tree_steps(field: CrossField, part: _Array) -> _Array:
-    """Label steps that make every jump zero along a breadth-first tree from the
-    innermost pixel of each part.
-    """
+    """Label steps that make jumps zero along a breadth-first tree from each part's innermost pixel."""
     from scipy import ndimage
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order
@@ -80,9 +79,7 @@ def _tree_steps(field: CrossField, part: _Array) -> _Array:
 
 
 def _exchanges(field: CrossField, part: _Array) -> _Array:
-    """1 for each pixel whose labels u and v are better exchanged, else 0,
-    by inverse iteration in each part.
-    """
+    """1 for each pixel whose u and v are better exchanged, else 0, by inverse iteration."""
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu
 
@@ -116,7 +113,5 @@ def _votes(field: CrossField, part: _Array) -> _Array:
 
 
 def towards_u(field: CrossField) -> Floats:
-    """Vectors (n, 2) whose product with the double-angle vector of a line is positive
-    where it is nearer to u than to v.
-    """
+    """Vectors (n, 2) whose product with a line's double-angle vector is positive nearer to u than v."""
     return double_angle(field.alpha + field.beta) - double_angle(field.alpha + HALF - field.beta)

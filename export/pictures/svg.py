@@ -1,5 +1,4 @@
-"""Pictures of a site as SVG that follows the reader's light or dark mode: small, without text, same input,
-same bytes.
+"""Pictures of a site as SVG in the reader's light or dark mode; same input, same bytes.
 
 `draw` makes pictures with captions on white paper; a browser wants them bare, scalable and on its own
 background. Lines and colours are those of `panels`. The longer side of the mask is 320 units; pixel [row,
@@ -63,8 +62,9 @@ def thumbnail(instance: Instance) -> bytes:
 
 
 def field_picture(field: CrossField) -> bytes:
-    """Crosses of a small grid or streamlines of a larger one, over faint strokes;
-    singularities as red (+) and blue (-) dots.
+    """Crosses of a small grid or streamlines of a larger one, over faint strokes.
+
+    Singularities are red (+) and blue (-) dots.
     """
     sheet = _Sheet(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
@@ -156,9 +156,7 @@ class _Sheet:
         )
 
     def place(self, points: Floats) -> Floats:
-        """Points (x, y) of the field's own plane, y up and centres at whole numbers,
-        as pixels of the picture.
-        """
+        """Points (x, y) of the field's plane, y up and centres at whole numbers, as picture pixels."""
         placed: Floats = points * np.array([1.0, -1.0]) + 0.5
         return placed
 
@@ -209,9 +207,7 @@ def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
 
 
 def _sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2) in pixels: between two pixels of the padded mask,
-    or between one and the outside.
-    """
+    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border."""
     first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
     row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
     level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)

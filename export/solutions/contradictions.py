@@ -1,4 +1,4 @@
-"""What a point says against the claims of the file that holds it: rows, bounds, integrality, objective and dual bound, computed again."""
+"""What a point, computed again, says against the claims of the file that holds it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DIGITS: Final = 1e-13
 
 
 class Claims(NamedTuple):
-    """What a file claims of its point: status, objective and dual bound, None where it is silent; and how far its integers were rounded."""
+    """What a file claims of its point, None where it is silent; and how far integers were rounded."""
 
     status: Status
     objective: float | None
@@ -33,7 +33,7 @@ class Claims(NamedTuple):
 def contradictions(
     problem: Problem, claims: Claims, objective: float, violation: Violation, tolerance: float = TOLERANCE
 ) -> tuple[str, ...]:
-    """What is wrong with the claims about a point of that objective and violation, in words; empty when they agree.
+    """What is wrong with the claims about a point, in words; empty when they agree.
 
     A status that promises a feasible point is contradicted by a violation beyond the tolerance, `infeasible` by a point without one; an
     objective by another one, and a dual bound by an objective below it. tolerance: of rows it is multiplied by their largest coefficient, if

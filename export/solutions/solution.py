@@ -59,7 +59,7 @@ class Solution:
 
     @cached_property
     def contradictions(self) -> tuple[str, ...]:
-        """What the recomputed point says against the claims of the file; empty when they agree or there is no point."""
+        """What the recomputed point says against the file's claims; empty when they agree."""
         if self.objective is None or self.violation is None:
             return ()
         claims = Claims(self.claimed, self.reported, self.bound, self.rounded)

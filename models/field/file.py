@@ -1,5 +1,4 @@
-"""Field files: .npz and documented JSON, which hold field and instance,
-and .rawfield with a mesh for Directional.
+"""Field files: .npz and JSON, with field and instance, and .rawfield with a mesh for Directional.
 
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
             version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
@@ -223,9 +222,7 @@ def _rawfield(field: CrossField) -> bytes:
 
 
 def _obj(instance: Instance) -> bytes:
-    """The mesh: vertices and, 1-based, the triangles (top left, bottom left, bottom right),
-    (top left, bottom right, top right).
-    """
+    """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
     places, corners = _corners(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
@@ -238,9 +235,7 @@ def _obj(instance: Instance) -> bytes:
 
 
 def _corners(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2), and the vertex at top left, top right, bottom left,
-    bottom right of each pixel (n, 4).
-    """
+    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row."""
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)

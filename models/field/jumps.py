@@ -1,5 +1,4 @@
-"""The jumps between the crosses of neighbouring pixels: the sign they give beta, the best ones,
-and steps of the label.
+"""Jumps between crosses of neighbouring pixels: signs of beta, best jumps, steps of the label.
 
 The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
 cross.
@@ -47,8 +46,9 @@ def _best(
 
 
 def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
-    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels;
-    no residual changes but in sign.
+    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels.
+
+    No residual changes but in sign.
     """
     jumps = p - steps[grid.first] + steps[grid.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

@@ -16,9 +16,7 @@ Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
 """Symbols, each as often as its power says, and coefficient, free of these symbols."""
 
 _NOISE: Final = 1e-12
-"""Relative to its element's largest coefficient: what cancels up to rounding,
-or comes from an angle of 1e-16, is noise.
-"""
+"""Rounding noise, relative to an element's largest coefficient: cancelled terms, angles of 1e-16."""
 
 
 @cache

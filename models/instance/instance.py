@@ -30,9 +30,7 @@ MOST_WEIGHT: Final = 1e6
 """Greatest weight of a term of the energy."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-"""Instance names: lower case, digits and underscores, at most 32 characters,
-as instance libraries ask for.
-"""
+"""Instance names, as instance libraries ask for: at most 32 lower-case letters, digits and `_`."""
 
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 

@@ -1,5 +1,4 @@
-"""Random changes of several jumps at once, by which a search leaves a valley that changes of
-single jumps do not lead out of.
+"""Random changes of several jumps at once, out of a valley that single changes do not leave.
 
 - `shift`: along a path of 2 x 2 blocks, which moves the turn at its start to its end: a singularity moves,
   two opposite ones meet, or a pair of them is made;

@@ -54,8 +54,7 @@ _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found: the field, the whole rounds it took, (round, energy) of every improvement,
-    and how it ended.
+    """What a search found: field, whole rounds, (round, energy) of every improvement, its end.
 
     ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
     """
@@ -76,8 +75,9 @@ def search(
     start: CrossField | None = None,
     progress: RoundProgress = lambda *_: None,
 ) -> Search:
-    """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off,
-    the improved greedy field.
+    """The field of least 2-norm energy found, never above `start`.
+
+    Nor is it above the improved greedy field, unless time cuts that off.
 
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
@@ -142,9 +142,7 @@ class _Limits:
 def _from_coarse(
     instance: Instance, seed: int, limits: _Limits, explorers: Explorers
 ) -> Iterator[CrossField]:
-    """Fields that were found on the grid of half the resolution, brought to this one,
-    the best of there first.
-    """
+    """Fields found on the grid of half the resolution, brought to this one, the best there first."""
     coarse = halved(instance)
     if coarse is None:
         return
@@ -161,9 +159,7 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of the greedy field, of what the user gives, and, if there is time, of the power field,
-    all improved while there is.
-    """
+    """The best of greedy field, given field and, in time, power field, each improved in time."""
     fields = [first_field(instance, limits.over)]
     if given is not None:
         fields.append(improved(given, limits.over))

@@ -82,9 +82,7 @@ class Picture:
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
     def covers(self, frame: Frame) -> tuple[Cover, Cover]:
-        """The cover by curvature lines and by other strokes;
-        everything is a curvature line unless red and other both occur.
-        """
+        """The cover by curvature lines and by other strokes, told apart where red and others occur."""
         share = float((self.ink * self.red).sum() / self.ink.sum())
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
             return self._cover(self.ink, frame), _no_cover(frame)
@@ -106,9 +104,7 @@ def _no_cover(frame: Frame) -> Cover:
 
 
 def stroke_directions(ink: Ink, width: float) -> Ink:
-    """Double-angle vectors (y up) of the strokes, as long as the structure tensor is coherent (0..1);
-    shape [h, w, 2].
-    """
+    """Double-angle vectors [h, w, 2] (y up) of strokes, as long as the tensor is coherent (0..1)."""
     from scipy import ndimage
 
     # Derivatives of a Gaussian favour no direction, unlike differences of neighbours.
@@ -187,9 +183,7 @@ def _check_size(width: int, height: int) -> None:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself,
-    Pillow by its log.
-    """
+    """Nothing goes to standard error meanwhile, where libtiff and Pillow's log write complaints."""
     with _SILENCE:
         try:
             kept = os.dup(2)
@@ -239,9 +233,7 @@ def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
 
 
 def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
-    """The picture composited on white as uint8 [h, w, 1 or 3];
-    greys of which `white` is the lightest are scaled down.
-    """
+    """The picture on white as uint8 [h, w, 1 or 3]; greys up to `white` are scaled down."""
     from PIL import Image
 
     if white is not None:
@@ -291,9 +283,7 @@ def _specks(ink: Ink) -> Bools:
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
-    """1 where the ink around is red, else 0: colour is coarser than brightness in JPEG,
-    so it is looked at blurred.
-    """
+    """1 where the blurred ink is red, else 0: in JPEG colour is coarser than brightness."""
     from scipy import ndimage
 
     if rgb.shape[-1] == 1:

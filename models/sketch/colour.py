@@ -27,9 +27,7 @@ def ink_of(rgb: Floats) -> Floats:
 
 
 def redness(rgb: Floats) -> Floats:
-    """How much red ink a colour holds: red - max(green, blue), less what orange and purple differ;
-    shape (...,).
-    """
+    """How much red ink a colour holds, (...,): red - max(green, blue), less orange and purple."""
     red, green, blue = np.moveaxis(rgb, -1, 0)
     excess: Floats = np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0)
     return excess

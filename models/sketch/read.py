@@ -34,9 +34,7 @@ MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
 LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w carry no direction worth a constraint: a corner that is barely touched,
-a crossing.
-"""
+"""Stroke pixels with a smaller w carry no direction worth a constraint: grazed corners, crossings."""
 CUT: Final = 0.5 - 1e-9
 """Length in pixel sides from which another stroke (silhouette, crease) takes a pixel out of the mask.
 
@@ -128,17 +126,13 @@ def instance_of(
 
 
 def name_from(text: str) -> str:
-    """An instance name made from any text: lower case, runs of other characters as `_`, a letter first,
-    at most 32 long.
-    """
+    """An instance name made from any text, at most 32 long; runs of other characters become `_`."""
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
 
 
 def check_memory(pixels: int, available: int | None) -> None:
-    """Nothing, or InputError when a grid of so many pixels needs more bytes than
-    are available (None: not known).
-    """
+    """Nothing, or InputError when a grid needs more bytes than available (None: not known)."""
     needed = pixels * BYTES_PER_PIXEL
     if available is not None and needed > available:
         raise InputError(

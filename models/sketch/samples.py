@@ -16,9 +16,7 @@ Kind = Literal["sketch", "analytic"]
 
 @dataclass(frozen=True)
 class Sample:
-    """A built-in sample: its name, whether it is a drawing (`sketch`) or a computed surface (`analytic`),
-    one line about it.
-    """
+    """A built-in sample: name, whether a drawing (`sketch`) or a surface (`analytic`), one line."""
 
     name: str
     kind: Kind

@@ -1,5 +1,4 @@
-"""Instances with a known answer: curved surfaces under orthographic projection,
-and their exact curvature lines.
+"""Instances with a known answer: curved surfaces, projected, with their exact curvature lines.
 
 Each surface is parametrised by its lines of curvature: position(s, t), turned in space and looked at along
 -z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
@@ -71,9 +70,7 @@ class AnalyticInstance:
 
 
 def _turn(tilt: float, spin: float) -> Floats:
-    """The rotation that tips the top away from the viewer by `tilt` about x and then spins the
-    picture by `spin` about z (degrees).
-    """
+    """The rotation by `tilt` about x, the top away, then by `spin` about z (degrees)."""
     a, b = np.radians([-tilt, spin])
     about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
     about_z = np.array([[cosine(b), -sine(b), 0], [sine(b), cosine(b), 0], [0, 0, 1]])
@@ -190,9 +187,7 @@ def _within(value: Floats, ends: tuple[float, float]) -> Bools:
 
 
 def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
-    """Parameters whose projection is `wanted` (n, 2),
-    by Newton's method from the nearest point of a lattice.
-    """
+    """Parameters whose projection is `wanted` (n, 2), by Newton's method from a near lattice point."""
     from scipy.spatial import cKDTree
 
     lattice = np.meshgrid(np.linspace(*surface.s_range, _SEEDS), np.linspace(*surface.t_range, _SEEDS))
@@ -219,8 +214,7 @@ def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
 
 
 def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of the drawn lines, 0 outside the mask,
-    and which pixels (n,) carry a line of family u.
+    """Weight [height, width] of drawn lines; which pixels (n,) carry a line of family u.
 
     The spacing of the lines is bisected by ratio; the best share seen wins.
     """
@@ -238,9 +232,7 @@ def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools
 
 
 def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
-    """Weight and family, as in _strokes, of lines about `spacing` pixels apart,
-    at least one of each family.
-    """
+    """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one a family."""
     u_lines, v_lines = _lines(surface, frame, spacing)
     of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
     both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)

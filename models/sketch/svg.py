@@ -128,9 +128,7 @@ class _Walk:
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
-        """The style of every visible shape and its control points in the units of the root,
-        in drawing order.
-        """
+        """Style and control points, in the root's units, of every visible shape in drawing order."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -250,9 +248,7 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
 
 
 def _view(place: _Place, element: Element) -> Any:
-    """The transform inside an inner svg or a symbol: its viewBox fitted into its width and height,
-    centred.
-    """
+    """The transform inside an inner svg or symbol: its viewBox centred in its width and height."""
     from svgelements import Matrix
 
     if _tag(element) not in ("svg", "symbol"):
@@ -280,9 +276,7 @@ def _painted(style: Mapping[str, str]) -> bool:
 
 
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
-    """Red, green, blue in [0, 1] of the stroke, or of the fill when there is no stroke;
-    white when there is neither.
-    """
+    """Red, green, blue in [0, 1] of the stroke, else of the fill; white when there is neither."""
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour

@@ -47,8 +47,7 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe, what is known of its instance, that instance's files,
-    and what the ledger says.
+    """The task of an entry: its recipe, and what is known of its instance.
 
     records and submitted: what the ledger has of all entries of the instance, records and kept fields;
     relatives: names of the entries that may be related.
@@ -135,9 +134,7 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the files of the best point that are now in the folder: MIPLIB's kind,
-    and AMPL's where there is a .nl.
-    """
+    """Facts of the best point's files, now in the folder: MIPLIB's kind, and AMPL's beside a .nl."""
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -166,9 +163,7 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]:
-    """The best dual bound of each solver on this problem or one with the same optimum,
-    as the ledger has them; and what follows from the point.
-    """
+    """The best dual bound of each solver with a record of this optimum, and what the point implies."""
     chosen: dict[str, Record] = {}
     for record in sorted(_records(task, best, instance), key=lambda each: _preference(each, task.name)):
         chosen.setdefault(record.solver, record)

@@ -51,9 +51,7 @@ def ahead(jobs: int, scheduler: str | None) -> int:
 
 @contextmanager
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Where tasks run. Raises InputError when no scheduler answers or dask is missing;
-    BuildError when workers die.
-    """
+    """Where tasks run. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
         with _cluster(scheduler) if scheduler else _local(jobs) as chosen:
             yield chosen
@@ -129,9 +127,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 class Tasks:
-    """Tasks under way, at most so many at once: each is a function, its value,
-    and what is done here with its result.
-    """
+    """Tasks under way, a limited number at once: function, value, and what to do with the result."""
 
     def __init__(self, chosen: Executor, most: int) -> None:
         self._executor, self._most = chosen, most
@@ -139,7 +135,8 @@ class Tasks:
         self._running: dict[Future[Any], Callable[[Any], None]] = {}
 
     def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
-        """Have the function called with the value somewhere, and `finish` here with its result;
+        """Have the function called with the value somewhere, and `finish` here with its result.
+
         `finish` may add more, which goes first.
         """
         self._waiting.append((function, value, finish))

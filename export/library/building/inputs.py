@@ -1,6 +1,4 @@
-"""From what each file of a library is made: its tasks, put together from specification and ledger,
-for building and for verifying alike.
-"""
+"""What each file of a library is made from, for building and verifying alike."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Checking an entry of a library against its problem, formulated again from the instance: facts, model files,
-points, bounds.
+"""Checking an entry of a library against its problem, formulated again from the instance.
 
 The entry is made again from what it was made of, and compared with what is in the library, model files
 unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
@@ -81,9 +80,7 @@ def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Fin
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """The files of the best known point can be read and have the objective and the
-    violations that the sidecar tells.
-    """
+    """The files of the best known point can be read and have the objective that the sidecar tells."""
     best, listed = sidecar["best"], {file["name"] for file in sidecar["files"]}
     for key in ("point", "nl_point"):
         name = best[key]
@@ -124,9 +121,7 @@ def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
 
 
 def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
-    """The checker finds the same without rounding: against the .mps,
-    and where jumps are variables against the instance.
-    """
+    """The checker finds the same without rounding, from the .mps and, where it can, the instance."""
     best, point = sidecar["best"], folder / sidecar["best"]["point"]
     models = [(file["name"], best["objective"]) for file in sidecar["files"] if file["format"] == "mps"]
     if sidecar["jumps"] is None:

@@ -1,5 +1,4 @@
-"""Checking a library as a whole: every file whole and accounted for, every document to its schema,
-every entry as its sidecar says.
+"""Checking a library as a whole: files, checksums, schemas, and every entry by its sidecar.
 
 Nothing that a file says is believed: problems are formulated again from their instances (`verify_entry`).
 """
@@ -52,9 +51,7 @@ def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lamb
 
 
 class _Verification:
-    """A verification under way: which files are there, which are not as SHA256SUMS says,
-    and which belong to something.
-    """
+    """A verification under way: files that are there, that are damaged, and that belong."""
 
     def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
         self.folder, self.progress = folder, progress
@@ -121,9 +118,7 @@ class _Verification:
             yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
 
     def _index(self, library: Library) -> Iterator[Finding]:
-        """The index names its sidecars, and they are those of its specification;
-        texts and checker are there.
-        """
+        """The index names the sidecars of its specification; texts and checker are there."""
         document = library.document
         names = document["entries"]
         if sorted(document["sha256"]) != sorted(names):
@@ -180,9 +175,7 @@ class _Verification:
             yield from self._texts(library, sidecars)
 
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
-        """What the library was made of; nothing, when its specification is damaged,
-        which is told with the index.
-        """
+        """What the library was made of; None when its specification is damaged, told with the index."""
         try:
             return Inputs(ledger, plan(library.spec))
         except CrossfieldError:
@@ -251,9 +244,7 @@ class _Verification:
                     yield of_error(error, record.point)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
-        """Every instance with its fields is as its own document says,
-        and as the sidecars of its entries do.
-        """
+        """Every instance and its fields are as its own document and the sidecars of its entries say."""
         self.progress("instances")
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
         for file, instance in sorted(wanted.items()):
@@ -284,9 +275,7 @@ class _Verification:
             yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """Every field is on its instance and has the energies that are told of it;
-        the least ones are least.
-        """
+        """Every field is on its instance and has the energies told of it; the least ones are least."""
         fields = about["fields"]
         for role, facts in fields.items():
             try:

@@ -1,5 +1,4 @@
-"""What a library should say, made again from specification, instances, fields and ledger,
-and compared with what it says.
+"""What a library should say, made again from its sources and compared with what it says.
 
 Only what was searched for is taken from the library: the fields of each instance, and the records of the
 ledger. All else follows from these.
@@ -23,9 +22,7 @@ from ..ledger.points import Provenance, ours
 from .finding import BUILD, Finding, close
 
 _FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
-"""Keys of a sidecar that are compared elsewhere: with the points that were read, with each other,
-and file by file.
-"""
+"""Keys of a sidecar that are compared elsewhere: with points, with each other, file by file."""
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
@@ -103,9 +100,7 @@ def _known(task: Entry) -> set[Provenance]:
 
 
 def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
-    """In what is said of an instance differs from its recipe: everything but the fields,
-    and who found those.
-    """
+    """Where what is said of an instance differs from its recipe, its fields aside."""
     recipe = task.recipe
     instance = read_instance(folder / about["instance"]["file"])
     expected = {

@@ -1,5 +1,4 @@
-"""Taking a solver's solution into a library: checked, compared with the best known point,
-kept in the ledger when it is better.
+"""Taking a solver's solution into a library: checked, compared, and kept when it is better.
 
 The ledger comes first and the rest of the library follows from it by a rebuild, which SHA256SUMS ends. So a
 submission that was stopped can be told by the checksum of ledger.json, and the next submission or build
@@ -38,9 +37,7 @@ _TOLD: Final = 4  # names in a message
 
 @dataclass(frozen=True)
 class Submission:
-    """What happened to a point: entry, the objective it was compared with and its own,
-    and whether it was better and is now kept.
-    """
+    """What happened to a point: its entry, both objectives, whether it was better and is kept."""
 
     entry: str
     known: float
@@ -177,9 +174,7 @@ def _by_columns(file: Path, raw: RawSolution, library: Library) -> str:
 
 
 def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Library) -> bool:
-    """Whether a file may be of an entry: it has all its columns, as one of its model files has them,
-    and no other.
-    """
+    """Whether a file may be of an entry: it has exactly the columns of one of its model files."""
     if raw.names is None:
         return False
     counts, pairs = sidecar["counts"], sidecar["instance"]["pairs"]
@@ -215,9 +210,7 @@ def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution
 
 
 def _violation(problem: Problem, solution: Solution) -> Violation:
-    """The worst violations of angles and jumps as the file has them,
-    with every other column at the value that follows from them.
-    """
+    """The worst violations of the file's angles and jumps, all other columns derived from them."""
     assert solution.point is not None
     assert solution.violation is not None
     completed = problem.violation(complete_point(problem, solution.field))

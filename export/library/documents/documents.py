@@ -74,9 +74,7 @@ def read_library(folder: str | Path) -> Library:
 
 
 def read_sidecar(path: str | Path) -> dict[str, Any]:
-    """The sidecar in a file. Raises InputError when it cannot be read,
-    InstanceError with the place when it breaks its schema.
-    """
+    """The sidecar in a file. Raises InputError, or InstanceError where it breaks its schema."""
     return _read(Path(path), FORMAT, "library-entry")
 
 
@@ -123,8 +121,9 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def problem_from(
     instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
 ) -> Problem:
-    """The problem of a formulation with options, and with jumps where they are data: [pair,
-    jump] of those that are not zero.
+    """The problem of a formulation with options, and with jumps where they are data.
+
+    listed: [pair, jump] of those that are not zero.
     """
     jumps: Ints | None = None
     if FORMULATIONS[formulation].fixed:

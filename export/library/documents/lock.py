@@ -28,8 +28,9 @@ Progress = Callable[[str], None]
 
 @contextmanager
 def changing(folder: Path, action: str, progress: Progress = lambda _: None) -> Iterator[None]:
-    """Nothing; meanwhile no other process changes the library in a folder. action: what is done,
-    for others that wait.
+    """Nothing; meanwhile no other process changes the library in a folder.
+
+    action: what is done, for others that wait.
 
     Raises OutputError when another change does not end within PATIENCE seconds, or the folder cannot be
     written.

@@ -79,9 +79,7 @@ class Ledger:
         return self.elsewhere.get(str(record.point), self.folder / str(record.point))
 
     def field(self, record: Record) -> CrossField:
-        """The field of a record. Raises InputError, InstanceError when the file is missing,
-        damaged or another one.
-        """
+        """The field of a record. Raises InputError, InstanceError for a missing or another file."""
         path = self.path(record)
         if path.is_file() and sha256_of(path) != record.point_sha256:
             raise InstanceError(
@@ -123,8 +121,7 @@ def write_ledger(ledger: Ledger) -> Path:
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
-    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry,
-    that is from now on the kept one.
+    """The record, now in the ledger of a folder; a better field takes the place of the kept one.
 
     The caller holds the lock of the library. The field's file is written first, so that the ledger never
     names what is not there. Records of the same entry that named the file before lose their field, which is
@@ -142,9 +139,7 @@ def add_record(folder: str | Path, record: Record, field: CrossField | None = No
 
 
 def _is_better(record: Record, kept: Record | None) -> bool:
-    """Whether the field of a record is to be kept in place of another one,
-    which may have come while it was looked for.
-    """
+    """Whether a record's field is better than the kept one, which may have come meanwhile."""
     if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
         return True
     return record.primal is None or record.primal < kept.primal
@@ -155,8 +150,7 @@ def _without_point(record: Record) -> Record:
 
 
 def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
-    """The ledger of a folder with the records of another one about these entries and their fields;
-    nothing is written yet.
+    """The ledger of a folder with another's records and fields of these entries; nothing is written.
 
     A field that the folder has for an entry already stays.
     """

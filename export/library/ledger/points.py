@@ -25,9 +25,7 @@ _ROUNDS: Final = 8
 
 @dataclass(frozen=True)
 class Provenance:
-    """Who found a field: solver and version; seconds and the person where
-    somebody measured and submitted it.
-    """
+    """Who found a field: solver and version; seconds and person where somebody submitted it."""
 
     solver: str
     version: str
@@ -50,9 +48,7 @@ def ours(method: str) -> Provenance:
 
 
 def baseline_field(instance: Instance) -> Known:
-    """The greedy field, whose jumps are the data of `qp-fixed`: they are part of an instance,
-    so that no search may change them.
-    """
+    """The greedy field: its jumps are the data of `qp-fixed`, so that no search may change them."""
     return Known(greedy(instance), ours("greedy"))
 
 

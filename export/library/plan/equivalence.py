@@ -1,4 +1,4 @@
-"""What is equivalent to what, and what is not: docs/mathematics.md, 5 to 7, as sentences, and what files change."""
+"""What is equivalent to what, and what is not (docs/mathematics.md, 5 to 7); what files change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
 
 
 def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
-    """Formulations of the same instance that have the same optimum, and why. names: entries of the library."""
+    """Formulations of the instance with the same optimum, and why. names: entries of the library."""
     if recipe.facet == "printed":
         return []
     return [

@@ -76,8 +76,7 @@ class Rung:
 
 @dataclass(frozen=True)
 class Sketch:
-    """Where instances come from: a sample, a file (its bytes, with those of a mask),
-    or random strokes of some seeds.
+    """Where instances come from: a sample, a file with its mask, or random strokes of some seeds.
 
     name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
     file's own name, or the shape of a random mask.

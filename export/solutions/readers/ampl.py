@@ -107,7 +107,7 @@ def recognises_binary(head: bytes) -> bool:
 
 
 def parse_text(data: bytes) -> RawSolution:
-    """The content of a text file. Raises SolutionError for files that are cut off or whose numbers do not fit."""
+    """The content of a text file. Raises SolutionError where it is cut off or numbers do not fit."""
     data = with_unix_ends(data)
     found = _OPTIONS.search(data, 0, HEAD)
     if found is None:
@@ -231,7 +231,7 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
 
 
 def parse_binary(data: bytes) -> RawSolution:
-    """The content of a binary file. Raises SolutionError for files that are cut off or whose records do not fit."""
+    """The content of a binary file. Raises SolutionError where it is cut off or does not fit."""
     records = _Records(data, len(_MAGIC))
     message = b"\n".join(iter(records.take, b""))
     counts = records.take_counts()

@@ -101,7 +101,7 @@ def recognises_times(head: bytes) -> bool:
 
 
 def parse_results(data: bytes) -> RawSolution:
-    """The content of a res.lst. Raises SolutionError for a sum.lst, a file that is cut off and what is not a number."""
+    """The content of a res.lst. Raises SolutionError for a sum.lst and what is cut off or no number."""
     data = with_unix_ends(data)
     if _SUMMARY in data:
         raise SolutionError("this is the summary of BARON, which holds no values; give its results, res.lst")
@@ -155,7 +155,7 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
 
 
 def parse_times(data: bytes) -> RawSolution:
-    """The status in a tim.lst, without a point. Raises SolutionError for codes that are none and a line that is cut off."""
+    """The status in a tim.lst, without a point. Raises SolutionError for unknown codes or a cut."""
     if not data.endswith(b"\n"):
         raise SolutionError("line 1: the line is cut off; let BARON write the file again")
     words = data.split()

@@ -1,4 +1,4 @@
-"""Solution files of CPLEX, XML: one solution, or a pool of them, of which the first is taken: that is the incumbent.
+"""Solution files of CPLEX, XML: one solution, or a pool, of which the first is the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
      <header objectiveValue="-14.4" solutionStatusValue="101" solutionStatusString="integer optimal solution" writeLevel="1"/>
@@ -98,7 +98,7 @@ def _status(header: dict[str, str]) -> Status:
 
 
 class _FirstSolution:
-    """Takes elements as they are parsed and keeps what is needed of the first solution, so that no tree is built."""
+    """Takes elements as they are parsed and keeps the first solution, so that no tree is built."""
 
     def __init__(self) -> None:
         self.header: dict[str, str] | None = None

@@ -78,7 +78,7 @@ def recognises(head: bytes) -> bool:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for NA, UNDF, what is not a number and a file that is cut off."""
+    """The content of a file. Raises SolutionError for NA, UNDF, what is no number or is cut off."""
     data = with_unix_ends(data)
     cursor = Cursor(data)
     status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))

@@ -1,4 +1,4 @@
-"""Listings of GAMS (.lst), for the status alone: their values have four decimals, so that no point is read from them.
+"""Listings of GAMS (.lst), for the status alone: values have four decimals, too few for a point.
 
                    S O L V E      S U M M A R Y
     **** SOLVER STATUS     1 Normal Completion

@@ -77,7 +77,7 @@ def recognises(head: bytes) -> bool:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for counts that do not fit and for a file that is cut off."""
+    """The content of a file. Raises SolutionError for counts that do not fit and for a cut file."""
     data = with_unix_ends(data)
     cursor = Cursor(data)
     comments = _comments(cursor)

@@ -1,4 +1,4 @@
-"""Solution files of Gurobi: .sol and .json. The .sol layout is also that of COPT, and of any plain list of names and values.
+"""Solution files of Gurobi: .sol and .json. COPT's .sol and plain lists of values are alike.
 
     # Solution for model obj               comment lines; they vary from version to version, and the first may be missing
     # Objective value = -1.44e+01
@@ -91,7 +91,7 @@ def recognises_json(head: bytes) -> bool:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a .sol. Raises SolutionError for a MIP start, for no values at all and for what is not a number."""
+    """The content of a .sol. Raises SolutionError for a MIP start, no values, and no number."""
     data = with_unix_ends(data)
     cursor, objective = Cursor(data), None
     while data.startswith(b"#", cursor.position):
@@ -107,7 +107,7 @@ def parse(data: bytes) -> RawSolution:
 
 
 def parse_json(data: bytes) -> RawSolution:
-    """The content of a .json: the incumbent. Raises SolutionError for damaged JSON and for values that are none."""
+    """The incumbent in a .json. Raises SolutionError for damaged JSON and for values that are none."""
     content = _document(data)
     information, variables = content.get("SolutionInfo"), content.get("Vars")
     if not isinstance(information, dict) or not isinstance(information.get("Status"), int):

@@ -112,7 +112,7 @@ def parse_raw(data: bytes) -> RawSolution:
 
 
 def _without_mark(data: bytes) -> bytes:
-    """The text behind a byte order mark, in UTF-8: editors and shells of Windows put one before it, and some write UTF-16."""
+    """The text behind a byte order mark, in UTF-8: Windows writes marks, and UTF-16 at times."""
     if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.removeprefix(codecs.BOM_UTF8)
     try:
@@ -122,7 +122,7 @@ def _without_mark(data: bytes) -> bytes:
 
 
 def _stamp(head: bytes) -> str:
-    """The stamp of a problem (`Problem.stamp`) wherever a solver repeats it: in a name or a message; empty where none does."""
+    """The stamp (`Problem.stamp`) wherever a solver repeats it, in a name or message; else empty."""
     found = _STAMP.search(head)
     return found[0].decode() if found else ""
 

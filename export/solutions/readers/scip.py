@@ -56,7 +56,7 @@ def recognises(head: bytes) -> bool:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for `unknown` values, what is not a number and files that are cut off."""
+    """The content of a file. Raises SolutionError for `unknown` and what is no number or cut off."""
     data = with_unix_ends(data)
     cursor = Cursor(data)
     words, status = b"", Status.FEASIBLE

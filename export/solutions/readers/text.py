@@ -58,7 +58,7 @@ def added_columns() -> dict[str, str]:
 
 
 class Status(StrEnum):
-    """What a solver claims about its answer, never more than its file says; and what remains of the claim once the point is checked.
+    """What a solver claims of its answer, and what remains of the claim once the point is checked.
 
     no-point: there is none, and no word why. unknown: the point contradicts the claim.
     """
@@ -340,7 +340,7 @@ def labelled_numbers(
 
 
 def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
-    """The names and values of a parsed document as arrays. Raises SolutionError for a name that is too long, or NaN."""
+    """Names and values of a document as arrays. Raises SolutionError for a long name or NaN."""
     long = next((name for name in names if len(name) > TOKEN_LIMIT), None)
     if long is not None:
         raise SolutionError(

@@ -84,7 +84,7 @@ def _check_kinds(data: bytes, start: int, stop: int) -> None:
 
 
 def parse_asc(data: bytes) -> RawSolution:
-    """The content of an .asc. Raises SolutionError for what is not a number and for a file that is cut off."""
+    """The content of an .asc. Raises SolutionError for what is no number and for a cut file."""
     data = with_unix_ends(data)
     found = _FIRST_COLUMN.search(data)
     if found is None:

@@ -1,4 +1,4 @@
-"""From solution files to checked points: names, positions, lifted products, rounding, and recomputed claims."""
+"""From solution files to checked points: names, positions, products, rounding, true claims."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Solution files of every other solver than HiGHS and those of AMPL: each as the real solver wrote it for our own files."""
+"""Solution files of other solvers than HiGHS and AMPL's, as the real ones wrote them for our files."""
 
 import itertools
 import json
@@ -605,7 +605,7 @@ def test_damaged_files_are_refused_or_read(path, damages):
 )
 @for_each("head", HEADS)
 def test_long_repetitions_take_linear_time(head, part):
-    """Milliseconds; what looks at all that came before at every character would not end within the time of a test."""
+    """Milliseconds; looking back from every character would not end within the time of a test."""
     attempt(head + part * (LONG // len(part)))
 
 
@@ -654,7 +654,7 @@ def lines_of(form, count):
     ids=["gurobi", "scip"],
 )
 def test_lines_are_read_by_the_thousand_and_not_one_by_one(head, form):
-    """Some hundred calls, in Python and from it, for a hundred thousand lines; what looks at each line has more than one for each."""
+    """Some hundred calls for a hundred thousand lines; looking at each line takes more than one each."""
     data = head.encode() + lines_of(form, 100_000)
     calls = itertools.count()
     before = sys.getprofile()

@@ -1,4 +1,4 @@
-"""What is claimed of an answer is what its point bears out: relaxations, cut and damaged files, codes of failure, foreign values."""
+"""A claim is what its point bears out: relaxations, damaged files, codes of failure, foreign values."""
 
 import codecs
 import gzip
@@ -216,7 +216,7 @@ def test_jumps_do_not_wrap_around(milp):
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
-    """For each reader the content of an answer that a real solver wrote, and its problem; where zeros may be left out also without them."""
+    """For each reader an answer that a real solver wrote, and its problem; also without zeros."""
     found = {}
     for path in GOOD:
         reader, status = FILES[path.name]
@@ -248,7 +248,7 @@ def answers(tmp_path_factory):
 
 
 def bears_out(solution):
-    """Whether a status that promises a point is what the point shows, by numbers that are not the package's own judgement."""
+    """Whether a point shows its promised status, by numbers that are not the package's judgement."""
     if not solution.status.promises_point or solution.point is None:
         return True
     off = solution.violation
@@ -263,7 +263,7 @@ def bears_out(solution):
 
 
 def attempt(path, data, of):
-    """The solution in damaged content; None where it is refused. Any other error than the package's own is a failure."""
+    """The solution in damaged content; None where refused. Only the package's errors are refusals."""
     path.write_bytes(data)
     try:
         return read_solution(path, of)
@@ -304,7 +304,7 @@ def test_files_of_a_status_alone_are_told_to_be_cut():
 
 
 def damages(data):
-    """Ways in which a file comes to harm: lines twice, out of order or longer, values replaced, ends of lines, marks."""
+    """Ways in which a file comes to harm: lines repeated, moved or longer, values replaced, marks."""
     lines = data.splitlines(keepends=True)
     for at in range(0, len(lines), max(1, len(lines) // 5)):
         yield b"".join([*lines[: at + 1], *lines[at:]])
