@@ -34,11 +34,8 @@ _ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are average
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
-_NOISE, _FULL = (
-    0.15,
-    0.85,
-)  # of the strokes' ink: below it paper and compression noise, above it full darkness
-_BAND: Final = 1 << 22  # pixels of a picture that are looked at together
+_NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
+_BAND: Final = 1 << 20  # pixels of a picture that are looked at together
 _SILENCE: Final = threading.Lock()
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
@@ -131,7 +128,9 @@ def read_picture(data: bytes, size: int) -> Picture:
     image = _opened(data)
     width, height = image.size
     reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
-    rgb = _on_paper(image, reduced)
+    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
+    del image  # of all that is held at any time its pixels are the most
+    rgb = _on_paper(pixels)
     raw = ink_of(rgb)
     strongest = float(raw.max())
     if strongest < _FAINTEST:
@@ -259,17 +258,15 @@ def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     return np.asarray(small).reshape(small.height, small.width, channels)
 
 
-def _on_paper(image: Any, reduced: int) -> Floats:
-    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1], averaged down by a whole factor."""
-    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
-    channels = pixels.shape[-1]
-    colours = pixels.astype(np.float32)
+def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
+    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1]."""
     # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
-    paper = np.percentile(colours.reshape(-1, channels), 75, axis=0).astype(np.float32)
+    paper = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
     if paper.max() < _DARKEST_PAPER:
         raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
-    clipped: Floats = np.minimum(colours / np.maximum(paper, 1), 1)
-    return clipped
+    colours: Floats = pixels.astype(np.float32)
+    colours /= np.maximum(paper, 1)
+    return np.minimum(colours, 1, out=colours)
 
 
 def _specks(ink: Ink) -> Bools:
