@@ -75,21 +75,17 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """The field that a .npz or .json file holds, with its instance.
 
     on: the instance that it must be on, when one is given.
-    Raises InputError for another ending, an unreadable file or another instance, and InstanceError, with file and place, for
-    a damaged one.
+    Raises InputError for another suffix and an unreadable file, and InstanceError, with file and place, for a
+    damaged one and another instance.
     """
     path = Path(path)
     read = _of_suffix(_READERS, path, "read")
     try:
         field = read(read_bytes(path, MAX_ARCHIVE))
+        if on is not None:
+            field.check_instance(on)
     except InstanceError as error:
         raise InstanceError(str(error), file=path) from error
-    if on is not None and field.instance.sha256 != on.sha256:
-        raise InputError(
-            f"is a field on another instance ({field.instance.summary}), not on this one ({on.summary}); "
-            "give a field of the same sketch, size and gauge",
-            file=path,
-        )
     return field
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ..errors import FormulationError, InstanceError
+from ..errors import FormulationError
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
@@ -219,17 +219,10 @@ class Problem:
                 )
             object.__setattr__(self, "jumps", jumps)
         if self.pinned is not None:
-            self._check_instance_of(self.pinned)
+            self.pinned.check_instance(self.instance)
         if self.free is not None and self.free.shape != (self.instance.grid.size,):
             raise FormulationError(
                 f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
-            )
-
-    def _check_instance_of(self, field: CrossField) -> None:
-        if field.instance.sha256 != self.instance.sha256:
-            raise InstanceError(
-                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, "
-                "or under another gauge"
             )
 
     @property
@@ -413,7 +406,7 @@ class Problem:
 
         Raises InstanceError when the field is on another instance.
         """
-        self._check_instance_of(field)
+        field.check_instance(self.instance)
         given = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 

@@ -85,11 +85,13 @@ def search(
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
     jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy and
     power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so far. Raises
-    InputError for a limit that is not positive, and for too many jobs.
+    InputError for a limit that is not positive and too many jobs, InstanceError for a start on another one.
     """
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     checked(jobs)
+    if start is not None:
+        start.check_instance(instance)
     with interruptible() as interrupted:
         limits = _Limits(
             Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
