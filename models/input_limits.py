@@ -54,3 +54,7 @@ MAX_ARCHIVE: Final = 1 << 31
 """Bytes of an .npz, packed and unpacked: far more than a field that can be solved takes."""
 MAX_HEAD: Final = 1 << 20
 """Bytes of the text in an .npz."""
+
+# Solutions
+MAX_SOLUTION: Final = 1 << 31
+"""Bytes of a solution file, packed and unpacked: a line for each of 40 million columns."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -162,20 +161,12 @@ def check_size(size: int) -> None:
 
 def _bytes_of(path: Path) -> bytes:
     """The content of a regular file of bearable length, at least one byte."""
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot be read: {reason.lower()}; check the path", file=path) from error
-    if not stat.S_ISREG(status.st_mode):
+    if path.exists() and not path.is_file():
         raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
-    if status.st_size == 0:
+    data = read_bytes(path, MAX_BYTES, "simplify the sketch")
+    if not data:
         raise InputError("is empty; save the sketch again", file=path)
-    if status.st_size > MAX_BYTES:
-        raise InputError(
-            f"has {status.st_size} bytes; at most {MAX_BYTES} are read, simplify the sketch", file=path
-        )
-    return read_bytes(path)
+    return data
 
 
 def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:

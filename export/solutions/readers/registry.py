@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from ....models.errors import SolutionError
+from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
 from . import ampl as ampl_sol
 from . import baron as baron_sol
@@ -29,14 +30,14 @@ from .text import HEAD, RawSolution
 
 _STAMP = re.compile(rb"sha256_[0-9a-f]{12}(?![0-9a-f])")
 _GZIP: Final = b"\x1f\x8b"
-_LARGEST: Final = 1 << 31  # bytes that a packed file may unpack to
+_SMALLER: Final = "let the solver write it without columns at 0"
 
 
 @dataclass(frozen=True)
 class Reader:
     """A reader of one kind of file.
 
-    recognises: whether a file with these first bytes is of this kind. parse: the content of a whole file; raises
+    recognises: whether a file with these first bytes is of this kind. parse: the content of a whole file, or
     SolutionError.
     """
 
@@ -89,9 +90,10 @@ READERS: Final = (
 def read_raw(path: str | Path) -> RawSolution:
     """What a solution file says; its kind is told by its content, and gzip is unpacked.
 
-    Raises InputError when the file cannot be opened, SolutionError when it is empty, of no known kind or malformed.
+    Raises InputError when the file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when
+    it is empty, malformed or of no known kind.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     try:
         return parse_raw(_unpacked(data))
     except SolutionError as error:
@@ -131,9 +133,9 @@ def _unpacked(data: bytes) -> bytes:
     if not data.startswith(_GZIP):
         return data
     try:
-        content = gzip.GzipFile(fileobj=io.BytesIO(data)).read(_LARGEST + 1)
+        content = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_SOLUTION + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise SolutionError("the packed file is damaged or cut off; pack it again") from error
-    if len(content) > _LARGEST:
-        raise SolutionError("the packed file is larger than 2 GiB; unpack it first")
+    if len(content) > MAX_SOLUTION:
+        raise SolutionError(f"unpacks to more than {MAX_SOLUTION} bytes; {_SMALLER}")
     return content
