@@ -6,13 +6,14 @@ Nothing that a file says is believed: problems are formulated again from their i
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field
+from ....models.processes.progress import Progress, silent
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
 from ..building.entry_task import Entry
@@ -23,6 +24,7 @@ from ..documents import check_point
 from ..documents.archive import opened
 from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
+from ..documents.lock import unchanged
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import plan
@@ -39,21 +41,23 @@ _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 _FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
 
 
-def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
+def verify_library(folder: str | Path, *, progress: Progress = silent) -> list[Finding]:
     """What is wrong with a library in a folder or an archive; nothing when all is as it should be.
 
-    progress: called with a line for each step. Raises InputError when there is no library.
+    progress: called with a line for each step. Nobody changes the folder meanwhile. Raises InputError when
+    there is no library, OutputError when another process works on it for too long.
     """
     with opened(folder) as place:
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
             raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
-        return list(_Verification(place, progress).findings())
+        with unchanged(place, "a verification of the library", progress):
+            return list(_Verification(place, progress).findings())
 
 
 class _Verification:
     """A verification under way: files that are there, that are damaged, and that belong."""
 
-    def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
+    def __init__(self, folder: Path, progress: Progress) -> None:
         self.folder, self.progress = folder, progress
         self.present: set[str] = set()
         self.damaged: set[str] = set()

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError, SolutionError
 from ....models.formulations.problem import Problem, Violation
+from ....models.processes.progress import Progress, silent
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, generator
 from ...solutions.readers.registry import read_raw
@@ -24,7 +25,7 @@ from ..building.build import rebuilt
 from ..building.index import SUMS
 from ..checking.finding import FEASIBLE, SAME
 from ..documents.documents import Library, problem_of, read_library
-from ..documents.lock import Progress, changing
+from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, add_record
@@ -63,7 +64,7 @@ def submit_point(
     version: str | None = None,
     seconds: float | None = None,
     by: str | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> Submission:
     """What happened to the point in a solution file of any kind that is read.
 
@@ -79,7 +80,7 @@ def submit_point(
         if not text.isprintable() or len(text) > _LONGEST:
             raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
     library = _library(folder)
-    with changing(library.folder, f"a submission of {file.name}", progress):
+    with locked(library.folder, f"a submission of {file.name}", progress):
         library = _settled(library, progress)
         progress("checking the point")
         return _submitted(file, library, entry=entry, texts=texts, seconds=seconds, by=by, progress=progress)

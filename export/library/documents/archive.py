@@ -122,7 +122,7 @@ def _check(members: Iterable[tuple[str, bool, int]], limit: int) -> None:
 
 @contextmanager
 def _tar(path: Path, limit: int) -> Iterator[tarfile.TarFile]:
-    """A .tar as a stream, unpacked by what it begins with; it gives no more than `most` bytes."""
+    """A .tar as a stream, unpacked by what it begins with; it gives its members and their headers alone."""
     head = _head(path)
     unpack = next((function for magic, function in _PACKED.items() if head.startswith(magic)), None)
     with (

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -25,6 +25,7 @@ from ....models.errors import InputError, InstanceError, OutputError
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
+from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
@@ -34,8 +35,6 @@ from ..building.instance_task import about_file
 from ..documents.documents import Library, read_about, read_library
 from ..documents.mathematics import model
 from ..plan.spec import RUNGS
-
-Progress = Callable[[str], None]
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")
 """Files of the templates that go into a site as they are."""
@@ -91,7 +90,7 @@ class Shown:
         return next(each for each in self.pictures if role in each.roles)
 
 
-def write_site(folder: str | Path, output: str | Path, progress: Progress = lambda _: None) -> list[Path]:
+def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:
     """The pages of the site about the library in `folder`; an earlier site in `output` is replaced.
 
     Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
