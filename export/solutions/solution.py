@@ -28,8 +28,7 @@ ROUND: Final = 1e-5
 """An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
 
 LARGEST: Final = 1e8
-"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a
-column's, and could not be squared or be a jump of 32 bits."""
+"""Largest size of a value: no column's angle or jump is beyond it, nor fits squares and 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +121,8 @@ def read_solution(
     raw = read_raw(path)
     if raw.stamp and raw.stamp != problem.stamp:
         raise SolutionError(
-            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; instance, options or fixed jumps "
-            "differ, give the manifest that lies beside the solver's model",
+            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; "
+            "instance, options or fixed jumps differ, give the manifest that lies beside the solver's model",
             file=path,
         )
     if not raw.has_point:
@@ -178,7 +177,8 @@ def _check_range(point: Floats, problem: Problem) -> None:
     if abs(point[at]) > LARGEST:
         name = Canonical(problem).column_names[at].decode()
         raise SolutionError(
-            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
+            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; "
+            "let the solver write it again"
         )
 
 
@@ -194,12 +194,13 @@ def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
     problem, found = form.problem, values_for(form.column_names, raw)
     if found.missing:
         raise SolutionError(
-            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} names are unknown; "
-            "it is of another instance, formulation or option"
+            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} "
+            "names are unknown; it is of another instance, formulation or option"
         )
     if found.unknown > len(raw.values) // 2:
         raise SolutionError(
-            f"{found.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+            f"{found.unknown} of its {len(raw.values)} names are unknown; "
+            "it is of another instance or formulation"
         )
     return found.values, found.unknown
 

@@ -28,7 +28,8 @@ def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, An
             recipe,
             other,
             names,
-            f"both minimise {declared.minimises}; {declared.how}; points transfer by alpha, beta and the jumps",
+            f"both minimise {declared.minimises}; {declared.how}; "
+            "points transfer by alpha, beta and the jumps",
         )
         for other, declared in FORMULATIONS.items()
         if other != recipe.formulation and declared.minimises == FORMULATIONS[recipe.formulation].minimises
@@ -64,10 +65,16 @@ def _difference(recipe: EntryRecipe, other: str) -> str:
 
 def _other_facet(recipe: EntryRecipe, names: Collection[str]) -> dict[str, Any]:
     if recipe.facet == "printed":
-        why = "the facet of the hull, z >= -(pi/4) p1: z = p1 beta_i there, and its optimum is at least as high as this one"
+        why = (
+            "the facet of the hull, z >= -(pi/4) p1: z = p1 beta_i there, "
+            "and its optimum is at least as high as this one"
+        )
         facet = "hull"
     else:
-        why = "(26) as printed, z >= -pi/4, leaves z free where p1 = 0: a relaxation, whose optimum may be lower"
+        why = (
+            "(26) as printed, z >= -pi/4, leaves z free where p1 = 0: "
+            "a relaxation, whose optimum may be lower"
+        )
         facet = "printed"
     name = entry_name(recipe.instance, recipe.formulation, facet)
     shown = f"{recipe.formulation} (facet {facet})"

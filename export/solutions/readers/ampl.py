@@ -2,12 +2,12 @@
 
 Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl and ampl/mp):
 
-    optimal solution found          any lines of message; Bonmin and Couenne begin with an empty one, Minto writes none
+    optimal solution found          message: Bonmin and Couenne begin with an empty line, Minto has none
                                     an empty line
     Options
     3                               number k of options, the first number of the .nl file
     1
-    1                               if this one is 3, then k is 2 too large and a real number (vbtol) follows the counts
+    1                               if 3, then k is 2 too large and a number (vbtol) follows the counts
     0
     2                               number of constraints
     0                               number of dual values that follow: all or none
@@ -15,16 +15,17 @@ Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl an
     5                               number of values that follow: all or none
     10                              dual values, then values, in the order of the .nl file
     ...
-    objno 0 0                       number of the objective and solve code; the code or the line may be missing
+    objno 0 0                       objective's number and solve code; code or line may be missing
     suffix ...                      suffixes and other text, not needed here
 
-If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told apart
-without the problem. The binary form has the same parts as records between their lengths, as Fortran writes them:
-integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes too few.
+If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told
+apart without the problem. The binary form has the same parts as records between their lengths, as Fortran
+writes them: integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes
+too few.
 
-The solve code says `solved` and no more. It counts as a global proof only where the message names a solver that
-proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is left out for saying
-Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
+The solve code says `solved` and no more. It counts as a global proof only where the message names a solver
+that proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is
+left out for saying Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
 """
 
 from __future__ import annotations
@@ -144,8 +145,8 @@ class _Counts(NamedTuple):
         if self.duals in {0, self.rows} and self.values in {0, self.columns}:
             return None
         return (
-            f"{self.duals} dual values are announced for {self.rows} constraints and {self.values} values for {self.columns} "
-            "variables, where all or none should be"
+            f"{self.duals} dual values are announced for {self.rows} constraints "
+            f"and {self.values} values for {self.columns} variables, where all or none should be"
         )
 
 
@@ -199,7 +200,8 @@ def _parse_without_options(data: bytes) -> RawSolution:
     start = _start_of_numbers(data[:HEAD])
     if start is None:
         raise SolutionError(
-            "there is neither an Options line nor a number after the message; let the solver write the file again"
+            "there is neither an Options line nor a number after the message; "
+            "let the solver write the file again"
         )
     stop = _end_of_numbers(data, start)
     return _solution(TEXT, data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
@@ -238,7 +240,8 @@ def parse_binary(data: bytes) -> RawSolution:
     duals, values = records.take_numbers("dual values"), records.take_numbers("values")
     if counts and (duals.size, values.size) != (counts.duals, counts.values):
         raise records.fault(
-            f"{counts.duals} dual values and {counts.values} values are announced, {duals.size} and {values.size} follow"
+            f"{counts.duals} dual values and {counts.values} values are announced, "
+            f"{duals.size} and {values.size} follow"
         )
     if np.isnan(values).any():
         raise records.fault("one of the values is not a number")
@@ -319,8 +322,8 @@ def write_ampl_sol(
     """The path, now holding an AMPL solution file, text or binary.
 
     primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
-    rows: number of constraints. code: solve code as in the head of this module. Numbers are written so that they are
-    read back bit by bit.
+    rows: number of constraints. code: solve code as in the head of this module. Numbers are read back bit by
+    bit.
 
     Raises SolutionError when a value is not finite, OutputError when the file cannot be written.
     """

@@ -9,15 +9,17 @@
 
     The above solution has an objective value of:  -14.4
 
-Normal completion is a global proof: of the optimum, of infeasibility when there is no table, of unboundedness when a ray follows it.
-It is none when the options FirstFeas or FirstLoc stopped the search: then the point is called feasible. That bounds were missing, so that
-nothing is proven, only tim.lst says. sum.lst begins like res.lst and has no values: it is refused. A tim.lst has one line:
+Normal completion is a global proof: of the optimum, of infeasibility when there is no table, of unboundedness
+when a ray follows it. It is none when the options FirstFeas or FirstLoc stopped the search: then the point is
+called feasible. That bounds were missing, so that nothing is proven, only tim.lst says. sum.lst begins like
+res.lst and has no values: it is refused. A tim.lst has one line:
 
     problem 2 16 10189 50 0.18 0.19 1 1 0 13 5 3 0.24 0.37
 
-that is name, constraints, variables, (two more,) lower and upper bound, solver status, model status, missing bounds, iterations, node of
-the best point (-3: there is none), nodes in memory, seconds of processor and clock; older versions have fewer at the end. We always
-minimise. Model status 1 is claimed for FirstFeas too, which tim.lst does not tell. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
+that is name, constraints, variables, (two more,) lower and upper bound, solver status, model status, missing
+bounds, iterations, node of the best point (-3: there is none), nodes in memory, seconds of processor and
+clock; older versions have fewer at the end. We always minimise. Model status 1 is claimed for FirstFeas too,
+which tim.lst does not tell. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
 """
 
 from __future__ import annotations

@@ -4,9 +4,10 @@
           0 x                     10                    -1.9      number, name, value, reduced cost
     **    3 y                    200                       0      ** before what is out of its bounds
 
-Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file. `printingOptions all` or
-`rows` puts the rows before the columns: their numbers start again, and what stands before must be no columns. Some versions and options omit columns at 0; a file that
-holds a value of 0 does not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
+Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file.
+`printingOptions all` or `rows` puts the rows before the columns: their numbers start again, and what stands
+before must be no columns. Some versions and options omit columns at 0; a file that holds a value of 0 does
+not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
 relaxation, (no integer solution - continuous used): both hold no point. Layouts: CBC 2.10.8.
 """
 

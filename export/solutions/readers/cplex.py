@@ -1,15 +1,16 @@
 """Solution files of CPLEX, XML: one solution, or a pool, of which the first is the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
-     <header objectiveValue="-14.4" solutionStatusValue="101" solutionStatusString="integer optimal solution" writeLevel="1"/>
+     <header objectiveValue="-14.4" writeLevel="1"
+      solutionStatusValue="101" solutionStatusString="integer optimal solution"/>
      <linearConstraints> ...               rows are not needed here
      <variables>
       <variable name="x" index="0" value="10"/>
 
-writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold the integer columns only. Status codes are those of
-CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones. A file of an infeasible problem has values too, which
-are no point. Without any solution CPLEX writes no file (error 1217). Nothing but elements is accepted: no DTD and no entities.
-Layouts: CPLEX 22.2.0.
+writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold the integer columns only.
+Status codes are those of CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones. A file of an
+infeasible problem has values too, which are no point. Without any solution CPLEX writes no file (error 1217).
+Nothing but elements is accepted: no DTD and no entities. Layouts: CPLEX 22.2.0.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def recognises(head: bytes) -> bool:
 def parse(data: bytes) -> RawSolution:
     """The content of a file, of a pool its first solution, which the message then says.
 
-    Raises SolutionError, with the line, for XML that is damaged, cut off or has entities, and for values that are none.
+    Raises SolutionError, with the line, for XML that is damaged or has entities, and for what is no number.
     """
     first = _parsed(data)
     if first.header is None:
@@ -78,7 +79,8 @@ def _with_point(first: _FirstSolution, status: Status, words: str) -> RawSolutio
     level = header.get("writeLevel", "1")
     if level in _INTEGERS_ONLY:
         raise SolutionError(
-            f"the file was written with writeLevel {level} and holds the integer columns only; use level 1 (AllVars)"
+            f"the file was written with writeLevel {level} and holds the integer columns only; "
+            "use level 1 (AllVars)"
         )
     names, values = named_pairs(first.names, first.values)
     omits = level == _OMITS_ZEROS

@@ -4,10 +4,11 @@
     solver_status,1
     problem,sha256_1a2b3c4d5e6f               older files have no such line
     objective, 5.565360828459345E-01
-    alpha_00_00, 1.146018366025520E-01     every column in order; EPS is a zero, +INF and -INF occur, NA and UNDF are no values
+    alpha_00_00, 1.146018366025520E-01     every column in order
 
-GAMS's numbers of the two states are in the manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves
-the start in the levels: values are then not read.
+EPS is a zero, +INF and -INF occur, NA and UNDF are no values. GAMS's numbers of the two states are in the
+manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves the start in the
+levels: values are then not read.
 """
 
 from __future__ import annotations

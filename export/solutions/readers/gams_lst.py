@@ -4,8 +4,8 @@
     **** SOLVER STATUS     1 Normal Completion
     **** MODEL STATUS      2 Locally Optimal
 
-Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model that does not compile leaves none, but `**** 2 ERROR(S)`.
-Layout: GAMS 54.6.1.
+Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
+that does not compile leaves none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
 """
 
 from __future__ import annotations

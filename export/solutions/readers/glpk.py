@@ -7,11 +7,12 @@
     j 1 10                                 columns, in the order of the LP or MPS file
     e o f
 
-Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the primal and one for the
-dual side. The order of the columns is told by the problem's name: our LP files put ONE first and have no name, our MPS files put it last;
-in a .mod the objective is named energy, which is the first row too.
-`glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its style 2 and counts the objective as
-one more row, which is found out when the sizes are compared. Layouts: GLPK 5.0.
+Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the
+primal and one for the dual side. The order of the columns is told by the problem's name: our LP files put ONE
+first and have no name, our MPS files put it last; in a .mod the objective is named energy, which is the first
+row too. `glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its
+style 2 and counts the objective as one more row, which is found out when the sizes are compared. Layouts:
+GLPK 5.0.
 """
 
 from __future__ import annotations
@@ -128,7 +129,8 @@ def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
         raise fault(
             data,
             start,
-            f"{summary.columns} columns are announced, {len(letters)} lines follow; let the solver write the file again",
+            f"{summary.columns} columns are announced, {len(letters)} lines follow; "
+            "let the solver write the file again",
         )
     wrong = (letters != b"j") | (numbers[:, 0] != np.arange(1, summary.columns + 1))
     if wrong.any():

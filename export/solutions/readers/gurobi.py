@@ -1,17 +1,18 @@
 """Solution files of Gurobi: .sol and .json. COPT's .sol and plain lists of values are alike.
 
-    # Solution for model obj               comment lines; they vary from version to version, and the first may be missing
+    # Solution for model obj               comment lines, which vary; the first may be missing
     # Objective value = -1.44e+01
     x 10                                   name and value of every column, zeros too
 
-A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one and holds the
-integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
+A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one
+and holds the integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
 
     { "SolutionInfo": { "Status": 2, "ObjVal": ..., "ObjBound": ..., ... },
       "Vars": [ { "VarName": "x", "X": 10}, ... ]}
 
-Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further solutions too, which are not
-read: X is the incumbent. Without a solution there is no Vars, and bounds are 1e+100. Layouts: Gurobi 13.0.3.
+Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further
+solutions too, which are not read: X is the incumbent. Without a solution there is no Vars, and bounds are
+1e+100. Layouts: Gurobi 13.0.3.
 """
 
 from __future__ import annotations
@@ -134,7 +135,8 @@ def _document(data: bytes) -> dict[str, Any]:
         content = json.loads(data, object_pairs_hook=_object, parse_int=_integer)
     except json.JSONDecodeError as error:
         raise SolutionError(
-            f"line {error.lineno}: the JSON is damaged or cut off at column {error.colno}; let Gurobi write the file again"
+            f"line {error.lineno}: the JSON is damaged or cut off at column {error.colno}; "
+            "let Gurobi write the file again"
         ) from error
     except (ValueError, RecursionError) as error:
         raise SolutionError("the JSON is damaged; let Gurobi write the file again") from error

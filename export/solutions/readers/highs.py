@@ -11,11 +11,11 @@ Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
     # Columns 5                     style 4: minus the number of columns that are not zero
     x 10                            name and value; style 4: and the column's number
     ...
-    # Rows 2                        style 0 alone; rows, dual values and a basis follow and are not needed here
+    # Rows 2                        style 0 alone; rows, dual values and a basis follow, not needed here
 
-Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style 2 has GLPK's layout
-and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic problems, which it does not take on paper: what
-class of problem it was given has to be checked where it is called.
+Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style
+2 has GLPK's layout and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic
+problems, which it does not take on paper: what class of problem it was given is checked where it is called.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _OTHER_STYLES: Final = {
 _STATUS: Final = {
     b"Optimal": Status.OPTIMAL_GLOBAL,
     b"Infeasible": Status.INFEASIBLE,
-    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # a sum of squares or absolute values is bounded below
+    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # our objectives are bounded below
     b"Unbounded": Status.UNBOUNDED,
     b"Bound on objective reached": Status.LIMIT_WITH_POINT,
     b"Target for objective reached": Status.LIMIT_WITH_POINT,
@@ -63,7 +63,7 @@ def recognises(head: bytes) -> bool:
 def parse(data: bytes) -> RawSolution:
     """The content of a file of style 0 or 4.
 
-    Raises SolutionError for other styles, files that are cut off, counts that do not fit and what is not a number.
+    Raises SolutionError for other styles, what is cut off or no number, and counts that do not fit.
     """
     data = with_unix_ends(data)
     if (style := _other_style(data)) is not None:

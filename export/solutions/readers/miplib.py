@@ -1,7 +1,7 @@
 """Solution files of MIPLIB: `=obj= value`, then a name and a value a line; columns at 0 may be omitted.
 
-`=infeas=` instead stands for an infeasible instance (MIPLIB's solution checker). There is no other status: a point is called
-feasible, and no more.
+`=infeas=` instead stands for an infeasible instance (MIPLIB's solution checker). There is no other status: a
+point is called feasible, and no more.
 """
 
 from __future__ import annotations

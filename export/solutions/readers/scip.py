@@ -4,10 +4,11 @@ r"""Solution files of SCIP.
     objective value:                                -14.4
     b                                                   1 \t(obj:-3)
 
-The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may be +infinity or
--infinity; a partial solution has the value `unknown`, which no point can have. Without a point the last line is `no solution available`.
-SCIP adds columns of its own (nlobjvar, quadobjvar, qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts:
-SCIP 10.0; words of the status: SCIPprintStatus.
+The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may
+be +infinity or -infinity; a partial solution has the value `unknown`, which no point can have. Without a
+point the last line is `no solution available`. SCIP adds columns of its own (nlobjvar, quadobjvar,
+qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts: SCIP 10.0; words
+of the status: SCIPprintStatus.
 """
 
 from __future__ import annotations

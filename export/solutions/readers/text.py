@@ -1,7 +1,7 @@
 """What a solution file says, before it is mapped onto a problem; and fast parsing of its columns of text.
 
-The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when something is
-wrong is the place looked for.
+The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when
+something is wrong is the place looked for.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 def added_columns() -> dict[str, str]:
     """Patterns of the columns that programs add when they read or write a model, by title of the program.
 
-    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may hold them
-    beside the columns of the problem.
+    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may
+    hold them beside the columns of the problem.
     """
-    # Not above: a solver's child process, which writes such files, would load all of the formulations with the table.
+    # Not above: a solver's child process, which writes such files, would load formulations with the table.
     from ...solvers_table import PROGRAMS
 
     ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
@@ -89,13 +89,14 @@ _PROMISING: Final = frozenset(
 class RawSolution:
     """The content of one solution file.
 
-    reader: name of the reader that understood the file. status: the solver's claim. message: the solver's own words
-    on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
+    reader: name of the reader that understood the file. status: the solver's claim. message: its own words on
+    one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
-    omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
-    order: the order of the values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file
-    lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated it, else empty.
-    A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
+    omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or
+    None: then a positional file has a dual value for each row before the values. order: the order of the
+    values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the
+    file lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated
+    it, or empty.
     """
 
     reader: str
@@ -136,10 +137,11 @@ class NamedValues(NamedTuple):
 def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     """The values of `names` (n,), unique byte strings, in their order.
 
-    A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in the file
-    that are not among `names` are counted as unknown, but for the columns that readers of models are known to add.
+    A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in
+    the file that are not among `names` are counted as unknown, but for the columns that programs add.
 
-    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of `names` as that of a row.
+    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
+    `names` as that of a row.
     """
     listed = _listed(raw)
     _check_rows(names, raw)
@@ -160,7 +162,8 @@ def _listed(raw: RawSolution) -> Bytes:
     _check_point(raw)
     if raw.names is None:
         raise SolutionError(
-            f"the file lists values without names; it must be read by position, in the order of the .{raw.order} file"
+            "the file lists values without names; "
+            f"it must be read by position, in the order of the .{raw.order} file"
         )
     return raw.names
 
@@ -180,8 +183,8 @@ def _check_rows(names: Bytes, raw: RawSolution) -> None:
     if len(misplaced):
         name = misplaced[0].decode(errors="replace")
         raise SolutionError(
-            f"the column {name} stands before the numbers start again, where rows should; a line is there twice or out of order; "
-            "let the solver write the file again"
+            f"the column {name} stands before the numbers start again, where rows should; "
+            "a line is there twice or out of order; let the solver write the file again"
         )
 
 
@@ -205,11 +208,13 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
         if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
             raise SolutionError(
-                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); write it with write_solution_style = 0 (raw) or 4 (sparse)"
+                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); "
+                "write it with write_solution_style = 0 (raw) or 4 (sparse)"
             )
         size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
-            f"the file is of {size}, the problem has {columns} columns and {rows} rows; give the solution of this very problem"
+            f"the file is of {size}, the problem has {columns} columns and {rows} rows; "
+            "give the solution of this very problem"
         )
     return raw.values[found - columns :].copy()
 
@@ -304,9 +309,9 @@ def number_of(text: bytes) -> float | None:
 
 
 def numbers(data: bytes, start: int, stop: int) -> Floats:
-    """The numbers in a text that has one on each line from byte `start` to `stop`; a new line must end the last one.
+    """The numbers in a text that has one on each line from byte `start` to `stop`.
 
-    Raises SolutionError with the line of what is not a number.
+    Raises SolutionError with the line of what is not a number, or is not ended by a new line.
     """
     pieces = [_floats(piece, _tokens(piece, 1)) for piece in _pieces(data, start, stop)]
     return np.concatenate([np.empty(0), *pieces])
@@ -326,7 +331,7 @@ def labelled_numbers(
 ) -> tuple[Bytes, Floats]:
     """Labels (k,) and numbers (k, len(numeric)) of a text of lines of `per_line` words.
 
-    label, numeric: places of the label and of the numbers among the words of a line; other words are left out.
+    label, numeric: places of the label and of the numbers among the words of a line; others are left out.
     Raises SolutionError with the line at fault.
     """
     names: list[Bytes] = [np.empty(0, dtype="S1")]

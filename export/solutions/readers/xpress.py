@@ -1,15 +1,15 @@
 """Solution files of Xpress: .slx and .asc.
 
-    NAME          mip                                     .slx: a block NAME .. ENDATA for each solution, the first is taken
+    NAME          mip                          .slx: NAME .. ENDATA for each solution, the first is taken
       C x                       10
-    ENDATA                                                ENDATA alone: there was no solution
+    ENDATA                                     ENDATA alone: there was no solution
 
-    1,"c1      ","G","BS",11,0.3,0,11.3,0                 .asc: number, name with blanks after it, kind, state, value, ...
-    3,"x       ","C","SB",10,0.1,0,10,0                   columns have the kind C and come after the rows
+    1,"c1      ","G","BS",11,0.3,0,11.3,0      .asc: number, name and blanks, kind, state, value, ...
+    3,"x       ","C","SB",10,0.1,0,10,0        columns have the kind C and come after the rows
 
-Neither says anything of a status: the point is called feasible, and no more. Without an integer solution Xpress writes the
-relaxation, which shows in the violation that is computed again. .prt has six decimals and .hdr no columns: they are not
-read. Layouts: Xpress 9.9.1.
+Neither says anything of a status: the point is called feasible, and no more. Without an integer solution
+Xpress writes the relaxation, which shows in the violation that is computed again. .prt has six decimals and
+.hdr no columns: they are not read. Layouts: Xpress 9.9.1.
 """
 
 from __future__ import annotations

@@ -28,14 +28,17 @@ from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 
 MILP = "milp-mccormick"
-needs_glpk = pytest.mark.skipif(shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils")  # fmt: skip
+needs_glpk = pytest.mark.skipif(
+    shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils"
+)
 
 
 @pytest.fixture(scope="module")
 def skew(tmp_path_factory):
     """A folder with the MILP of a sample in LP, MPS and as an AMPL model, its instance and manifest."""
     folder = tmp_path_factory.mktemp("skew")
-    arguments = ["export", "skew", "--size", "4", "-f", MILP, "--format", "lp", "--format", "mps", "--format", "mod"]  # fmt: skip
+    formats = ["--format", "lp", "--format", "mps", "--format", "mod"]
+    arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats]
     assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
     return folder
 
@@ -108,7 +111,9 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
 def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp_path):
     relaxed, whole = tmp_path / "relaxed.sol", tmp_path / "whole.sol"
     stem = f"skew.{MILP}"
-    for arguments in (["--lp", f"{stem}.lp", "--nomip", "-w", relaxed], ["-m", f"{stem}.mod", "-d", f"{stem}.dat", "-w", whole]):  # fmt: skip
+    of_lp = ["--lp", f"{stem}.lp", "--nomip", "-w", relaxed]
+    of_mod = ["-m", f"{stem}.mod", "-d", f"{stem}.dat", "-w", whole]
+    for arguments in (of_lp, of_mod):
         subprocess.run(["glpsol", *map(str, arguments)], cwd=skew, check=True, capture_output=True)
     code, facts, _, written = reading(relaxed)
     assert (code, facts["status"], written) == (1, "unknown", False)
@@ -165,7 +170,9 @@ def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
     assert (found.status, found.claimed, found.bound) == ("unknown", "optimal-global", 0.9)
 
 
-@pytest.mark.parametrize("code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")])  # fmt: skip
+@pytest.mark.parametrize(
+    "code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")]
+)
 def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, tmp_path, code, status):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
