@@ -42,20 +42,7 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
-from .text import (
-    HEAD,
-    Cursor,
-    RawSolution,
-    Status,
-    is_number,
-    numbers,
-    one_line,
-    shown,
-    with_unix_ends,
-)
-
-TEXT: Final = "ampl-text"
-BINARY: Final = "ampl-binary"
+from .text import HEAD, Cursor, RawSolution, Reader, Status, begins, is_number, numbers, one_line, shown
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _AFTER_NUMBERS = re.compile(rb"^(?:objno|suffix)\b", re.MULTILINE)
@@ -96,20 +83,12 @@ _CODES: Final = (
 )
 
 
-def recognises_text(head: bytes) -> bool:
-    """Whether a file that begins so is an AMPL solution in text form."""
-    head = with_unix_ends(head)
+def _recognises_text(head: bytes) -> bool:
     return _OPTIONS.search(head) is not None or _start_of_numbers(head) is not None
-
-
-def recognises_binary(head: bytes) -> bool:
-    """Whether a file that begins so is an AMPL solution in binary form."""
-    return head.startswith(_MAGIC)
 
 
 def parse_text(data: bytes) -> RawSolution:
     """The content of a text file. Raises SolutionError where it is cut off or numbers do not fit."""
-    data = with_unix_ends(data)
     found = _OPTIONS.search(data, 0, HEAD)
     if found is None:
         return _parse_without_options(data)
@@ -117,7 +96,7 @@ def parse_text(data: bytes) -> RawSolution:
     counts = _read_counts(cursor)
     values = _read_values(cursor, counts)
     code = _read_code(cursor)
-    return _solution(TEXT, data[: found.start()], code, values, counts.rows)
+    return _solution(data[: found.start()], code, values, counts.rows)
 
 
 def _start_of_numbers(head: bytes) -> int | None:
@@ -204,7 +183,7 @@ def _parse_without_options(data: bytes) -> RawSolution:
             "let the solver write the file again"
         )
     stop = _end_of_numbers(data, start)
-    return _solution(TEXT, data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
+    return _solution(data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
 
 
 def _end_of_numbers(data: bytes, start: int) -> int:
@@ -212,13 +191,12 @@ def _end_of_numbers(data: bytes, start: int) -> int:
     return len(data) if found is None else found.start()
 
 
-def _solution(reader: str, message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
+def _solution(message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file says solved and holds no values; let the solver write the file again")
-    return RawSolution(
-        reader, _status(code, words, with_point=values.size > 0), words, None, None, values, rows=rows
-    )
+    status = _status(code, words, with_point=values.size > 0)
+    return RawSolution(status, words, None, None, values, rows=rows)
 
 
 def _status(code: int | None, message: str, *, with_point: bool) -> Status:
@@ -246,7 +224,7 @@ def parse_binary(data: bytes) -> RawSolution:
     if np.isnan(values).any():
         raise records.fault("one of the values is not a number")
     rows = counts.rows if counts else duals.size
-    return _solution(BINARY, message, records.take_code(), values, rows)
+    return _solution(message, records.take_code(), values, rows)
 
 
 @dataclass
@@ -372,3 +350,9 @@ def _binary_parts(message: str, primal: Floats, counts: tuple[int, ...], code: i
 def _record(content: bytes) -> bytes:
     length = len(content).to_bytes(4, "little")
     return length + content + length
+
+
+READERS: Final = (
+    Reader("ampl-binary", "AMPL .sol, binary", begins(_MAGIC), parse_binary, text=False),
+    Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text),
+)

@@ -33,19 +33,16 @@ from .text import (
     Bytes,
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     is_number,
     labelled_numbers,
     one_line,
     shown,
-    with_unix_ends,
     without_point,
 )
 
-RESULTS: Final = "baron-res"
-TIMES: Final = "baron-tim"
-
-_HEAD = re.compile(rb"=+\n BARON version ")
 _SUMMARY: Final = b"\n Best solution found at node:"
 _BANNER = re.compile(rb"^ *\*\*\* ([^*\n]{3,100}?) \*\*\* *$", re.MULTILINE)
 _TABLE: Final = b"\nThe best solution found is"
@@ -90,12 +87,7 @@ _UNPROVEN: Final = {
 _NO_NODE: Final = b"-3"
 
 
-def recognises_results(head: bytes) -> bool:
-    """Whether a file that begins so is a res.lst (or sum.lst)."""
-    return _HEAD.match(with_unix_ends(head)) is not None
-
-
-def recognises_times(head: bytes) -> bool:
+def _recognises_times(head: bytes) -> bool:
     """Whether a file that begins so is a tim.lst: one line of a name and numbers."""
     words = head.split()
     alone = len(head.strip().splitlines()) == 1 and _FEWEST_WORDS <= len(words) <= _MOST_WORDS
@@ -104,7 +96,6 @@ def recognises_times(head: bytes) -> bool:
 
 def parse_results(data: bytes) -> RawSolution:
     """The content of a res.lst. Raises SolutionError for a sum.lst and what is cut off or no number."""
-    data = with_unix_ends(data)
     if _SUMMARY in data:
         raise SolutionError("this is the summary of BARON, which holds no values; give its results, res.lst")
     banners = [found[1] for found in _BANNER.finditer(data)]
@@ -122,11 +113,11 @@ def parse_results(data: bytes) -> RawSolution:
             raise SolutionError(
                 "the file is cut off: points were found, and the table of the best is not there"
             )
-        return without_point(RESULTS, status, words)
+        return without_point(status, words)
     names, values, objective = _table(data, at + 1)
     if abs(objective) >= _INFINITE:
-        return without_point(RESULTS, Status.UNBOUNDED, words)
-    return RawSolution(RESULTS, status, words, objective, names, values)
+        return without_point(Status.UNBOUNDED, words)
+    return RawSolution(status, words, objective, names, values)
 
 
 def _status(banner: bytes, *, has_table: bool, unbounded: bool) -> Status:
@@ -170,7 +161,7 @@ def parse_times(data: bytes) -> RawSolution:
         status, text = _UNPROVEN.get(status, status), f"{text}, bounds are missing"
     if status is Status.LIMIT_WITHOUT_POINT and solver not in _LIMITS | {1}:
         status = Status.ERROR
-    return without_point(TIMES, status, f"{text}; {_SOLVER.get(solver, f'solver status {solver}')}")
+    return without_point(status, f"{text}; {_SOLVER.get(solver, f'solver status {solver}')}")
 
 
 def _code(word: bytes) -> int:
@@ -179,3 +170,9 @@ def _code(word: bytes) -> int:
             f"line 1: {shown(word)} is not the number of a status; let BARON write the file again"
         )
     return int(word)
+
+
+READERS: Final = (
+    Reader("baron-res", "BARON results (res.lst)", begins(rb"=+\n BARON version "), parse_results),
+    Reader("baron-tim", "BARON times (tim.lst), for the status alone", _recognises_times, parse_times),
+)

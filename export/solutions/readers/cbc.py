@@ -21,17 +21,16 @@ import numpy as np
 from .text import (
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     fault,
     labelled_numbers,
     line_after,
     one_line,
     shown,
-    with_unix_ends,
     without_point,
 )
-
-NAME: Final = "cbc"
 
 _HEAD = re.compile(rb"([A-Z][^\n]{2,100}?) - objective value +(\S+)")
 _MARK: Final = b"\n**"
@@ -46,25 +45,18 @@ _WORDS: Final = (
     (b"stopped on difficulties", Status.ERROR),
     (b"stopped", Status.LIMIT_WITH_POINT),
 )
-_WITH_POINT: Final = {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}
-
-
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by CBC."""
-    return _HEAD.match(head) is not None
 
 
 def parse(data: bytes) -> RawSolution:
     """The content of a file. Raises SolutionError for what is not a number and files that are cut off."""
-    data = with_unix_ends(data)
     cursor = Cursor(data)
     line = cursor.line("the status and the objective")
     head = _HEAD.fullmatch(line)
     if head is None:
         raise cursor.fault(f"{shown(line)} is not a status and the objective")
     status = _status(head[1])
-    if status not in _WITH_POINT:
-        return without_point(NAME, status, head[1])
+    if not status.promises_point:
+        return without_point(status, head[1])
     objective = cursor.number(head[2])
     names, numbers = labelled_numbers(
         data.replace(_MARK, b"\n  "), cursor.position, len(data), 4, label=1, numeric=(0, 2)
@@ -78,7 +70,6 @@ def parse(data: bytes) -> RawSolution:
     first = int(starts[0]) if len(starts) else 0
     values = numbers[first:, 1].copy()
     return RawSolution(
-        NAME,
         status,
         one_line(head[1]),
         objective,
@@ -92,6 +83,9 @@ def parse(data: bytes) -> RawSolution:
 def _status(words: bytes) -> Status:
     known = (status for start, status in _WORDS if words.lower().startswith(start))
     status = next(known, Status.ERROR)
-    if _CONTINUOUS in words and status in _WITH_POINT:
+    if _CONTINUOUS in words and status.promises_point:
         return Status.LIMIT_WITHOUT_POINT
     return status
+
+
+READERS: Final = (Reader("cbc", "CBC, the file of its command solution", begins(_HEAD.pattern), parse),)

@@ -24,9 +24,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
-from .text import RawSolution, Status, named_pairs, number_of, one_line, without_point
-
-NAME: Final = "cplex"
+from .text import RawSolution, Reader, Status, begins, named_pairs, number_of, one_line, without_point
 
 _HEAD = re.compile(rb"\s*<[?!C]")
 _ROOT: Final = b"<CPLEXSolution"
@@ -48,13 +46,6 @@ _STATUS: Final = {code: status for status, codes in _CODES.items() for code in c
 _STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
 """A continuous problem was stopped; the header says whether the point is feasible."""
 
-_POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED, Status.LIMIT_WITHOUT_POINT, Status.ERROR}
-
-
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by CPLEX."""
-    return _HEAD.match(head) is not None and _ROOT in head
-
 
 def parse(data: bytes) -> RawSolution:
     """The content of a file, of a pool its first solution, which the message then says.
@@ -69,8 +60,8 @@ def parse(data: bytes) -> RawSolution:
     if first.solutions > 1:
         name = first.header.get("solutionName", "without a name")
         words += f"; {name}, the first of {first.solutions} solutions"
-    if status in _POINTLESS:
-        return without_point(NAME, status, words)
+    if not status.promises_point:
+        return without_point(status, words)
     return _with_point(first, status, words)
 
 
@@ -87,7 +78,7 @@ def _with_point(first: _FirstSolution, status: Status, words: str) -> RawSolutio
     if not (omits or len(values)):
         raise SolutionError("the file holds no variables; let CPLEX write it again")
     objective = number_of(header.get("objectiveValue", "").encode(errors="replace"))
-    return RawSolution(NAME, status, one_line(words.encode()), objective, names, values, omits_zeros=omits)
+    return RawSolution(status, one_line(words.encode()), objective, names, values, omits_zeros=omits)
 
 
 def _status(header: dict[str, str]) -> Status:
@@ -150,3 +141,6 @@ def _parsed(data: bytes) -> _FirstSolution:
         line = parser.parser.CurrentLineNumber
         raise SolutionError(f"line {line}: {error}; let CPLEX write the file again") from error
     return first
+
+
+READERS: Final = (Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse),)

@@ -27,21 +27,18 @@ from .text import (
     Bytes,
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     is_number,
     named_numbers,
     named_pairs,
-    with_unix_ends,
     without_point,
 )
-
-NAME: Final = "gurobi"
-JSON: Final = "gurobi-json"
 
 _MARK = re.compile(rb"# ?(?:Solution for model|Objective value|MIP start)\b", re.IGNORECASE)
 _OBJECTIVE = re.compile(rb"# ?Objective value ?=? *(\S+)", re.IGNORECASE)
 _START = re.compile(rb"# ?MIP start\b", re.IGNORECASE)
-_JSON = re.compile(rb'\s*\{\s*"SolutionInfo"')
 _LINES_TO_TELL: Final = 5
 _INFINITE: Final = 1e100
 
@@ -70,7 +67,7 @@ _WITHOUT_POINT: Final = {
 }
 
 
-def recognises(head: bytes) -> bool:
+def _recognises(head: bytes) -> bool:
     """Whether a file that begins so is a .sol of Gurobi, or a list of names and values without comments."""
     if _MARK.match(head):
         return True
@@ -86,14 +83,8 @@ def _is_pair(line: bytes) -> bool:
     )
 
 
-def recognises_json(head: bytes) -> bool:
-    """Whether a file that begins so is a .json of Gurobi."""
-    return _JSON.match(head) is not None
-
-
 def parse(data: bytes) -> RawSolution:
     """The content of a .sol. Raises SolutionError for a MIP start, no values, and no number."""
-    data = with_unix_ends(data)
     cursor, objective = Cursor(data), None
     while data.startswith(b"#", cursor.position):
         line = cursor.line("the end of a comment")
@@ -104,7 +95,7 @@ def parse(data: bytes) -> RawSolution:
     names, values = named_numbers(data, cursor.position, len(data), 2)
     if not len(values):
         raise SolutionError("the file holds no values; let the solver write it again")
-    return RawSolution(NAME, Status.FEASIBLE, "", objective, names, values)
+    return RawSolution(Status.FEASIBLE, "", objective, names, values)
 
 
 def parse_json(data: bytes) -> RawSolution:
@@ -119,10 +110,10 @@ def parse_json(data: bytes) -> RawSolution:
     if variables is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError("the file says optimal and holds no Vars; let Gurobi write it again")
-        return without_point(JSON, _WITHOUT_POINT.get(status, status), words)
+        return without_point(_WITHOUT_POINT.get(status, status), words)
     names, values = _columns(variables)
     objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
-    return RawSolution(JSON, status, words, objective, names, values, omits_zeros=True, bound=bound)
+    return RawSolution(status, words, objective, names, values, omits_zeros=True, bound=bound)
 
 
 def _finite(value: Any) -> float | None:
@@ -164,3 +155,9 @@ def _columns(variables: Any) -> tuple[Bytes, Floats]:
 
 def _is_column(entry: Any) -> bool:
     return isinstance(entry, tuple) and isinstance(entry[0], str) and type(entry[1]) in {int, float}
+
+
+READERS: Final = (
+    Reader("gurobi-json", "Gurobi .json", begins(rb'\s*\{\s*"SolutionInfo"'), parse_json),
+    Reader("gurobi", "Gurobi .sol, or any list of names and values", _recognises, parse),
+)

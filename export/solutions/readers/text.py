@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -89,17 +89,15 @@ _PROMISING: Final = frozenset(
 class RawSolution:
     """The content of one solution file.
 
-    reader: name of the reader that understood the file. status: the solver's claim. message: its own words on
-    one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
+    status: the solver's claim. message: its own words on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
     positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
     omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or
     None: then a positional file has a dual value for each row before the values. order: the order of the
     values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the
     file lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated
-    it, or empty.
+    it, or empty. reader: name of the reader that understood the file.
     """
 
-    reader: str
     status: Status
     message: str
     objective: float | None
@@ -111,6 +109,7 @@ class RawSolution:
     bound: float | None = None
     of_rows: Bytes | None = None
     stamp: str = ""
+    reader: str = ""
 
     @property
     def has_point(self) -> bool:
@@ -118,12 +117,31 @@ class RawSolution:
         return self.values.size > 0 or self.omits_zeros
 
 
-def without_point(
-    reader: str, status: Status, message: bytes | str, *, rows: int | None = None
-) -> RawSolution:
+def without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
     """What a file without a point says; the message is put on one line."""
     words = one_line(message if isinstance(message, bytes) else message.encode())
-    return RawSolution(reader, status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
+    return RawSolution(status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader of one kind of file.
+
+    recognises: whether a file with these first bytes is of this kind. parse: the content of a whole file, or
+    SolutionError. text: both are given lines that end as on Unix.
+    """
+
+    name: str
+    description: str
+    recognises: Callable[[bytes], bool]
+    parse: Callable[[bytes], RawSolution]
+    text: bool = True
+
+
+def begins(pattern: bytes) -> Callable[[bytes], bool]:
+    """For a Reader: whether a file's first bytes match a regular expression."""
+    compiled = re.compile(pattern)
+    return lambda head: compiled.match(head) is not None
 
 
 class NamedValues(NamedTuple):

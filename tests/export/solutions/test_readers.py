@@ -63,9 +63,7 @@ def ampl(
 
 def named(**values):
     names = np.array([name.encode() for name in values])
-    return RawSolution(
-        "highs", Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float)
-    )
+    return RawSolution(Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float))
 
 
 # what real solvers write
