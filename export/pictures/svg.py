@@ -11,16 +11,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from ...models.field.field import CrossField
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.grid import Floats, Ints
 from ...models.instance.instance import Instance
 from .combing import combed
-from .panels import FAMILIES, NEGATIVE, POSITIVE, STROKE
+from .panels import FAMILIES, NEGATIVE, POSITIVE, STROKE, runs, sides
 from .streamlines import streamlines
 
 SIDE: Final = 320.0
@@ -129,11 +128,11 @@ class _Sheet:
             ["h", "v", "h"],
             np.stack([stops - starts, np.ones_like(row), starts - stops], axis=1) * self.unit,
         )
-        inside = _sides(mask, between=True) if self.unit >= _CELLS_FROM else np.zeros((0, 2, 2))
+        inside = sides(mask, between=True) if self.unit >= _CELLS_FROM else np.zeros((0, 2, 2))
         return [
             f'<path class="paper" d="{runs}"/>',
             _path("cells", self._segments(inside), 0.8),
-            _path("border", self._segments(_sides(mask, between=False)), 1.2),
+            _path("border", self._segments(sides(mask, between=False)), 1.2),
         ]
 
     def strokes(self, name: str, width: float) -> list[str]:
@@ -182,13 +181,11 @@ def _crosses(sheet: _Sheet, field: CrossField) -> list[str]:
 
 def _streamlines(sheet: _Sheet, field: CrossField) -> list[str]:
     """Evenly spaced lines of both families."""
-    runs: dict[int, list[Floats]] = {0: [], 1: []}
-    for line in streamlines(field, _SPACING / sheet.unit):
-        cuts = np.flatnonzero(np.diff(line.families)) + 1
-        limits = [0, *cuts.tolist(), len(line.points)]
-        for first, stop in pairwise(limits):
-            runs[int(line.families[first])].append(sheet.place(line.points[first : stop + 1]))
-    return [sheet.lines(name, runs[family], 1.3) for family, name in enumerate("uv")]
+    found = streamlines(field, _SPACING / sheet.unit)
+    return [
+        sheet.lines(name, (sheet.place(run) for line in found for run in runs(line, family)), 1.3)
+        for family, name in enumerate("uv")
+    ]
 
 
 def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
@@ -204,16 +201,6 @@ def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
             _rounded(at), found.index.tolist(), np.round(radius, 2).tolist(), strict=True
         )
     ]
-
-
-def _sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border."""
-    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
-    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
-    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
-    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
-    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
-    return np.concatenate([level, upright]).astype(np.float64)
 
 
 def _moves(starts: Floats, letters: list[str], lengths: Floats) -> str:

@@ -107,6 +107,23 @@ def parse_json(text: str) -> object:
         raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
 
 
+def read_document(
+    path: Path, form: str, version: int, schema: str, package: str, *, remedy: str
+) -> dict[str, Any]:
+    """The JSON document in a file of at most MAX_BYTES, of a format and version, that obeys a schema.
+
+    Raises InputError when the file cannot be read, InstanceError, with file and place, when it breaks a rule.
+    """
+    try:
+        document = parse_json(read_bytes(path, MAX_BYTES).decode())
+        check_version(document, form, version)
+        return check_schema(document, schema, package)
+    except UnicodeDecodeError as error:
+        raise InstanceError(f"is not JSON; {remedy}", file=path) from error
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+
+
 def of_document(document: object) -> Instance:
     """The instance that a parsed JSON document describes.
 
@@ -172,10 +189,7 @@ def number_table(rows: list[Any], width: int) -> Floats | None:
 
 
 def check_schema(
-    document: object,
-    schema: str,
-    package: str,
-    rows: Mapping[str, Callable[[list[Any]], bool]] | None = None,
+    document: object, schema: str, package: str, rows: Mapping[str, Callable[[list[Any]], bool]] | None = None
 ) -> dict[str, Any]:
     """The document, which obeys the `<schema>.schema.json` that ships with a package.
 

@@ -41,9 +41,14 @@ class FreeField:
         self.alpha, self.beta = np.split(value, 2)
 
     @property
+    def field(self) -> CrossField:
+        """The same angles and jumps as a field."""
+        return CrossField(self.instance, self.alpha, self.beta, self.p)
+
+    @property
     def energy(self) -> float:
         """The 2-norm energy."""
-        return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
+        return self.field.energy().total
 
     def bounded(self, over: Over = never) -> CrossField:
         """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""

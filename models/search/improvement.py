@@ -97,7 +97,7 @@ def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
     """Let curves change their family of lines where that lowers the energy, the worst first."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
-    miss = CrossField(instance, state.alpha, state.beta, state.p).residual_r ** 2 * instance.w
+    miss = state.field.residual_r**2 * instance.w
     worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
     of_pixel = np.append(curve, -1)[nearest_strokes(instance)]
     for number in worst:

@@ -242,8 +242,7 @@ class _Hunt:
         if not self.large:
             yield from [self._reached] * _PATCHES
             return
-        field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
-        high = field.pixel_energy + 1e-12
+        high = self._state.field.pixel_energy + 1e-12
         for number in range(_PATCHES):
             centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
@@ -256,9 +255,7 @@ class _Hunt:
         for task, better in sorted(lower, key=lambda pair: pair[1].energy):
             self._adopt(task, better, over)
         if any(found) and self._unsettled:
-            self._latest.append(
-                CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
-            )
+            self._latest.append(self._state.field)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:

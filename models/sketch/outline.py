@@ -78,3 +78,12 @@ def _hull_area(strokes: Bools) -> float:
     row, column = np.nonzero(strokes)
     corners = np.concatenate([np.stack([row + a, column + b], axis=1) for a in (0, 1) for b in (0, 1)])
     return float(ConvexHull(corners).volume)
+
+
+def largest_part(mask: Bools) -> Bools:
+    """The 4-connected part of a mask with most pixels, the first of equal ones."""
+    from scipy import ndimage
+
+    label, _ = ndimage.label(mask)
+    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:])
+    return part

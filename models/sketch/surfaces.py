@@ -18,7 +18,8 @@ from ..instance.angles import wrap
 from ..instance.elementary import arctangent, cosine, length, sine, turned
 from ..instance.grid import Bools, Floats
 from ..instance.instance import Gauge, Instance
-from .cover import Cover, Frame, cover_by_segments, fit_frame
+from .cover import Frame, cover_by_segments, fit_frame
+from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
 
 _NEWTON: Final = 12
@@ -169,17 +170,8 @@ def _parameters(surface: Surface, frame: Frame) -> tuple[Floats, Floats, Bools]:
     on_patch = (miss < 1e-9) & _within(s, surface.s_range) & _within(t, surface.t_range)
     if not on_patch.any():
         raise InputError("no pixel centre lies on the surface; choose a larger size")
-    mask = _largest_part(on_patch.reshape(frame.shape))
+    mask = largest_part(on_patch.reshape(frame.shape))  # tips may touch the rest at corners only
     return s[mask.ravel()], t[mask.ravel()], mask
-
-
-def _largest_part(mask: Bools) -> Bools:
-    """The 4-connected part with most pixels: tips of a patch may touch the rest at corners only."""
-    from scipy import ndimage
-
-    label, _ = ndimage.label(mask)
-    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel())[1:])
-    return part
 
 
 def _within(value: Floats, ends: tuple[float, float]) -> Bools:
@@ -200,17 +192,13 @@ def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
         area = ax * by - ay * bx
         # Away from the patch the projection may fold; such pixels only have to stay finite.
         area = np.where(np.abs(area) < 1e-3, np.copysign(1e-3, area), area)
-        s = np.clip(
-            s + (by * error[:, 0] - bx * error[:, 1]) / area,
-            surface.s_range[0] - 0.5,
-            surface.s_range[1] + 0.5,
-        )
-        t = np.clip(
-            t + (ax * error[:, 1] - ay * error[:, 0]) / area,
-            surface.t_range[0] - 0.5,
-            surface.t_range[1] + 0.5,
-        )
+        s = _kept_near(s + (by * error[:, 0] - bx * error[:, 1]) / area, surface.s_range)
+        t = _kept_near(t + (ax * error[:, 1] - ay * error[:, 0]) / area, surface.t_range)
     return s, t
+
+
+def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
+    return np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
 
 
 def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
@@ -236,12 +224,7 @@ def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tu
     u_lines, v_lines = _lines(surface, frame, spacing)
     of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
     both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
-    return np.where(mask, both.weight, 0.0), _dominates(of_u, of_v)[mask]
-
-
-def _dominates(first: Cover, second: Cover) -> Bools:
-    dominates: Bools = first.amount >= second.amount
-    return dominates
+    return np.where(mask, both.weight, 0.0), (of_u.amount >= of_v.amount)[mask]
 
 
 def _lines(surface: Surface, frame: Frame, spacing: float) -> tuple[Floats, Floats]:

@@ -98,8 +98,7 @@ def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
         (folder / name).write_bytes(data)
     known = {}
     for role, facts in task.about["fields"].items():
-        provenance = Provenance(facts["solver"], facts["version"], facts["seconds"], facts["by"])
-        known[role] = Known(read_field(folder / facts["file"]), provenance)
+        known[role] = Known(read_field(folder / facts["file"]), Provenance.of(facts))
     instance = read_instance(folder / task.about["instance"]["file"])
     for place, each in enumerate(task.submitted):
         submitted = each.known()
@@ -208,28 +207,15 @@ def _preference(record: Record, entry: str) -> tuple[Any, ...]:
 
 
 def _bound(record: Record, entry: str) -> dict[str, Any]:
-    return {
-        "solver": record.solver,
-        "version": record.version,
-        "bound": record.bound,
-        "status": record.status,
-        "seconds": record.seconds,
-        "threads": record.threads,
-        "via": None if record.entry == entry else record.entry,
-    }
+    told = ("solver", "version", "bound", "status", "seconds", "threads")
+    via = None if record.entry == entry else record.entry
+    return {key: getattr(record, key) for key in told} | {"via": via}
 
 
 def _tangent(bound: float) -> dict[str, Any]:
     mine = ours("tangent at the point")
-    return {
-        "solver": mine.solver,
-        "version": mine.version,
-        "bound": bound,
-        "status": "computed",
-        "seconds": None,
-        "threads": None,
-        "via": None,
-    }
+    found = {"solver": mine.solver, "version": mine.version, "bound": bound, "status": "computed"}
+    return found | {"seconds": None, "threads": None, "via": None}
 
 
 def _greatest(bounds: list[dict[str, Any]]) -> float | None:

@@ -38,10 +38,6 @@ class Inputs:
         for recipe in each.entries:
             yield Entry(recipe, about, files, records, submitted, relatives)
 
-    def provenances(self, each: InstancePlan) -> set[Provenance]:
-        """Who, by the ledger, found a field that is kept for an entry of an instance."""
-        return {submitted.provenance for submitted in self._submitted(each)}
-
     def _records(self, each: InstancePlan) -> tuple[Record, ...]:
         names = {entry.name for entry in each.entries}
         return tuple(record for record in self.ledger.records if record.entry in names)

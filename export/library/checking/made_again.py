@@ -43,7 +43,7 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
             yield Finding(name, f"names another {key} than is made of its problem", BUILD)
     if not close(sidecar["best"]["objective"], made["best"]["objective"]):
         yield Finding(name, "does not tell the best of the known points", BUILD)
-    if provenance_of(sidecar["best"]) not in _known(task):
+    if Provenance.of(sidecar["best"]) not in _known(task):
         yield Finding(name, "says that somebody found its point who found none of the known fields", BUILD)
 
 
@@ -87,14 +87,9 @@ def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{key: file[key] for key in file if key not in {"bytes", "sha256"}} for file in files]
 
 
-def provenance_of(facts: dict[str, Any]) -> Provenance:
-    """Who found a field, by what a document says of it."""
-    return Provenance(facts["solver"], facts["version"], facts["seconds"], facts["by"])
-
-
 def _known(task: Entry) -> set[Provenance]:
     """Who found the fields that are known of an entry's instance."""
-    return {provenance_of(facts) for facts in task.about["fields"].values()} | {
+    return {Provenance.of(facts) for facts in task.about["fields"].values()} | {
         each.provenance for each in task.submitted
     }
 
@@ -116,7 +111,7 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
             yield Finding(name, f"tells another {key} than follows from the specification", BUILD)
     known = {each.provenance for each in task.submitted}
     for role, facts in about["fields"].items():
-        found = provenance_of(facts)
+        found = Provenance.of(facts)
         if found not in known and not _is_of_a_build(found):
             yield Finding(
                 name, f"says that somebody found its field {role} of whom the ledger knows nothing", BUILD

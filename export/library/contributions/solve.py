@@ -24,7 +24,7 @@ from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
-from ..ledger.ledger import Ending, Record, add_record, read_ledger
+from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
 
@@ -128,7 +128,7 @@ def _run(
         return record, None
     field = field_of(found.problem, found.point)
     primal = problem.objective_value(complete_point(problem, field))
-    record = replace(record, status=_ending(problem, solver, found), primal=primal)
+    record = replace(record, status=_run_status(problem, solver, found), primal=primal)
     return record, field if primal < best - _BETTER * max(abs(best), _BETTER) else None
 
 
@@ -138,7 +138,7 @@ def _start(library: Library, document: dict[str, Any], problem: Problem) -> Cros
     return None if known.point is None else field_of(known.problem, known.point)
 
 
-def _ending(problem: Problem, solver: str, found: Solution) -> Ending:
+def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
     if _proves(problem, solver, found):
         return "optimal"
     return "feasible" if found.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE} else "limit"

@@ -18,11 +18,10 @@ import numpy as np
 from ....models.errors import InputError, InstanceError
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
-from ....models.input_limits import MAX_BYTES
-from ....models.instance.file import check_schema, check_version, parse_json, read_instance
+from ....models.instance.file import read_document, read_instance
 from ....models.instance.grid import Ints
 from ....models.instance.instance import Instance
-from ....models.storage import read_bytes, sha256_of
+from ....models.storage import sha256_of
 from ..plan.spec import Spec, spec_of
 
 FORMAT: Final = "crossfield-library-entry"
@@ -84,14 +83,7 @@ def read_about(path: str | Path) -> dict[str, Any]:
 
 
 def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
-    try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, form, VERSION)
-        return check_schema(document, schema, __package__)
-    except UnicodeDecodeError as error:
-        raise InstanceError("is not JSON; build the library again", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    return read_document(path, form, VERSION, schema, __package__, remedy="build the library again")
 
 
 def as_bytes(document: dict[str, Any]) -> bytes:

@@ -12,18 +12,18 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, InstanceError
+from ....models.errors import InstanceError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field, write_field
-from ....models.input_limits import MAX_BYTES
-from ....models.instance.file import check_schema, check_version, parse_json
+from ....models.instance.file import read_document
 from ....models.storage import read_bytes, sha256_of, write_bytes
 from .. import documents
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
-Ending = Literal["optimal", "feasible", "limit", "no point"]
+RunStatus = Literal["optimal", "feasible", "limit", "no point"]
+"""What a run came to; of a submitted point `feasible`."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Record:
     problem_sha256: str
     solver: str
     version: str
-    status: Ending
+    status: RunStatus
     primal: float | None = None
     bound: float | None = None
     seconds: float | None = None
@@ -103,14 +103,8 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     path = Path(folder) / name
     if not path.exists():
         return Ledger(Path(folder))
-    try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, FORMAT, VERSION)
-        given = check_schema(document, "library-ledger", documents.__name__)["records"]
-    except UnicodeDecodeError as error:
-        raise InputError("is not JSON; give the ledger.json of a library", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    schema, remedy = documents.__name__, "give the ledger.json of a library"
+    given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)["records"]
     return Ledger(Path(folder), tuple(Record(**each) for each in given))
 
 

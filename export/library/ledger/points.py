@@ -32,6 +32,11 @@ class Provenance:
     seconds: float | None = None
     by: str | None = None
 
+    @classmethod
+    def of(cls, facts: dict[str, Any]) -> Provenance:
+        """Who found a field, by what a document says of it."""
+        return cls(facts["solver"], facts["version"], facts["seconds"], facts["by"])
+
 
 @dataclass(frozen=True, eq=False)
 class Known:

@@ -61,10 +61,7 @@ _STATUS: Final = {
     19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # no proof of anything, and no point
 }
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
-_WITHOUT_POINT: Final = {
-    Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT,
-    Status.FEASIBLE: Status.ERROR,
-}
+_WITHOUT_POINT: Final = {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.FEASIBLE: Status.ERROR}
 
 
 def _recognises(head: bytes) -> bool:
