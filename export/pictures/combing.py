@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import CrossField
+from ...models.field.jumps import stepped
 from ...models.instance.angles import double_angle
 from ...models.instance.grid import Floats
 from ...models.instance.instance import HALF
@@ -37,11 +38,7 @@ def combed(field: CrossField) -> CrossField:
 
 
 def _stepped(field: CrossField, steps: _Array) -> CrossField:
-    grid = field.instance.grid
-    p = field.p + steps[grid.second] - steps[grid.first]
-    return CrossField(
-        field.instance, field.alpha + HALF * steps, np.where(steps & 1, -field.beta, field.beta), p
-    )
+    return CrossField(field.instance, *stepped(field.instance.grid, field.alpha, field.beta, field.p, steps))
 
 
 def _parts(field: CrossField) -> _Array:

@@ -61,10 +61,7 @@ def thumbnail(instance: Instance) -> bytes:
 
 
 def field_picture(field: CrossField) -> bytes:
-    """Crosses of a small grid or streamlines of a larger one, over faint strokes.
-
-    Singularities are red (+) and blue (-) dots.
-    """
+    """Crosses or, of a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
     sheet = _Sheet(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = _crosses(sheet, field) if few else _streamlines(sheet, field)

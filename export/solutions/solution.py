@@ -126,9 +126,9 @@ def read_solution(
             file=path,
         )
     if not raw.has_point:
-        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
+        return _told(raw, problem, None, tolerance)
     try:
-        return replace(_mapped(raw, _form(raw, problem, held or {})), tolerance=tolerance)
+        return _mapped(raw, _form(raw, problem, held or {}), tolerance)
     except SolutionError as error:
         raise SolutionError(str(error), file=path) from error
 
@@ -152,22 +152,17 @@ def _carried(problem: Problem, name: str) -> Problem:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
 
-def _mapped(raw: RawSolution, form: Canonical) -> Solution:
+def _told(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
+    told = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
+    return Solution(problem, point, *told, tolerance=tolerance)
+
+
+def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
     problem = form.problem
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
-    return Solution(
-        problem,
-        point,
-        raw.status,
-        raw.message,
-        raw.reader,
-        raw.objective,
-        raw.bound,
-        rounded=moved,
-        unknown=unknown,
-    )
+    return replace(_told(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
 
 
 def _check_range(point: Floats, problem: Problem) -> None:

@@ -75,9 +75,7 @@ class Family:
 
 
 def term(tag: str, over: IndexSet, expression: sp.Expr, paper: str = "") -> Family:
-    """A term of the objective: the sum of the expression over an index set.
-    paper: by default the formulation's own section.
-    """
+    """A term of the objective: the sum over an index set. paper: by default the formulation's section."""
     return Family(tag, over, expression, paper)
 
 
@@ -149,10 +147,7 @@ class Declaration:
         return next((name for name in same if name != self.name), "")
 
     def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
-        """The formulation with the chosen options.
-
-        Raises FormulationError for an unknown or unfitting one.
-        """
+        """The formulation with the chosen options. Raises FormulationError for one that does not fit."""
         options = self._options(chosen)
         given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [

@@ -114,10 +114,6 @@ class Bound:
         """Whether its elements are the whole index set."""
         return self.family.only is None
 
-    def _reach(self, values: Any, kind: Any) -> Any:
-        index = way(self.problem.instance, kind)
-        return values[self.elements] if isinstance(index, slice) else values[index[self.elements]]
-
     def data(self, expression: sp.Expr) -> Coefficient:
         """Value of an expression free of columns: a number, or an array (count,)."""
         symbols = sorted(expression.free_symbols, key=_name)
@@ -130,7 +126,7 @@ class Bound:
         if symbol in SCALARS:
             return getattr(self.problem.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
-        return self._reach(self.problem.data[name], kind)
+        return self.problem.data[name][way(self.problem.instance, kind)][self.elements]
 
     @cached_property
     def terms(self) -> tuple[Term, ...] | None:
@@ -151,9 +147,7 @@ class Bound:
 
     @cached_property
     def scale(self) -> Floats:
-        """The largest coefficient of each element's monomials, shape (count,):
-        rounding errors are measured by it.
-        """
+        """The largest coefficient of each element's monomials, (count,): the scale of rounding errors."""
         scale = np.zeros(self.count)
         for term in self.terms or ():
             scale = np.maximum(scale, np.abs(term.coefficient))
@@ -411,10 +405,7 @@ class Problem:
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
-        """The cross field of a point, jumps rounded to the nearest integer.
-
-        Raises InstanceError for jumps beyond 32 bits.
-        """
+        """The cross field of a point, jumps rounded. Raises InstanceError for jumps beyond 32 bits."""
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -527,10 +518,7 @@ def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem
 
 
 def lifted(problem: Problem) -> Problem:
-    """The problem with every product p1 beta_i lifted to z, for formats up to quadratic.
-
-    See `Formulation.weakened`.
-    """
+    """The problem with each p1 beta_i lifted to z, for formats up to quadratic: `Formulation.weakened`."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 

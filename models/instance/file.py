@@ -97,10 +97,7 @@ def of_json(text: str) -> Instance:
 
 
 def parse_json(text: str) -> object:
-    """The document that JSON text holds, behind a byte order mark or not.
-
-    Raises InstanceError with line and column.
-    """
+    """The document that JSON text holds, with or without byte order mark, or InstanceError with the line."""
     try:
         return cast("object", json.loads(text.removeprefix("\ufeff")))
     except (ValueError, RecursionError) as error:
@@ -125,10 +122,7 @@ def read_document(
 
 
 def of_document(document: object) -> Instance:
-    """The instance that a parsed JSON document describes.
-
-    Raises InstanceError with the place in the document.
-    """
+    """The instance that a parsed JSON document describes, or InstanceError with the place in it."""
     check_version(document, FORMAT, VERSION)
     document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
@@ -200,7 +194,7 @@ def check_schema(
     quick = {
         key: document[key][:1]
         for key, are_good in (rows or {}).items()
-        if _is_list(document.get(key)) and are_good(document[key])
+        if isinstance(document.get(key), list) and are_good(document[key])
     }
     error = schema_error({**document, **quick}, schema, package)
     if error is not None:
@@ -220,10 +214,6 @@ def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | N
     validator = jsonschema.Draft202012Validator(_schema(schema, package), format_checker=lines)
     first = islice(validator.iter_errors(document), _MOST_ERRORS)
     return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, list)
 
 
 @cache
@@ -260,10 +250,7 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def unpacked(data: bytes, prefix: str = "") -> Instance:
-    """The instance in an .npz, the names of its arrays led by a prefix.
-
-    Raises InstanceError with the array's name.
-    """
+    """The instance in an .npz whose arrays' names a prefix leads, or InstanceError with the array's name."""
     return of_arrays(unpack_arrays(data, _ARCHIVE, prefix))
 
 

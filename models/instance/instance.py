@@ -249,9 +249,7 @@ class Instance:
         return self._moved(self.mask[:, ::-1], pixels, np.pi - self.theta)
 
     def transposed(self) -> Instance:
-        """The instance with rows and columns exchanged:
-        mirrored at the line from top left to bottom right.
-        """
+        """The instance mirrored at the line from top left to bottom right: rows and columns exchanged."""
         return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -HALF - self.theta)
 
     def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:

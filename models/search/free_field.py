@@ -56,10 +56,7 @@ class FreeField:
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only.
-
-    Elsewhere every label will do.
-    """
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only."""
     size, at = instance.grid.size, instance.stroke_index
     lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
     upper = -lower

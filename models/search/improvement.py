@@ -140,9 +140,7 @@ def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
 
 
 def stroke_curves(instance: Instance) -> Ints:
-    """The number of the curve of each stroke pixel:
-    neighbours of nearly the same direction belong together. Shape (s,).
-    """
+    """The curve of each stroke pixel, (s,): neighbours of nearly the same direction belong together."""
     count = len(instance.theta)
     number = np.full(instance.grid.size, -1)
     number[instance.stroke_index] = np.arange(count)

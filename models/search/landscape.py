@@ -266,9 +266,7 @@ class Landscape:
         return places + len(self.patch.pixels), added
 
     def _small(self, places: Ints, added: Floats) -> Floats:
-        """C (1 + G C)^-1 for couplings C that are added at these places:
-        H + C has the inverse G - G (...) G.
-        """
+        """C (1 + G C)^-1 for added couplings C: H + C has the inverse G - G (...) G."""
         inside = self._inverse[np.ix_(places, places)]
         small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
         return small

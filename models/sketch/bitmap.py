@@ -69,9 +69,7 @@ class Picture:
 
     @cached_property
     def stroke_width(self) -> float:
-        """Typical width of a stroke in pixels of the arrays, at least 1:
-        twice its area over the length of its two edges.
-        """
+        """Typical width of a stroke in pixels of the arrays, at least 1: twice area over length of edges."""
         down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
         # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is
         # turned.
@@ -82,7 +80,7 @@ class Picture:
         """The cover by curvature lines and by other strokes, told apart where red and others occur."""
         share = float((self.ink * self.red).sum() / self.ink.sum())
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
-            return self._cover(self.ink, frame), _no_cover(frame)
+            return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
 
     def _cover(self, ink: Ink, frame: Frame) -> Cover:
@@ -94,10 +92,6 @@ class Picture:
         )
         # A stroke straight across a grid pixel darkens a part width / pixel of it.
         return Cover(dark / min(1.0, self.stroke_width * self.reduced / frame.pixel), direction)
-
-
-def _no_cover(frame: Frame) -> Cover:
-    return Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
 
 
 def stroke_directions(ink: Ink, width: float) -> Ink:

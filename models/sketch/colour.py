@@ -18,10 +18,7 @@ REDDISH: Final = 0.4
 
 
 def ink_of(rgb: Floats) -> Floats:
-    """How much ink a colour is, 1 - min(red, green, blue), in [0, 1]; 1 for black and for pure red.
-
-    Shape (...,).
-    """
+    """Ink of a colour, 1 - min(red, green, blue) in [0, 1], shape (...,): 1 for black and for pure red."""
     ink: Floats = 1 - rgb.min(axis=-1)
     return ink
 

@@ -21,7 +21,7 @@ from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import Gauge, Instance
 from ..storage import read_bytes
-from .bitmap import Picture, read_picture, read_white
+from .bitmap import read_picture, read_white
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .outline import inside_outline, parts_with
@@ -96,10 +96,7 @@ def read_sketch(
 def instance_of(
     data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
 ) -> Instance:
-    """The instance of a sketch that is given as the bytes of a file; otherwise as read_sketch.
-
-    Raises InputError.
-    """
+    """The instance of a sketch given as the bytes of a file, as read_sketch. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower())
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
@@ -176,12 +173,13 @@ def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return _of_curves(read_svg(data))
-    picture = _PICTURE.match(data) is not None
-    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and not picture):
+    drawn = _PICTURE.match(data) is None
+    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
         return _of_curves(read_scap(data))
-    if suffix == ".svg" and not picture:
+    if suffix == ".svg" and drawn:
         return _of_curves(read_svg(data))
-    return _of_picture(read_picture(data, size))
+    picture = read_picture(data, size)
+    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
 
 
 def _of_curves(curves: Curves) -> _Sketch:
@@ -194,10 +192,6 @@ def _of_curves(curves: Curves) -> _Sketch:
     return _Sketch(bounding_box(curves.points), curves.canvas, covers)
 
 
-def _of_picture(picture: Picture) -> _Sketch:
-    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
-
-
 def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
     if max(box[2] - box[0], box[3] - box[1]) <= 0:
         raise InputError("draws no stroke: everything is one point")
@@ -207,10 +201,7 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 
 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask file, and the mask on it.
-
-    Raises InputError about the mask's file.
-    """
+    """The frame round the white part of a mask file, and the mask on it, or InputError about the file."""
     try:
         white = read_white(_bytes_of(path))
         return _mask_on_grid(white, page, size)

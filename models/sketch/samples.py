@@ -74,10 +74,7 @@ def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Ins
 
 
 def sample_svg(name: str) -> str:
-    """The SVG text of a built-in sketch.
-
-    Raises InputError for an unknown name or one that is not a drawing.
-    """
+    """The SVG text of a built-in sketch. Raises InputError for a name that is none, or no drawing."""
     if _known(name).kind == "analytic":
         drawings = ", ".join(sample.name for sample in samples() if sample.kind == "sketch")
         raise InputError(f"sample {name!r} is computed, not drawn; choose one of {drawings}")

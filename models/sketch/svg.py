@@ -39,21 +39,12 @@ from ..instance.grid import Floats
 from .colour import is_paper, is_red
 from .curves import Curves
 from .path_data import SHAPES, outline, pixels, too_many_curves
-from .style_sheet import KNOWN, StyleSheet, style_properties, style_sheet
+from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
 _GREATEST: Final = 1e9
 _SVG: Final = "http://www.w3.org/2000/svg"
 _HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
-_INHERITED: Final = (
-    "stroke",
-    "fill",
-    "visibility",
-    "color",
-    "stroke-width",
-    "stroke-opacity",
-    "fill-opacity",
-)
 _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
 
 
@@ -79,7 +70,8 @@ def read_svg(data: bytes) -> Curves:
             f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
         )
     canvas = _canvas(root)
-    walk = _Walk(style_sheet(_style_texts(root)), canvas)
+    texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
+    walk = _Walk(style_sheet(texts), canvas)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points in shapes):
         raise InputError(
@@ -110,10 +102,6 @@ def _parsed(data: bytes) -> Element:
     return root
 
 
-def _style_texts(root: Element) -> Iterator[str]:
-    return ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-
-
 @dataclass(eq=False)
 class _Walk:
     """A walk through a drawing. What depends on an element alone is found once and kept for all its uses."""
@@ -137,7 +125,7 @@ class _Walk:
             place = self._styled(stack.pop())
             tag, element = _tag(place.element), place.element
             self._count()
-            if _hidden(place.style):
+            if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES and _painted(place.style):
                 yield place.style, self._placed(place)
@@ -159,7 +147,7 @@ class _Walk:
             style = _own_style(place.element, self.sheet)
             self.own[place.element] = style, _transform(place.element, style)
         own, transform = self.own[place.element]
-        inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
+        inherited = {key: place.style[key] for key in PAINT if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
         return _Place(place.element, style, matrix, place.uses)
@@ -262,10 +250,6 @@ def _view(place: _Place, element: Element) -> Any:
     scale = min(wide / width, high / height)
     centre = Matrix.translate((wide - scale * width) / 2, (high - scale * height) / 2)
     return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
-
-
-def _hidden(style: Mapping[str, str]) -> bool:
-    return style.get("display") == "none" or _number(style.get("opacity")) == 0
 
 
 def _painted(style: Mapping[str, str]) -> bool:

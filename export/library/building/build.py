@@ -64,10 +64,7 @@ def _built(
     scheduler: str | None,
     progress: Progress,
 ) -> Library:
-    """The library, by a caller who holds its lock.
-
-    The ledger is written when all else is there: a build that is refused leaves none.
-    """
+    """The library, by a caller who holds its lock; the ledger comes last, so a refused build has none."""
     _sweep(folder)
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
@@ -98,9 +95,7 @@ def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Libr
 
 
 def unmatched(library: Library) -> list[Record]:
-    """The records of a library's ledger that count for nothing:
-    the problem of their entry has changed since.
-    """
+    """Records of a library's ledger that count for nothing: their entry's problem has changed since."""
     records = read_ledger(library.folder).records
     names = {record.entry for record in records} & set(library.document["entries"])
     problems = {name: library.entry(name)["problem_sha256"] for name in names}

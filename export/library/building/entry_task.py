@@ -174,10 +174,7 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
 
 
 def _within(told: dict[str, Any], best: Best, entry: str) -> float:
-    """A bound, cut to the objective of the best point.
-
-    Raises InputError for one that the point contradicts.
-    """
+    """A bound, cut to the best point's objective. Raises InputError where the point contradicts it."""
     bound = float(told["bound"])
     if contradicts(bound, best.objective):
         raise InputError(

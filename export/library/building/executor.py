@@ -43,9 +43,7 @@ class _Here(Executor):
 
 
 def ahead(jobs: int, scheduler: str | None) -> int:
-    """How many tasks are handed out at once:
-    what is handed out and not done is lost when a build is killed.
-    """
+    """How many tasks are handed out at once; a build that is killed loses those that are not done."""
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
 
 

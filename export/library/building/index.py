@@ -37,7 +37,8 @@ def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None
     written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
     for name, data in written.items():
         write_bytes(folder / name, data)
-    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *_of_ledger(folder)]
+    points = (record.point for record in read_ledger(folder).records if record.point is not None)
+    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *points]
     _remove_stale(folder, set(present))
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
     write_bytes(folder / SUMS, sums.encode())
@@ -113,10 +114,6 @@ def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
         for each in sidecars
         for name in (f"{each['name']}.json", *(file["name"] for file in each["files"]))
     ]
-
-
-def _of_ledger(folder: Path) -> list[str]:
-    return [record.point for record in read_ledger(folder).records if record.point is not None]
 
 
 def _remove_stale(folder: Path, present: set[str]) -> None:

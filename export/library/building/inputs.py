@@ -28,10 +28,7 @@ class Inputs:
         return Preparation(each.recipe, self._submitted(each))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
-        """The tasks of its entries, once its files are in a folder.
-
-        Raises as `preparation`, InputError for a file that is missing.
-        """
+        """The tasks of its entries. Raises as `preparation`, InputError for a file that is missing."""
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
         relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
         records = self._records(each)

@@ -26,10 +26,7 @@ _FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """In what the files of an entry differ from those that its task makes today.
-
-    Raises CrossfieldError when it makes none.
-    """
+    """Where an entry's files differ from what its task makes today. Raises CrossfieldError without a task."""
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)

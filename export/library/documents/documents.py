@@ -41,10 +41,7 @@ class Library:
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
-        """The sidecars of all entries, in order.
-
-        Raises InputError, InstanceError when one is missing or damaged.
-        """
+        """The sidecars of all entries. Raises InputError, InstanceError for a missing or damaged one."""
         return tuple(map(self.entry, self.document["entries"]))
 
     def entry(self, name: str) -> dict[str, Any]:
@@ -60,10 +57,7 @@ class Library:
 
 
 def read_library(folder: str | Path) -> Library:
-    """The library in a folder.
-
-    Raises InputError when there is none, InstanceError when its index is damaged.
-    """
+    """The library in a folder. Raises InputError without one, InstanceError when its index is damaged."""
     path = Path(folder) / INDEX
     if not path.is_file():
         raise InputError(
@@ -113,10 +107,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def problem_from(
     instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
 ) -> Problem:
-    """The problem of a formulation with options, and with jumps where they are data.
-
-    listed: [pair, jump] of those that are not zero.
-    """
+    """The problem of a formulation with options and, where they are data, jumps not zero as [pair, jump]."""
     jumps: Ints | None = None
     if FORMULATIONS[formulation].fixed:
         jumps = np.zeros(len(instance.grid.first), dtype=np.int32)

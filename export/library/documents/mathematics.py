@@ -51,10 +51,7 @@ def _model(formulation: str, options: tuple[tuple[str, Any], ...]) -> Model:
 
 
 def _lines(rows: list[str]) -> Iterator[Line]:
-    """Lines of an `aligned` environment: lead & formula && set, label.
-
-    Rows have labels, domains have none.
-    """
+    """Lines of an `aligned` environment, lead & formula && set, label; domains have no label."""
     last = ""
     for row in rows:
         lead, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))

@@ -92,10 +92,7 @@ def curvature(problem: Problem) -> dict[str, Any]:
 
 
 def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
-    """Numbers of negative, zero and positive eigenvalues of a quadratic objective's Hessian.
-
-    None when it is larger than MOST_EIGEN.
-    """
+    """Numbers of negative, zero, positive eigenvalues of a Hessian; None above MOST_EIGEN variables."""
     index, value = problem.merged_objective(2)
     used, place = np.unique(index, return_inverse=True)
     if len(used) > MOST_EIGEN:

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from ....models.field.field import CrossField
-from ....models.formulations.problem import Problem, formulate
+from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
 from ....models.search.greedy import greedy
@@ -128,8 +128,3 @@ def best_point(problem: Problem, known: Sequence[Known]) -> Best:
     """The point of least objective among those of the known fields, the first of equal ones."""
     points = [Best(problem, each, complete_point(problem, each.field)) for each in known]
     return min(points, key=lambda best: best.objective)
-
-
-def linearised(instance: Instance) -> Problem:
-    """The problem whose objective is the 1-norm energy: `milp-mccormick`."""
-    return formulate(instance, "milp-mccormick")

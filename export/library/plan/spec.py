@@ -164,10 +164,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """The specification that a document describes, whose files are found beside `path`.
-
-    Raises InputError, naming `path`.
-    """
+    """The specification of a document whose files lie beside `path`. Raises InputError, naming `path`."""
     try:
         _check_form(document)
         return _spec(document, path.parent)

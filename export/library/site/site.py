@@ -53,9 +53,7 @@ _ROLES: Final = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A field of an instance as it is shown. roles: keys of _ROLES; facts: who found it; told:
-    its singularities.
-    """
+    """A field as it is shown. roles: keys of _ROLES; facts: who found it; told: its singularities."""
 
     roles: tuple[str, ...]
     facts: dict[str, Any]

@@ -182,13 +182,9 @@ def _parse_without_options(data: bytes) -> RawSolution:
             "there is neither an Options line nor a number after the message; "
             "let the solver write the file again"
         )
-    stop = _end_of_numbers(data, start)
-    return _solution(data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
-
-
-def _end_of_numbers(data: bytes, start: int) -> int:
     found = _AFTER_NUMBERS.search(data, start)
-    return len(data) if found is None else found.start()
+    stop = len(data) if found is None else found.start()
+    return _solution(data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
 
 
 def _solution(message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:

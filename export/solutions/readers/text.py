@@ -89,13 +89,14 @@ _PROMISING: Final = frozenset(
 class RawSolution:
     """The content of one solution file.
 
-    status: the solver's claim. message: its own words on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
-    positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
-    omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or
-    None: then a positional file has a dual value for each row before the values. order: the order of the
-    values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the
-    file lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated
-    it, or empty. reader: name of the reader that understood the file.
+    status: the solver's claim. message: its own words on one line. objective: its objective value, or None.
+    names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
+    file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
+    number of constraints the file speaks of, or None: then a positional file has a dual value for each row
+    before the values. order: the order of the values where there are no names. bound: the solver's dual
+    bound, or None. of_rows: names (k,) that the file lists as those of rows, whose values are left out.
+    stamp: of the problem, where the solver repeated it, or empty. reader: name of the reader that understood
+    the file.
     """
 
     status: Status
