@@ -327,7 +327,9 @@ def proofs() -> str:
 
 
 def optimum(instance: Instance, start: CrossField) -> tuple[Finding | None, float | None]:
-    """The first prover that closes `miqp-exact`, or None; and the best dual bound of all."""
+    """The finding of the first prover that closes `miqp-exact`, or None;
+    and the best dual bound of all that were asked.
+    """
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
         write_all(instance, folder, ["miqp-exact"], ["mps"], start=start)
