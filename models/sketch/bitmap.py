@@ -140,7 +140,12 @@ def read_picture(data: bytes, size: int) -> Picture:
 def read_white(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError as read_picture."""
     image = _opened(data)
-    return np.concatenate([pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)])
+    white = np.empty(image.size[::-1], dtype=bool)
+    top = 0
+    for pixels in _bands(image, 1):
+        white[top : top + len(pixels)] = pixels.mean(axis=-1, dtype=np.float32) >= 127.5
+        top += len(pixels)
+    return white
 
 
 def _opened(data: bytes) -> Any:
