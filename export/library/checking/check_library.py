@@ -89,7 +89,7 @@ class _Verification:
                 kind = "a link" if path.is_symlink() else "a folder, or no plain file"
                 yield Finding(path.name, f"is {kind}; a library is flat and holds files alone", REMOVE)
             elif path.name.startswith(".") and path.name.endswith(".part"):
-                yield Finding(path.name, "was left by a build that was stopped", BUILD)
+                yield Finding(path.name, "was left by a build that was stopped")
             else:
                 self.present.add(path.name)
 
@@ -126,11 +126,11 @@ class _Verification:
         document = library.document
         names = document["entries"]
         if sorted(document["sha256"]) != sorted(names):
-            yield Finding(INDEX, "lists other entries than it has checksums for", BUILD)
+            yield Finding(INDEX, "lists other entries than it has checksums for")
         for name in names:
             path = self.folder / f"{name}.json"
             if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
-                yield Finding(path.name, f"has another SHA-256 than {INDEX} says", BUILD)
+                yield Finding(path.name, f"has another SHA-256 than {INDEX} says")
         try:
             spec = library.spec
             planned = [entry.name for each in plan(spec) for entry in each.entries]
@@ -139,7 +139,7 @@ class _Verification:
         else:
             self.known |= {name for sketch in spec.sketches for name in sketch.files}
             if planned != names:
-                yield Finding(INDEX, "lists other entries than its specification asks for", BUILD)
+                yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
         ours = read_bytes(Path(check_point.__file__))
@@ -148,7 +148,7 @@ class _Verification:
             and document["generator"] == generator()
             and read_bytes(self.folder / CHECKER) != ours
         ):
-            yield Finding(CHECKER, f"is not the checker of {generator()}", BUILD)
+            yield Finding(CHECKER, f"is not the checker of {generator()}")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
         """Ledger, instances, entries and library.solu."""
@@ -208,38 +208,38 @@ class _Verification:
             return  # told with the index
         for name in sorted({*made} - {CHECKER, SOLU}):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
-                yield Finding(name, "is not what follows from the specification and the sidecars", BUILD)
+                yield Finding(name, "is not what follows from the specification and the sidecars")
 
     def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger, inputs: Inputs) -> Iterator[Finding]:
         if sidecar["name"] != name:
-            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}", BUILD)
+            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}")
         lost = list(self._listed(f"{name}.json", sidecar["files"]))
         yield from lost
         try:
             if not lost:
                 yield from verify_entry(self.folder, sidecar, ledger, self._task(name, inputs))
         except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
-            yield Finding(f"{name}.json", "holds values that no entry can have", BUILD)
+            yield Finding(f"{name}.json", "holds values that no entry can have")
 
     def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
         """Every file that a document lists is there, with the size and the checksum that it says."""
         for file in files:
             name = file["name"]
             if not PLAIN.fullmatch(name):
-                yield Finding(by, f"names {name[:60]!r}, which is no plain file name", BUILD)
+                yield Finding(by, f"names {name[:60]!r}, which is no plain file name")
             elif name not in self.present:
                 yield Finding(name, f"is missing, but {by} lists it", FETCH)
             elif ((path := self.folder / name).stat().st_size, sha256_of(path)) != (
                 file["bytes"],
                 file["sha256"],
             ):
-                yield Finding(name, f"is not the file that {by} lists", BUILD)
+                yield Finding(name, f"is not the file that {by} lists")
 
     def _ledger(self, ledger: Ledger, library: Library) -> Iterator[Finding]:
         """Every record is about an entry of the library, and its field is there."""
         for record in ledger.records:
             if record.entry not in library.document["sha256"]:
-                yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library", BUILD)
+                yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library")
             if record.point is not None:
                 self.known.add(record.point)
                 try:
@@ -263,7 +263,7 @@ class _Verification:
             lost = list(self._listed(name, about["files"]))
             yield from lost
             if about["instance"] != instance:
-                yield Finding(name, "is about another instance than the sidecars of its entries", BUILD)
+                yield Finding(name, "is about another instance than the sidecars of its entries")
             elif not lost:
                 yield from self._fields(name, about)
                 yield from self._recipe(name, about, inputs)
@@ -289,12 +289,12 @@ class _Verification:
                 continue
             told = (facts["energy_2norm"], facts["energy_1norm"])
             if field is None:
-                yield Finding(facts["file"], f"is not a field of {about['name']}", BUILD)
+                yield Finding(facts["file"], f"is not a field of {about['name']}")
             elif not all(map(close, told, (field.energy(2).total, field.energy(1).total))):
-                yield Finding(name, f"tells other energies of its field {role} than it has", BUILD)
+                yield Finding(name, f"tells other energies of its field {role} than it has")
         for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
             if fields[role][energy] > min(facts[energy] for facts in fields.values()):
-                yield Finding(name, f"its field {role} is not the one of least energy", BUILD)
+                yield Finding(name, f"its field {role} is not the one of least energy")
 
     def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
         """The field in a file that belongs to an instance, None when it does not."""
@@ -311,7 +311,7 @@ class _Verification:
         for number, line in enumerate(_text(self.folder / SOLU).splitlines(), 1):
             fact = _FACT.fullmatch(line)
             if fact is None or (fact[2], fact[1]) in told or not _is_number(fact[3]):
-                yield Finding(SOLU, f"line {number} is no fact, or there twice", BUILD)
+                yield Finding(SOLU, f"line {number} is no fact, or there twice")
             else:
                 told[fact[2], fact[1]] = float(fact[3])
         expected = {}
@@ -322,7 +322,7 @@ class _Verification:
             if not proven and sidecar["bound"] is not None:
                 expected[sidecar["name"], "bestdual"] = sidecar["bound"]
         for name, tag in sorted({key for key, _ in told.items() ^ expected.items()}):
-            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says", BUILD)
+            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says")
 
 
 def _text(path: Path) -> str:

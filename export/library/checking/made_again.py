@@ -19,7 +19,7 @@ from ...formats.registry import FORMATS
 from ..building.entry_task import Entry, make_entry
 from ..building.instance_task import Files, Preparation, source_of
 from ..ledger.points import Provenance, ours
-from .finding import BUILD, Finding, close
+from .finding import Finding, close
 
 _FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
 """Keys of a sidecar that are compared elsewhere: with points, with each other, file by file."""
@@ -32,16 +32,16 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
     yield from _models(folder, sidecar, files)
     for key, value in made.items():
         if key not in _FROM_EACH_OTHER and not same(sidecar[key], value):
-            yield Finding(name, f"tells another {key} than follows from its instance and the ledger", BUILD)
+            yield Finding(name, f"tells another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
-        yield Finding(name, "tells other files, or other things of them, than are made of its problem", BUILD)
+        yield Finding(name, "tells other files, or other things of them, than are made of its problem")
     for key in ("point", "nl_point"):
         if sidecar["best"][key] != made["best"][key]:
-            yield Finding(name, f"names another {key} than is made of its problem", BUILD)
+            yield Finding(name, f"names another {key} than is made of its problem")
     if not close(sidecar["best"]["objective"], made["best"]["objective"]):
-        yield Finding(name, "does not tell the best of the known points", BUILD)
+        yield Finding(name, "does not tell the best of the known points")
     if Provenance.of(sidecar["best"]) not in _known(task):
-        yield Finding(name, "says that somebody found its point who found none of the known fields", BUILD)
+        yield Finding(name, "says that somebody found its point who found none of the known fields")
 
 
 def same(told: Any, made: Any) -> bool:
@@ -66,9 +66,9 @@ def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Find
         if file["format"] not in FORMATS:
             continue
         if name not in made:
-            yield Finding(name, f"is not what is written as .{file['format']} of this problem", BUILD)
+            yield Finding(name, f"is not what is written as .{file['format']} of this problem")
         elif _content(made[name], name) != _content(read_bytes(folder / name), name):
-            yield Finding(name, "does not hold the problem that its sidecar describes", BUILD)
+            yield Finding(name, "does not hold the problem that its sidecar describes")
 
 
 def _content(data: bytes, name: str) -> bytes | None:
@@ -105,14 +105,12 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
     }
     for key, value in expected.items():
         if not same(about[key], value):
-            yield Finding(name, f"tells another {key} than follows from the specification", BUILD)
+            yield Finding(name, f"tells another {key} than follows from the specification")
     known = {each.provenance for each in task.submitted}
     for role, facts in about["fields"].items():
         found = Provenance.of(facts)
         if found not in known and not _is_of_a_build(found):
-            yield Finding(
-                name, f"says that somebody found its field {role} of whom the ledger knows nothing", BUILD
-            )
+            yield Finding(name, f"says that somebody found its field {role} of whom the ledger knows nothing")
 
 
 def _is_of_a_build(found: Provenance) -> bool:
