@@ -64,9 +64,7 @@ def parse(data: bytes) -> RawSolution:
     starts = np.flatnonzero(np.diff(numbers[:, 0]) <= 0) + 1
     if len(starts) > 1:
         at = line_after(data, cursor.position, int(starts[1]))
-        raise fault(
-            data, at, "the numbers start again for the second time; let the solver write the file again"
-        )
+        raise fault(data, at, "the numbers start again for the second time")
     first = int(starts[0]) if len(starts) else 0
     values = numbers[first:, 1].copy()
     return RawSolution(

@@ -117,20 +117,11 @@ def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
         data, start, stop, summary.words, label=0, numeric=(1, 2 + (summary.words == 5))
     )
     if len(letters) != summary.columns:
-        raise fault(
-            data,
-            start,
-            f"{summary.columns} columns are announced, {len(letters)} lines follow; "
-            "let the solver write the file again",
-        )
+        raise fault(data, start, f"{summary.columns} columns are announced, {len(letters)} lines follow")
     wrong = (letters != b"j") | (numbers[:, 0] != np.arange(1, summary.columns + 1))
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise fault(
-            data,
-            line_after(data, start, at),
-            f"this is not the line of column {at + 1}; let the solver write the file again",
-        )
+        raise fault(data, line_after(data, start, at), f"this is not the line of column {at + 1}")
     return numbers[:, 1].copy()
 
 

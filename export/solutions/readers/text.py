@@ -249,9 +249,9 @@ def with_unix_ends(data: bytes) -> bytes:
 
 
 def fault(data: bytes, position: int, text: str) -> SolutionError:
-    """An error that names the line of a byte position in a text."""
+    """An error that names the line of a byte position in a text, and the remedy."""
     line = data.count(b"\n", 0, position) + 1
-    return SolutionError(f"line {line}: {text}")
+    return SolutionError(f"line {line}: {text}; let the solver write the file again")
 
 
 def line_after(data: bytes, position: int, count: int) -> int:
@@ -277,11 +277,7 @@ class Cursor:
         """The next line, stripped. Raises SolutionError when the text ends before the line does."""
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise fault(
-                self.data,
-                self.position,
-                f"the file is cut off where {expected} should be; let the solver write it again",
-            )
+            raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
         self.before, self.position = self.position, end + 1
         return self.data[self.before : end].strip()
 
@@ -305,7 +301,7 @@ class Cursor:
 
     def fault(self, text: str) -> SolutionError:
         """An error about the line last read."""
-        return fault(self.data, self.before, f"{text}; let the solver write the file again")
+        return fault(self.data, self.before, text)
 
 
 def shown(text: bytes) -> str:
@@ -396,7 +392,7 @@ class _Piece(NamedTuple):
         return np.frombuffer(self.data, np.uint8, self.stop - self.start, self.start)
 
     def fault(self, offset: int, text: str) -> SolutionError:
-        return fault(self.data, self.start + offset, f"{text}; let the solver write the file again")
+        return fault(self.data, self.start + offset, text)
 
 
 class _Tokens(NamedTuple):
@@ -413,9 +409,7 @@ def _pieces(data: bytes, start: int, stop: int) -> Iterator[_Piece]:
     while start < stop:
         end = data.rfind(b"\n", start, min(start + _PIECE, stop)) + 1 or data.find(b"\n", start, stop) + 1
         if not end:
-            raise fault(
-                data, start, "the file is cut off in the middle of this line; let the solver write it again"
-            )
+            raise fault(data, start, "the file is cut off in the middle of this line")
         yield _Piece(data, start, end)
         start = end
 
@@ -487,5 +481,5 @@ def _fast_floats(text: bytes) -> Floats | None:
 def _number(data: bytes, position: int, text: bytes) -> float:
     value = number_of(text)
     if value is None:
-        raise fault(data, position, f"{shown(text)} is not a number; let the solver write the file again")
+        raise fault(data, position, f"{shown(text)} is not a number")
     return value

@@ -65,7 +65,7 @@ def _check_kinds(data: bytes, start: int, stop: int) -> None:
     if data.count(_COLUMN, start - 1, stop) != lines:
         wrong = _NO_COLUMN.search(data, start - 1, stop)
         at = start if wrong is None else wrong.start() + 1
-        raise fault(data, at, "this line is of no column (C); let Xpress write the file again")
+        raise fault(data, at, "this line is of no column (C)")
 
 
 def parse_asc(data: bytes) -> RawSolution:
