@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -47,6 +49,17 @@ class CrossfieldError(Exception):
         line = shortened(message, LONGEST)
         super().__init__(f"{printable(str(file))}: {line}" if file is not None else line)
         self.file = file
+
+
+@contextmanager
+def naming(file: str | Path) -> Iterator[None]:
+    """Nothing; errors of crossfield that name no file meanwhile come out naming this one."""
+    try:
+        yield
+    except CrossfieldError as error:
+        if error.file is not None:
+            raise
+        raise type(error)(str(error), file=file) from error
 
 
 class InputError(CrossfieldError):

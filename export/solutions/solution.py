@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.errors import SolutionError, UnsupportedByFormatError
+from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
@@ -127,10 +127,8 @@ def read_solution(
         )
     if not raw.has_point:
         return _told(raw, problem, None, tolerance)
-    try:
+    with naming(path):
         return _mapped(raw, _form(raw, problem, held or {}), tolerance)
-    except SolutionError as error:
-        raise SolutionError(str(error), file=path) from error
 
 
 def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:

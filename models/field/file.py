@@ -24,7 +24,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from ..array_archive import Expected, pack_arrays, unpack_arrays
-from ..errors import InputError, InstanceError
+from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.file import (
     are_places,
@@ -80,13 +80,11 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """
     path = Path(path)
     read = _of_suffix(_READERS, path, "read")
-    try:
+    with naming(path):
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
             field.check_instance(on)
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
-    return field
+        return field
 
 
 def _of_suffix(table: dict[str, _Kind], path: Path, verb: str) -> _Kind:

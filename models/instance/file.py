@@ -13,7 +13,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from ..array_archive import Expected, pack_arrays, unpack_arrays
-from ..errors import InstanceError, shortened
+from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
 from .grid import Floats
@@ -50,10 +50,8 @@ def read_instance(path: str | Path) -> Instance:
     schema.
     """
     data = read_bytes(path, MAX_ARCHIVE)
-    try:
+    with naming(path):
         return unpacked(data) if data[:2] == b"PK" else of_json(decoded(data))
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
 
 
 def to_json(instance: Instance) -> str:
@@ -112,13 +110,13 @@ def read_document(
     Raises InputError when the file cannot be read, InstanceError, with file and place, when it breaks a rule.
     """
     try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, form, version)
-        return check_schema(document, schema, package)
+        text = read_bytes(path, MAX_BYTES).decode()
     except UnicodeDecodeError as error:
         raise InstanceError(f"is not JSON; {remedy}", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    with naming(path):
+        document = parse_json(text)
+        check_version(document, form, version)
+        return check_schema(document, schema, package)
 
 
 def of_document(document: object) -> Instance:

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools
@@ -84,11 +84,9 @@ def read_sketch(
     with_mask = None if mask is None else Path(mask)
     data = _bytes_of(path)
     try:
-        return instance_of(
-            data, size=size, mask=with_mask, gauge=gauge, name=name or name_from(path.stem), source=path.name
-        )
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
+        with naming(path):
+            name = name or name_from(path.stem)
+            return instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
 
@@ -202,11 +200,8 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
     """The frame round the white part of a mask file, and the mask on it, or InputError about the file."""
-    try:
-        white = read_white(_bytes_of(path))
-        return _mask_on_grid(white, page, size)
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
+    with naming(path):
+        return _mask_on_grid(read_white(_bytes_of(path)), page, size)
 
 
 def _mask_on_grid(

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, shortened
+from ....models.errors import InputError, naming, shortened
 from ....models.formulations.declaration import FACETS, FORMULATIONS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
@@ -165,11 +165,9 @@ def read_spec(path: str | Path) -> Spec:
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
     """The specification of a document whose files lie beside `path`. Raises InputError, naming `path`."""
-    try:
+    with naming(path):
         _check_form(document)
         return _spec(document, path.parent)
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
 
 
 def _check_form(document: dict[str, Any]) -> None:

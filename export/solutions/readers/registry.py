@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from ....models.errors import SolutionError
+from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
 from . import ampl, baron, cbc, cplex, gams_csv, gams_lst, glpk, gurobi, highs, miplib, scip, xpress
@@ -34,10 +34,8 @@ def read_raw(path: str | Path) -> RawSolution:
     it is empty, malformed or of no known kind.
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
-    try:
+    with naming(path):
         return parse_raw(_unpacked(data))
-    except SolutionError as error:
-        raise SolutionError(str(error), file=path) from error
 
 
 def parse_raw(data: bytes) -> RawSolution:
