@@ -191,9 +191,11 @@ def in_short(closed: list[list[str]], means: list[list[str]]) -> str:
     plain, *others = means
     best = min(others, key=lambda row: float(row[2]))
     return (
-        f"In {SECONDS:g} s HiGHS proves the optimum of `milp-mccormick` {said['milp-mccormick']}, and Bonmin that of `miqp-exact` {said['miqp-exact']}. "
+        f"In {SECONDS:g} s HiGHS proves the optimum of `milp-mccormick` {said['milp-mccormick']}, "
+        f"and Bonmin that of `miqp-exact` {said['miqp-exact']}. "
         f"The bound that the relaxation of the MILP gives is {relaxed:.5f} at most. "
-        f'Of the rows and bounds tried to strengthen it, "{best[0]}" does best, with a mean of {best[2]} s against {plain[2]} s as written.'
+        f'Of the rows and bounds tried to strengthen it, "{best[0]}" does best, '
+        f"with a mean of {best[2]} s against {plain[2]} s as written."
     )
 
 
@@ -203,9 +205,10 @@ PAGE: Final = """# Proofs and lower bounds
 
 {short}
 
-Random directions on two pixels in five of a full grid, {seconds:g} s each in the first table. What is proven with other solvers, and how the search compares,
-stands in [fields.md](fields.md#against-proven-optima); bounds of all entries of the instance library in its sidecars. Beyond these sizes the
-best bounds known are those of the relaxation, which say next to nothing.
+Random directions on two pixels in five of a full grid, {seconds:g} s each in the first table. What is proven
+with other solvers, and how the search compares, stands in [fields.md](fields.md#against-proven-optima);
+bounds of all entries of the instance library in its sidecars. Beyond these sizes the best bounds known are
+those of the relaxation, which say next to nothing.
 
 ## How far open solvers get
 
@@ -213,8 +216,9 @@ best bounds known are those of the relaxation, which say next to nothing.
 
 ## Strengthening the MILP
 
-On one thread, {milp_seconds:g} s each. *Odd cycles*: for every 2 x 2 block C and every odd subset F of its four pairs, the sum of p1 over F, less that over the
-others, is at most |F| - 1 + (2/pi) times the sum of s over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
+On one thread, {milp_seconds:g} s each. *Odd cycles*: for every 2 x 2 block C and every odd subset F of its
+four pairs, the sum of p1 over F, less that over the others, is at most |F| - 1 + (2/pi) times the sum of s
+over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
 Means are geometric, shifted by 1 s and by 10 nodes, runs that met the limit counted as they stand.
 
 {means}

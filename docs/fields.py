@@ -82,8 +82,9 @@ def sketches(folder: Path | None) -> list[Sketch]:
 
 @dataclass(frozen=True)
 class Row:
-    """What the methods made of a sketch. improved: energy of the greedy field, improved;
-    the search's memory in bytes, at most.
+    """What the methods made of a sketch.
+
+    improved: energy of the greedy field, improved; the search's memory in bytes, at most.
     """
 
     sketch: Sketch
@@ -138,8 +139,7 @@ COLUMNS: Final = (
 def solved(
     sketch: Sketch, size: int, method: str, seconds: float, folder: Path, *options: str
 ) -> dict[str, Any]:
-    """The facts of `crossfield solve --method`, and `memory`: the most that its processes took together,
-    in bytes.
+    """The facts of `crossfield solve --method`, and `memory`: bytes that its processes took at most.
 
     In the folder they stay, with the field, and are read from there the next time.
     """
@@ -216,9 +216,7 @@ def picture(sketch: Sketch, folder: Path) -> str:
 
 
 def windows(sketch: Sketch, folder: Path) -> list[str]:
-    """A line of the table of windows: what exact solvers reach from the improved greedy field,
-    and from that of the search.
-    """
+    """What exact solvers reach from the improved greedy field, and from that of the search."""
     size, here = min(SIZES), place(folder, sketch, min(SIZES))
     start = here / "improved.npz"
     cf.write_field(cf.improved(cf.read_field(field_in(here / "greedy"))), start)
@@ -242,9 +240,7 @@ WINDOW_COLUMNS: Final = (
 
 
 def best_angles(sketch: Sketch, folder: Path) -> list[str]:
-    """A line of the table of QPs: greedy field and angles at size 256,
-    and the angles beside those of Ipopt at size 64.
-    """
+    """Greedy field and angles at size 256, and the angles beside those of Ipopt at size 64."""
     seconds = 600.0
     facts = solved(sketch, HUGE, "greedy", seconds, place(folder, sketch, HUGE) / "greedy")
     large = cold(cf.read_field(field_in(place(folder, sketch, HUGE) / "greedy")))
@@ -279,9 +275,7 @@ QP_COLUMNS: Final = (
 
 
 def tiny() -> Iterator[Instance]:
-    """Instances that are small enough for a proof: samples as small as they come,
-    and random strokes on 5 x 5 pixels.
-    """
+    """Instances small enough for a proof: the smallest samples, and random strokes on 5 x 5 pixels."""
     for name in SAMPLES:
         for size in range(5, 12):
             try:

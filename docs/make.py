@@ -1,5 +1,4 @@
-"""Make the generated pages and pictures of docs/: `python docs/make.py` (some five minutes),
-or one of them by name.
+"""Make the generated pages and pictures of docs/, or one of them by name: `python docs/make.py`.
 
 Every number in the docs comes from here. Sizes, seeds and time limits stand in the tables themselves.
 """

@@ -1,5 +1,4 @@
-"""What programs make of files that break the rules of docs/format-rules.md: `python docs/make.py traps`,
-with the extra `oracles`.
+"""What programs make of files that break the rules of docs/format-rules.md (`docs/make.py traps`).
 
 Each file has a few lines and one trap; how a program read it shows in the optimum that it finds.
 """
@@ -23,9 +22,7 @@ SECONDS: Final = 60
 
 @dataclass(frozen=True)
 class Trap:
-    """A file: the rule that it breaks (or keeps, when `good`), what is in it, its text,
-    and the optimum that is meant.
-    """
+    """A file: the rule it breaks (or keeps, when `good`), its subject, text and intended optimum."""
 
     rule: str
     what: str

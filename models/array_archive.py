@@ -1,5 +1,4 @@
-"""Archives of arrays (.npz): packed so that equal arrays give equal bytes,
-and unpacked member by member within stated limits.
+"""Archives of arrays (.npz): equal arrays give equal bytes, and members are unpacked within limits.
 
 Of an archive only the members that are asked for are read. The header of each comes first: what it promises
 (kind, shape, bytes) is checked before the data is unpacked. No pickles.
@@ -41,17 +40,12 @@ _DAMAGE: Final = (
     zipfile.BadZipFile,
     zlib.error,
 )
-_HEADERS: Final = {
-    (1, 0): np.lib.format.read_array_header_1_0,
-    (2, 0): np.lib.format.read_array_header_2_0,
-}
+_HEADERS: Final = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a member may be: its number of dimensions, its greatest number of entries along any of them,
-    and the kinds of its numbers.
-    """
+    """What a member may be: number of dimensions, most entries along one, kinds of its numbers."""
 
     dimensions: int
     most: int

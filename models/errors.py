@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -16,9 +18,7 @@ _HEAD: Final = (
 
 
 def printable(text: str) -> str:
-    """The text on one line, safe for a terminal: control,
-    bidirectional and other invisible characters as their escapes.
-    """
+    """The text on one line, safe for a terminal: invisible characters as their escapes."""
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(map(_visible, line))
 
@@ -30,9 +30,7 @@ def _visible(character: str) -> str:
 
 
 def shortened(text: object, most: int = QUOTED) -> str:
-    """A text from a file for a message: printable,
-    with its middle left out when it is longer than `most` characters.
-    """
+    """A text from a file for a message: printable, its middle left out beyond `most` characters."""
     try:
         whole = str(text)
     except ValueError:  # a whole number of more digits than Python writes
@@ -51,6 +49,17 @@ class CrossfieldError(Exception):
         line = shortened(message, LONGEST)
         super().__init__(f"{printable(str(file))}: {line}" if file is not None else line)
         self.file = file
+
+
+@contextmanager
+def naming(file: str | Path) -> Iterator[None]:
+    """Nothing; errors of crossfield that name no file meanwhile come out naming this one."""
+    try:
+        yield
+    except CrossfieldError as error:
+        if error.file is not None:
+            raise
+        raise type(error)(str(error), file=file) from error
 
 
 class InputError(CrossfieldError):

@@ -51,8 +51,10 @@ MAX_PIXELS: Final = 80_000_000
 MAX_GRID: Final = 9999
 """Rows and columns of a grid."""
 MAX_ARCHIVE: Final = 1 << 31
-"""Bytes of an .npz, and of what is read of it unpacked: a field on a grid of 9999 x 9999 takes more,
-one that can be solved far less.
-"""
+"""Bytes of an .npz, packed and unpacked: far more than a field that can be solved takes."""
 MAX_HEAD: Final = 1 << 20
 """Bytes of the text in an .npz."""
+
+# Solutions
+MAX_SOLUTION: Final = 1 << 31
+"""Bytes of a solution file, packed and unpacked: a line for each of 40 million columns."""

@@ -56,8 +56,7 @@ def neighbour(path: Path) -> Path:
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove the temporary files and folders that killed processes of this machine have left in a folder;
-    looked for once in a process.
+    """Remove temporary files that killed processes of this machine left in a folder, once a process.
 
     Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and
     of other machines.
@@ -97,19 +96,18 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     return Path(path)
 
 
-def read_bytes(path: str | Path, most: int | None = None) -> bytes:
+def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a smaller file") -> bytes:
     """The whole content of a file.
 
-    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes.
-
-    With `most` it must be a plain file, because nothing else tells its length.
+    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes, with the remedy
+    for these. With `most` it must be a plain file, because nothing else tells its length.
     """
     try:
         status = Path(path).stat()
         if most is not None and not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
             raise InputError("cannot be read: is no plain file", file=path)
         if most is not None and status.st_size > most:
-            raise InputError(f"has {status.st_size} bytes; at most {most} are read", file=path)
+            raise InputError(f"has {status.st_size} bytes; at most {most} are read, {remedy}", file=path)
         return Path(path).read_bytes()
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {_reason(error)}", file=path) from error

@@ -27,8 +27,7 @@ _MARK: Final = "\0"  # in no template and in no text that an instance may hold
 
 
 def stream(name: str, blocks: Mapping[str, Iterable[bytes]], **context: object) -> Iterator[bytes]:
-    """The bytes of a template, each block in the place of its `{{ block.key }}`;
-    a block is read only when its place comes.
+    """The bytes of a template with each block in place of its `{{ block.key }}`, read when needed.
 
     Raises jinja2.UndefinedError for a name that the template uses and nobody gave.
     """

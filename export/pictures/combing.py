@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import CrossField
+from ...models.field.jumps import stepped
 from ...models.instance.angles import double_angle
 from ...models.instance.grid import Floats
 from ...models.instance.instance import HALF
@@ -18,8 +19,9 @@ _ITERATIONS: Final = 12  # of the inverse iteration that places the cuts
 
 
 def combed(field: CrossField) -> CrossField:
-    """The same crosses with labels that agree between neighbours: p is even but on cuts,
-    which a singularity or a hole forces.
+    """The same crosses with labels that agree between neighbours: p is even but on cuts.
+
+    Singularities and holes force cuts.
 
     Which labels are exchanged follows the signs of the lowest eigenvector of the signed Laplacian of the
     grid, with signs (-1)^p: its zero lines, the cuts, are short and smooth. In each 4-connected part the line
@@ -36,11 +38,7 @@ def combed(field: CrossField) -> CrossField:
 
 
 def _stepped(field: CrossField, steps: _Array) -> CrossField:
-    grid = field.instance.grid
-    p = field.p + steps[grid.second] - steps[grid.first]
-    return CrossField(
-        field.instance, field.alpha + HALF * steps, np.where(steps & 1, -field.beta, field.beta), p
-    )
+    return CrossField(field.instance, *stepped(field.instance.grid, field.alpha, field.beta, field.p, steps))
 
 
 def _parts(field: CrossField) -> _Array:
@@ -53,9 +51,7 @@ def _parts(field: CrossField) -> _Array:
 
 
 def _tree_steps(field: CrossField, part: _Array) -> _Array:
-    """Label steps that make every jump zero along a breadth-first tree from the
-    innermost pixel of each part.
-    """
+    """Label steps that make jumps zero along a breadth-first tree from each part's innermost pixel."""
     from scipy import ndimage
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order
@@ -80,9 +76,7 @@ def _tree_steps(field: CrossField, part: _Array) -> _Array:
 
 
 def _exchanges(field: CrossField, part: _Array) -> _Array:
-    """1 for each pixel whose labels u and v are better exchanged, else 0,
-    by inverse iteration in each part.
-    """
+    """1 for each pixel whose u and v are better exchanged, else 0, by inverse iteration."""
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu
 
@@ -116,7 +110,5 @@ def _votes(field: CrossField, part: _Array) -> _Array:
 
 
 def towards_u(field: CrossField) -> Floats:
-    """Vectors (n, 2) whose product with the double-angle vector of a line is positive
-    where it is nearer to u than to v.
-    """
+    """Vectors (n, 2) whose product with a line's double-angle vector is positive nearer to u than v."""
     return double_angle(field.alpha + field.beta) - double_angle(field.alpha + HALF - field.beta)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...models.errors import InputError
 from ...models.field.field import CrossField
-from ...models.instance.grid import Floats
+from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 from .combing import combed
 from .streamlines import Streamline, streamlines
@@ -105,7 +105,7 @@ def draw_streamlines(axes: Any, picture: Picture) -> None:
     spacing = SPACING * picture.ink / picture.unit
     lines = streamlines(picture.crosses, spacing)
     for family, colour in enumerate(FAMILIES):
-        _lines(axes, [run for line in lines for run in _runs(line, family)], colour, 0.85 * picture.ink)
+        _lines(axes, [run for line in lines for run in runs(line, family)], colour, 0.85 * picture.ink)
     _singularities(axes, picture)
 
 
@@ -166,7 +166,7 @@ def _under(axes: Any, picture: Picture) -> None:
     _border(axes, picture)
 
 
-def _runs(line: Streamline, family: int) -> list[Floats]:
+def runs(line: Streamline, family: int) -> list[Floats]:
     """The stretches of a line on which it belongs to a family; neighbouring stretches share a point."""
     limits = np.concatenate([[0], np.flatnonzero(np.diff(line.families)) + 1, [len(line.points)]])
     return [
@@ -205,16 +205,21 @@ def _strokes(axes: Any, picture: Picture, colour: str, width: float, fade: float
 
 def _border(axes: Any, picture: Picture) -> None:
     """The outline of the mask, along pixel sides."""
-    mask = np.pad(picture.instance.mask, 1)
-    row, column = np.nonzero(mask[1:, :] != mask[:-1, :])
-    level = np.stack(
-        [np.stack([column - 1.5, 0.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1
-    )
-    row, column = np.nonzero(mask[:, 1:] != mask[:, :-1])
-    upright = np.stack(
-        [np.stack([column - 0.5, 1.5 - row], axis=1), np.stack([column - 0.5, 0.5 - row], axis=1)], axis=1
-    )
-    _lines(axes, np.concatenate([level, upright]), BORDER, 0.5 * picture.ink, snap=True)
+    outline = sides(np.pad(picture.instance.mask, 1), between=False) * (1, -1) + (-0.5, 0.5)
+    _lines(axes, outline, BORDER, 0.5 * picture.ink, snap=True)
+
+
+def sides(mask: Bools, *, between: bool) -> Floats:
+    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border.
+
+    Points are (x, y) with y down; pixel [row, column] reaches from (column, row) one further.
+    """
+    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
+    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
+    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
+    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
+    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
+    return np.concatenate([level, upright]).astype(np.float64)
 
 
 def _image(axes: Any, values: Floats, **style: Any) -> Any:

@@ -143,9 +143,7 @@ class _Cells:
         return np.stack([corner.ravel() for corner in corners], axis=1)
 
     def _walks(self) -> tuple[_Array, Bools]:
-        """Jumps (cells, 4) on the counter-clockwise walk from the bottom left corner,
-        and which of them exist.
-        """
+        """Jumps (cells, 4) counter-clockwise from the bottom left corner, and which of them exist."""
         upper, right = (
             np.pad(table, 1, constant_values=-1) for table in self.field.instance.grid.pair_number
         )
@@ -164,9 +162,7 @@ class _Cells:
         return index
 
     def lift(self, z: Positions, pixel: Positions, q: Labels) -> tuple[_Array, _Array, Floats, Labels]:
-        """Cell and top left corner of each position, (alpha, beta) there in the cell's frame,
-        and q in that frame.
-        """
+        """Cell and top left corner of each position; (alpha, beta) and q there in the cell's frame."""
         top, left = np.floor(-z.imag), np.floor(z.real)
         cell = ((top + 1) * (self.width + 1) + left + 1).astype(np.int64)
         corner = (2 * (-pixel.imag - top) + pixel.real - left).astype(np.int64)
@@ -207,9 +203,7 @@ def _free(z: Positions, _q: Labels) -> Bools:
 
 @dataclass(frozen=True)
 class _Pace:
-    """How lines are traced: step and greatest length in pixels, how near they may come back to their seed,
-    what stops them.
-    """
+    """How lines are traced: step and greatest length in pixels, distance to their seed, limits."""
 
     step: float
     length: float
@@ -283,9 +277,7 @@ def _joined(ahead: _Walk, behind: _Walk) -> _Walk:
 
 @dataclass(eq=False)
 class _Heads:
-    """Where traced lines have got to: line, position, centre of the pixel, label in it, heading;
-    each of shape (m,).
-    """
+    """Where lines have got to: line, position, pixel's centre, label in it, heading; shapes (m,)."""
 
     line: Labels
     z: Positions
@@ -357,9 +349,7 @@ def _returned(way: Positions, turn: Positions, count: int, pace: _Pace) -> tuple
 def _last_points(
     cells: _Cells, heads: _Heads, target: Positions, pace: _Pace
 ) -> tuple[Labels, Positions, Labels]:
-    """Line, position and label of the farthest allowed point on each last step that was refused,
-    by bisection.
-    """
+    """Line, position and label of the farthest point of each refused last step, by bisection."""
     way, reach, size = target - heads.z, np.zeros(len(target)), 0.5
     for _ in range(_HALVINGS):
         allowed, _ = heads.at(cells, heads.z + (reach + size) * way, pace)

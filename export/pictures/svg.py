@@ -1,5 +1,4 @@
-"""Pictures of a site as SVG that follows the reader's light or dark mode: small, without text, same input,
-same bytes.
+"""Pictures of a site as SVG in the reader's light or dark mode; same input, same bytes.
 
 `draw` makes pictures with captions on white paper; a browser wants them bare, scalable and on its own
 background. Lines and colours are those of `panels`. The longer side of the mask is 320 units; pixel [row,
@@ -12,16 +11,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from ...models.field.field import CrossField
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.grid import Floats, Ints
 from ...models.instance.instance import Instance
 from .combing import combed
-from .panels import FAMILIES, NEGATIVE, POSITIVE, STROKE
+from .panels import FAMILIES, NEGATIVE, POSITIVE, STROKE, runs, sides
 from .streamlines import streamlines
 
 SIDE: Final = 320.0
@@ -63,9 +61,7 @@ def thumbnail(instance: Instance) -> bytes:
 
 
 def field_picture(field: CrossField) -> bytes:
-    """Crosses of a small grid or streamlines of a larger one, over faint strokes;
-    singularities as red (+) and blue (-) dots.
-    """
+    """Crosses or, of a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
     sheet = _Sheet(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = _crosses(sheet, field) if few else _streamlines(sheet, field)
@@ -129,11 +125,11 @@ class _Sheet:
             ["h", "v", "h"],
             np.stack([stops - starts, np.ones_like(row), starts - stops], axis=1) * self.unit,
         )
-        inside = _sides(mask, between=True) if self.unit >= _CELLS_FROM else np.zeros((0, 2, 2))
+        inside = sides(mask, between=True) if self.unit >= _CELLS_FROM else np.zeros((0, 2, 2))
         return [
             f'<path class="paper" d="{runs}"/>',
             _path("cells", self._segments(inside), 0.8),
-            _path("border", self._segments(_sides(mask, between=False)), 1.2),
+            _path("border", self._segments(sides(mask, between=False)), 1.2),
         ]
 
     def strokes(self, name: str, width: float) -> list[str]:
@@ -156,9 +152,7 @@ class _Sheet:
         )
 
     def place(self, points: Floats) -> Floats:
-        """Points (x, y) of the field's own plane, y up and centres at whole numbers,
-        as pixels of the picture.
-        """
+        """Points (x, y) of the field's plane, y up and centres at whole numbers, as picture pixels."""
         placed: Floats = points * np.array([1.0, -1.0]) + 0.5
         return placed
 
@@ -184,13 +178,11 @@ def _crosses(sheet: _Sheet, field: CrossField) -> list[str]:
 
 def _streamlines(sheet: _Sheet, field: CrossField) -> list[str]:
     """Evenly spaced lines of both families."""
-    runs: dict[int, list[Floats]] = {0: [], 1: []}
-    for line in streamlines(field, _SPACING / sheet.unit):
-        cuts = np.flatnonzero(np.diff(line.families)) + 1
-        limits = [0, *cuts.tolist(), len(line.points)]
-        for first, stop in pairwise(limits):
-            runs[int(line.families[first])].append(sheet.place(line.points[first : stop + 1]))
-    return [sheet.lines(name, runs[family], 1.3) for family, name in enumerate("uv")]
+    found = streamlines(field, _SPACING / sheet.unit)
+    return [
+        sheet.lines(name, (sheet.place(run) for line in found for run in runs(line, family)), 1.3)
+        for family, name in enumerate("uv")
+    ]
 
 
 def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
@@ -206,18 +198,6 @@ def _singularities(sheet: _Sheet, field: CrossField) -> list[str]:
             _rounded(at), found.index.tolist(), np.round(radius, 2).tolist(), strict=True
         )
     ]
-
-
-def _sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2) in pixels: between two pixels of the padded mask,
-    or between one and the outside.
-    """
-    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
-    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
-    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
-    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
-    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
-    return np.concatenate([level, upright]).astype(np.float64)
 
 
 def _moves(starts: Floats, letters: list[str], lengths: Floats) -> str:

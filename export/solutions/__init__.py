@@ -1,5 +1,5 @@
 """From a solver's answer to a field.
 
-The Solution: a point mapped back by name, its objective and violations recomputed, and what in the file they contradict.
+The Solution: a point mapped back by name, what is recomputed of it, and what in the file that contradicts.
 No reader runs a solver; the running is export/solving.
 """

@@ -1,4 +1,4 @@
-"""What a point says against the claims of the file that holds it: rows, bounds, integrality, objective and dual bound, computed again."""
+"""What a point, computed again, says against the claims of the file that holds it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .readers.text import Status
 TOLERANCE: Final = 1e-5
 """How far a point may be off before it contradicts its claims, in units of a column (radians, jumps).
 
-What solvers leave with the tolerances they come with: HiGHS, GLPK, CBC and Ipopt at most 1e-7, SCIP 1e-6 in rows and 3e-6 in the objective,
-CPLEX, Gurobi and Xpress integers that are 2e-6 from a whole number (up to 1e-5 is allowed by default), BARON rows within 1e-5.
+Solvers leave, by default: HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6 in the
+objective; CPLEX, Gurobi and Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
 """
 
 _DIGITS: Final = 1e-13
@@ -22,7 +22,7 @@ _DIGITS: Final = 1e-13
 
 
 class Claims(NamedTuple):
-    """What a file claims of its point: status, objective and dual bound, None where it is silent; and how far its integers were rounded."""
+    """What a file claims of its point, None where it is silent; and how far integers were rounded."""
 
     status: Status
     objective: float | None
@@ -33,11 +33,11 @@ class Claims(NamedTuple):
 def contradictions(
     problem: Problem, claims: Claims, objective: float, violation: Violation, tolerance: float = TOLERANCE
 ) -> tuple[str, ...]:
-    """What is wrong with the claims about a point of that objective and violation, in words; empty when they agree.
+    """What is wrong with the claims about a point, in words; empty when they agree.
 
-    A status that promises a feasible point is contradicted by a violation beyond the tolerance, `infeasible` by a point without one; an
-    objective by another one, and a dual bound by an objective below it. tolerance: of rows it is multiplied by their largest coefficient, if
-    that is above 1, for one column may be off by so much; of the objective it is a part of its size, or of 1 below that.
+    A status that promises a point is contradicted by a violation beyond the tolerance, `infeasible` by a
+    point without one; an objective by another one, and a dual bound by an objective below it. tolerance:
+    times the largest coefficient of the rows, or 1; and of the objective a part of its size, or of 1.
     """
     broken = list(_broken(problem, claims, violation, tolerance))
     if not claims.status.promises_point:

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.errors import SolutionError, UnsupportedByFormatError
+from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
@@ -28,8 +28,7 @@ ROUND: Final = 1e-5
 """An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
 
 LARGEST: Final = 1e8
-"""Largest size of a value: angles are radians and jumps a few units, so that one beyond it is none of a
-column's, and could not be squared or be a jump of 32 bits."""
+"""Largest size of a value: no column's angle or jump is beyond it, nor fits squares and 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ class Solution:
 
     @cached_property
     def contradictions(self) -> tuple[str, ...]:
-        """What the recomputed point says against the claims of the file; empty when they agree or there is no point."""
+        """What the recomputed point says against the file's claims; empty when they agree."""
         if self.objective is None or self.violation is None:
             return ()
         claims = Claims(self.claimed, self.reported, self.bound, self.rounded)
@@ -122,16 +121,14 @@ def read_solution(
     raw = read_raw(path)
     if raw.stamp and raw.stamp != problem.stamp:
         raise SolutionError(
-            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; instance, options or fixed jumps "
-            "differ, give the manifest that lies beside the solver's model",
+            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; "
+            "instance, options or fixed jumps differ, give the manifest that lies beside the solver's model",
             file=path,
         )
     if not raw.has_point:
-        return Solution(problem, None, raw.status, raw.message, raw.reader, raw.objective, raw.bound)
-    try:
-        return replace(_mapped(raw, _form(raw, problem, held or {})), tolerance=tolerance)
-    except SolutionError as error:
-        raise SolutionError(str(error), file=path) from error
+        return _told(raw, problem, None, tolerance)
+    with naming(path):
+        return _mapped(raw, _form(raw, problem, held or {}), tolerance)
 
 
 def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
@@ -153,22 +150,17 @@ def _carried(problem: Problem, name: str) -> Problem:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
 
-def _mapped(raw: RawSolution, form: Canonical) -> Solution:
+def _told(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
+    told = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
+    return Solution(problem, point, *told, tolerance=tolerance)
+
+
+def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
     problem = form.problem
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
-    return Solution(
-        problem,
-        point,
-        raw.status,
-        raw.message,
-        raw.reader,
-        raw.objective,
-        raw.bound,
-        rounded=moved,
-        unknown=unknown,
-    )
+    return replace(_told(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
 
 
 def _check_range(point: Floats, problem: Problem) -> None:
@@ -178,7 +170,8 @@ def _check_range(point: Floats, problem: Problem) -> None:
     if abs(point[at]) > LARGEST:
         name = Canonical(problem).column_names[at].decode()
         raise SolutionError(
-            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; let the solver write it again"
+            f"{name} has the value {point[at]:g}, which no column of {problem.name} can have; "
+            "let the solver write it again"
         )
 
 
@@ -194,12 +187,13 @@ def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
     problem, found = form.problem, values_for(form.column_names, raw)
     if found.missing:
         raise SolutionError(
-            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} names are unknown; "
-            "it is of another instance, formulation or option"
+            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} "
+            "names are unknown; it is of another instance, formulation or option"
         )
     if found.unknown > len(raw.values) // 2:
         raise SolutionError(
-            f"{found.unknown} of its {len(raw.values)} names are unknown; it is of another instance or formulation"
+            f"{found.unknown} of its {len(raw.values)} names are unknown; "
+            "it is of another instance or formulation"
         )
     return found.values, found.unknown
 

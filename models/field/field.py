@@ -85,6 +85,14 @@ class CrossField:
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
+    def check_instance(self, instance: Instance) -> None:
+        """Nothing, when the field is on this instance. Raises InstanceError when it is on another one."""
+        if self.instance.sha256 != instance.sha256:
+            raise InstanceError(
+                f"the field is on another instance ({self.instance.summary}), not on this one "
+                f"({instance.summary}); give a field of the same sketch, size and gauge"
+            )
+
     @cached_property
     def u(self) -> Floats:
         """Unit vectors (x, y), y up, of line u; shape (n, 2)."""

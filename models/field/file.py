@@ -1,5 +1,4 @@
-"""Field files: .npz and documented JSON, which hold field and instance,
-and .rawfield with a mesh for Directional.
+"""Field files: .npz and JSON, with field and instance, and .rawfield with a mesh for Directional.
 
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
             version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
@@ -25,7 +24,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from ..array_archive import Expected, pack_arrays, unpack_arrays
-from ..errors import InputError, InstanceError
+from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.file import (
     are_places,
@@ -76,22 +75,16 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     """The field that a .npz or .json file holds, with its instance.
 
     on: the instance that it must be on, when one is given.
-    Raises InputError for another ending, an unreadable file or another instance, and InstanceError, with file and place, for
-    a damaged one.
+    Raises InputError for another suffix and an unreadable file, and InstanceError, with file and place, for a
+    damaged one and another instance.
     """
     path = Path(path)
     read = _of_suffix(_READERS, path, "read")
-    try:
+    with naming(path):
         field = read(read_bytes(path, MAX_ARCHIVE))
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
-    if on is not None and field.instance.sha256 != on.sha256:
-        raise InputError(
-            f"is a field on another instance ({field.instance.summary}), not on this one ({on.summary}); "
-            "give a field of the same sketch, size and gauge",
-            file=path,
-        )
-    return field
+        if on is not None:
+            field.check_instance(on)
+        return field
 
 
 def _of_suffix(table: dict[str, _Kind], path: Path, verb: str) -> _Kind:
@@ -223,9 +216,7 @@ def _rawfield(field: CrossField) -> bytes:
 
 
 def _obj(instance: Instance) -> bytes:
-    """The mesh: vertices and, 1-based, the triangles (top left, bottom left, bottom right),
-    (top left, bottom right, top right).
-    """
+    """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
     places, corners = _corners(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
@@ -238,9 +229,7 @@ def _obj(instance: Instance) -> bytes:
 
 
 def _corners(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2), and the vertex at top left, top right, bottom left,
-    bottom right of each pixel (n, 4).
-    """
+    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row."""
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)

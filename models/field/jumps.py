@@ -1,5 +1,4 @@
-"""The jumps between the crosses of neighbouring pixels: the sign they give beta, the best ones,
-and steps of the label.
+"""Jumps between crosses of neighbouring pixels: signs of beta, best jumps, steps of the label.
 
 The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
 cross.
@@ -19,10 +18,7 @@ def parity_sign(p: Ints) -> Floats:
 
 
 def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
-    """The jump of least 2-norm energy for each pair, in [p_min, p_max]; ties go to the smaller jump.
-
-    Shape (m,).
-    """
+    """The jump of least 2-norm energy in [p_min, p_max] of each pair, (m,), of equal ones the smaller."""
     return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max))[0]
 
 
@@ -47,8 +43,6 @@ def _best(
 
 
 def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
-    """Angles (n,) and jumps (m,) of the same crosses after `steps` (n,) of their labels;
-    no residual changes but in sign.
-    """
+    """Angles (n,), jumps (m,) of the crosses after `steps` (n,) of labels; residuals change sign alone."""
     jumps = p - steps[grid.first] + steps[grid.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

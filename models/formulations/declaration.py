@@ -1,5 +1,4 @@
-"""What a declared formulation is made of: families of terms and rows, options,
-and the table that a declaration enters.
+"""Parts of a declared formulation: families of terms and rows, options, and their table.
 
 A formulation is a function that yields its families from top to bottom. Its parameters are its options, the
 first line of its docstring is its summary, and the decorator `formulation` states all else that is known of
@@ -76,9 +75,7 @@ class Family:
 
 
 def term(tag: str, over: IndexSet, expression: sp.Expr, paper: str = "") -> Family:
-    """A term of the objective: the sum of the expression over an index set.
-    paper: by default the formulation's own section.
-    """
+    """A term of the objective: the sum over an index set. paper: by default the formulation's section."""
     return Family(tag, over, expression, paper)
 
 
@@ -90,18 +87,14 @@ def row(
     *,
     only: tuple[str, int] | None = None,
 ) -> Family:
-    """A row for each element of an index set. number: of the equation in the paper,
-    or a tag where it has none.
-    """
+    """A row for each element of an index set; number: of the paper's equation, or a tag."""
     tag = f"c{number}" if isinstance(number, int) else number
     return Family(tag, over, relation, paper or f"({number})", only)
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a formulation leaves open: facet of z, norms of the stroke and the skew term,
-    integrality dropped.
-    """
+    """What a formulation leaves open: facet of z, norms of the two terms, integrality dropped."""
 
     facet: Facet = "hull"
     stroke_norm: int = 2
@@ -142,9 +135,7 @@ class Declaration:
 
     @cached_property
     def settable(self) -> frozenset[str]:
-        """Names of the options that may be chosen;
-        integrality can be dropped where a variable is an integer.
-        """
+        """Names of the options that may be chosen; `relax` where a variable is an integer."""
         return frozenset(inspect.signature(self.families).parameters) | (
             {"relax"} if not self.fixed else set()
         )
@@ -156,10 +147,7 @@ class Declaration:
         return next((name for name in same if name != self.name), "")
 
     def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
-        """The formulation with the chosen options.
-
-        Raises FormulationError for an unknown or unfitting one.
-        """
+        """The formulation with the chosen options. Raises FormulationError for one that does not fit."""
         options = self._options(chosen)
         given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [
@@ -235,16 +223,15 @@ class Formulation:
 
     @property
     def weakened(self) -> bool:
-        """Whether lifting made it a relaxation of itself: z between its facets is p1 beta_i at p1 = 0 and 1
-        alone, and here p1 may lie between.
+        """Whether lifting made it a relaxation of itself.
+
+        Between its facets z is p1 beta_i at p1 = 0 and 1 alone, and here p1 may lie between.
         """
         return bool(self.lifted) and self.options.relax
 
     @property
     def convex(self) -> bool:
-        """Whether its continuous relaxation is known to be convex: linear rows,
-        and an objective that is a sum of squares as written.
-        """
+        """Whether its continuous relaxation is convex as written: linear rows, a sum of squares."""
         return _is_convex(self.objective, self.rows, self.fixed)
 
 
@@ -289,9 +276,7 @@ FORMULATIONS: Final[Mapping[str, Declaration]] = MappingProxyType(_TABLE)
 def formulation(
     name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
 ) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
-    """A decorator that enters a function which yields families into the table,
-    as the `Declaration` of that name.
-    """
+    """A decorator: enters a function that yields families into the table, as its `Declaration`."""
 
     def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
         assert name not in _TABLE, f"there are two formulations {name}"

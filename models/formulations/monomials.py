@@ -16,9 +16,7 @@ Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
 """Symbols, each as often as its power says, and coefficient, free of these symbols."""
 
 _NOISE: Final = 1e-12
-"""Relative to its element's largest coefficient: what cancels up to rounding,
-or comes from an angle of 1e-16, is noise.
-"""
+"""Rounding noise, relative to an element's largest coefficient: cancelled terms, angles of 1e-16."""
 
 
 @cache
@@ -34,11 +32,11 @@ def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | N
     except sp.PolynomialError:
         return None
     terms = sorted(terms, key=lambda term: (sum(term[0]), tuple(-power for power in term[0])))
-    return tuple((_factors(variables, powers), value) for powers, value in terms if value != 0)
-
-
-def _factors(variables: tuple[sp.Symbol, ...], powers: tuple[int, ...]) -> tuple[sp.Symbol, ...]:
-    return tuple(symbol for symbol, power in zip(variables, powers, strict=True) for _ in range(power))
+    return tuple(
+        (tuple(s for s, power in zip(variables, powers, strict=True) for _ in range(power)), value)
+        for powers, value in terms
+        if value != 0
+    )
 
 
 def ordered(factors: tuple[Ints, ...]) -> Ints:
@@ -49,9 +47,7 @@ def ordered(factors: tuple[Ints, ...]) -> Ints:
 
 
 def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
-    """Sum of coefficients over equal rows of `index`, sorted by row; noise is left out.
-    columns: more than any index.
-    """
+    """Sums over equal rows of `index`, sorted, without noise. columns: more than any index."""
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ..errors import FormulationError, InstanceError
+from ..errors import FormulationError
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance, whole_numbers
@@ -53,9 +53,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A monomial of a family: its symbols, each as often as its power says,
-    and its coefficient (a number or one per element).
-    """
+    """A monomial of a family: symbols, each as often as its power, and coefficient (one or (count,))."""
 
     family: PlacedFamily
     symbols: tuple[sp.Symbol, ...]
@@ -63,9 +61,7 @@ class Term:
 
     @property
     def factors(self) -> tuple[Ints, ...]:
-        """Columns of its symbols, one array (count,) each; made anew at every call,
-        so that none stays in memory.
-        """
+        """Columns of its symbols, one array (count,) each; made anew at every call to spare memory."""
         return tuple(map(self.family.columns, self.symbols))
 
     @property
@@ -107,9 +103,7 @@ class PlacedFamily:
         return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
-        """Place in its block of the symbol at each element, shape (count,);
-        None where it is the element's own place.
-        """
+        """The symbol's place in its block at each element, (count,); None: the element's own."""
         index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
             return None if self.everywhere else self.elements
@@ -119,10 +113,6 @@ class PlacedFamily:
     def everywhere(self) -> bool:
         """Whether its elements are the whole index set."""
         return self.family.only is None
-
-    def _reach(self, values: Any, kind: Any) -> Any:
-        index = way(self.problem.instance, kind)
-        return values[self.elements] if isinstance(index, slice) else values[index[self.elements]]
 
     def data(self, expression: sp.Expr) -> Coefficient:
         """Value of an expression free of columns: a number, or an array (count,)."""
@@ -136,7 +126,7 @@ class PlacedFamily:
         if symbol in SCALARS:
             return getattr(self.problem.instance, SCALARS[symbol])
         name, kind = SLOTS[self.family.over][symbol]
-        return self._reach(self.problem.data[name], kind)
+        return self.problem.data[name][way(self.problem.instance, kind)][self.elements]
 
     @cached_property
     def terms(self) -> tuple[Term, ...] | None:
@@ -157,9 +147,7 @@ class PlacedFamily:
 
     @cached_property
     def scale(self) -> Floats:
-        """The largest coefficient of each element's monomials, shape (count,):
-        rounding errors are measured by it.
-        """
+        """The largest coefficient of each element's monomials, (count,): the scale of rounding errors."""
         scale = np.zeros(self.count)
         for term in self.terms or ():
             scale = np.maximum(scale, np.abs(term.coefficient))
@@ -172,9 +160,7 @@ class PlacedFamily:
         return np.broadcast_to(0.0 - constant, (self.count,))
 
     def values(self, point: Floats) -> Floats:
-        """The expression (of a row: left minus right side) at a point, one value per element,
-        shape (count,).
-        """
+        """The expression (of a row: left minus right side) at a point, shape (count,)."""
         symbols = sorted(self.family.body.free_symbols, key=_name)
         evaluate = numeric(symbols, self.family.body)
         given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
@@ -212,9 +198,7 @@ class Problem:
     free: Bools | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data,
-        and that what is fixed is of this instance.
-        """
+        """Check that jumps are there exactly where they are data, and what is fixed fits the instance."""
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -229,17 +213,10 @@ class Problem:
                 )
             object.__setattr__(self, "jumps", jumps)
         if self.pinned is not None:
-            self._check_instance_of(self.pinned)
+            self.pinned.check_instance(self.instance)
         if self.free is not None and self.free.shape != (self.instance.grid.size,):
             raise FormulationError(
                 f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
-            )
-
-    def _check_instance_of(self, field: CrossField) -> None:
-        if field.instance.sha256 != self.instance.sha256:
-            raise InstanceError(
-                f"the field is on instance {field.instance.name!r}, not on {self.instance.name!r}, "
-                "or under another gauge"
             )
 
     @property
@@ -289,9 +266,7 @@ class Problem:
         return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
 
     def _fixed(self, variable: Variable) -> Bools | None:
-        """True for the columns of a variable that are fixed at the pinned field, if there is one;
-        None when none of them can be.
-        """
+        """Which columns of a variable are fixed at the pinned field; None when none can be."""
         count = elements(self.instance, variable.over)
         if self.free is None:
             return np.ones(count, bool) if variable.integer else None
@@ -357,9 +332,7 @@ class Problem:
 
     @property
     def problem_class(self) -> str:
-        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP,
-        by what is in it (any QP and MIQP may be non-convex: see `convex`).
-        """
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP (whether a QP is convex says `convex`)."""
         integer = "MI" if self.integer.any() else ""
         if max(self.objective_degree, self.row_degree) > 2:
             return f"{integer}NLP"
@@ -427,15 +400,12 @@ class Problem:
 
         Raises InstanceError when the field is on another instance.
         """
-        self._check_instance_of(field)
+        field.check_instance(self.instance)
         given = _angles_and_jumps(field)
         return np.concatenate([_at_field(self, name, given) for name in self.blocks])
 
     def field(self, point: Floats) -> CrossField:
-        """The cross field of a point, jumps rounded to the nearest integer.
-
-        Raises InstanceError for jumps beyond 32 bits.
-        """
+        """The cross field of a point, jumps rounded. Raises InstanceError for jumps beyond 32 bits."""
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
@@ -477,9 +447,7 @@ def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
 
 
 def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
-    """The block of columns `name` where angles and jumps have the given values,
-    from the variable's own definition.
-    """
+    """The block of columns `name` where angles and jumps are given, by the variable's definition."""
     if name in given:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
@@ -497,9 +465,7 @@ def _excess(sense: str, values: Floats) -> Floats:
 
 
 def _costs(terms: list[Term], block: Block) -> tuple[Ints, Floats]:
-    """As `merged`, for the single columns of a block: one number each,
-    to which the terms are added in turn.
-    """
+    """As `merged`, for single columns of a block: one number each, terms added in turn."""
     if not terms:
         return np.zeros((0, 1), np.int32), np.zeros(0)
     total, scale = np.zeros(block.count), np.zeros(block.count)
@@ -543,8 +509,7 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
 
 
 def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem:
-    """The same problem in which only the angles of some pixels and the jumps to and between them are free;
-    all else as in a field.
+    """The problem in which only some pixels' angles and the jumps to and between them are free.
 
     free: those pixels, shape (n,). Raises InstanceError when the field is on another instance,
     FormulationError for another shape.
@@ -553,9 +518,7 @@ def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem
 
 
 def lifted(problem: Problem) -> Problem:
-    """The problem with every product p1 beta_i lifted to z, for formats that hold nothing beyond quadratic;
-    see `Formulation.weakened`.
-    """
+    """The problem with each p1 beta_i lifted to z, for formats up to quadratic: `Formulation.weakened`."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 

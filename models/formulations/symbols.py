@@ -162,9 +162,7 @@ def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., An
 
 @cache
 def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
-    """The declarations are few and fixed, so each is compiled once however many
-    problems and points there are.
-    """
+    """The expression compiled; declarations are few and fixed, so each is compiled once."""
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
 
 

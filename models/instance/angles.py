@@ -1,6 +1,4 @@
-"""Line directions: angles modulo pi, counter-clockwise from +x with y up,
-averaged by the double angle only.
-"""
+"""Line directions: angles modulo pi, counter-clockwise, y up, averaged by the double angle only."""
 
 from __future__ import annotations
 

@@ -52,9 +52,7 @@ def length(x: Floats, y: Floats) -> Floats:
 
 
 def turned(vectors: Floats, matrix: Floats) -> Floats:
-    """The vectors (..., k) times the matrix (c, k), shape (..., c):
-    the sum for each entry from left to right.
-    """
+    """The vectors (..., k) times the matrix (c, k), shape (..., c), summed from left to right."""
     total = vectors[..., :1] * matrix[:, 0]
     for k in range(1, matrix.shape[1]):
         total = total + vectors[..., k : k + 1] * matrix[:, k]

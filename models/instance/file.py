@@ -13,7 +13,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from ..array_archive import Expected, pack_arrays, unpack_arrays
-from ..errors import InstanceError, shortened
+from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
 from .grid import Floats
@@ -50,10 +50,8 @@ def read_instance(path: str | Path) -> Instance:
     schema.
     """
     data = read_bytes(path, MAX_ARCHIVE)
-    try:
+    with naming(path):
         return unpacked(data) if data[:2] == b"PK" else of_json(decoded(data))
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
 
 
 def to_json(instance: Instance) -> str:
@@ -97,21 +95,32 @@ def of_json(text: str) -> Instance:
 
 
 def parse_json(text: str) -> object:
-    """The document that JSON text holds, behind a byte order mark or not.
-
-    Raises InstanceError with line and column.
-    """
+    """The document that JSON text holds, with or without byte order mark, or InstanceError with the line."""
     try:
         return cast("object", json.loads(text.removeprefix("\ufeff")))
     except (ValueError, RecursionError) as error:
         raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
 
 
-def of_document(document: object) -> Instance:
-    """The instance that a parsed JSON document describes.
+def read_document(
+    path: Path, form: str, version: int, schema: str, package: str, *, remedy: str
+) -> dict[str, Any]:
+    """The JSON document in a file of at most MAX_BYTES, of a format and version, that obeys a schema.
 
-    Raises InstanceError with the place in the document.
+    Raises InputError when the file cannot be read, InstanceError, with file and place, when it breaks a rule.
     """
+    try:
+        text = read_bytes(path, MAX_BYTES).decode()
+    except UnicodeDecodeError as error:
+        raise InstanceError(f"is not JSON; {remedy}", file=path) from error
+    with naming(path):
+        document = parse_json(text)
+        check_version(document, form, version)
+        return check_schema(document, schema, package)
+
+
+def of_document(document: object) -> Instance:
+    """The instance that a parsed JSON document describes, or InstanceError with the place in it."""
     check_version(document, FORMAT, VERSION)
     document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
@@ -172,10 +181,7 @@ def number_table(rows: list[Any], width: int) -> Floats | None:
 
 
 def check_schema(
-    document: object,
-    schema: str,
-    package: str,
-    rows: Mapping[str, Callable[[list[Any]], bool]] | None = None,
+    document: object, schema: str, package: str, rows: Mapping[str, Callable[[list[Any]], bool]] | None = None
 ) -> dict[str, Any]:
     """The document, which obeys the `<schema>.schema.json` that ships with a package.
 
@@ -186,7 +192,7 @@ def check_schema(
     quick = {
         key: document[key][:1]
         for key, are_good in (rows or {}).items()
-        if _is_list(document.get(key)) and are_good(document[key])
+        if isinstance(document.get(key), list) and are_good(document[key])
     }
     error = schema_error({**document, **quick}, schema, package)
     if error is not None:
@@ -206,10 +212,6 @@ def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | N
     validator = jsonschema.Draft202012Validator(_schema(schema, package), format_checker=lines)
     first = islice(validator.iter_errors(document), _MOST_ERRORS)
     return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, list)
 
 
 @cache
@@ -246,10 +248,7 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def unpacked(data: bytes, prefix: str = "") -> Instance:
-    """The instance in an .npz, the names of its arrays led by a prefix.
-
-    Raises InstanceError with the array's name.
-    """
+    """The instance in an .npz whose arrays' names a prefix leads, or InstanceError with the array's name."""
     return of_arrays(unpack_arrays(data, _ARCHIVE, prefix))
 
 

@@ -84,9 +84,7 @@ class Grid:
 
     @cached_property
     def pair_number(self) -> tuple[Ints, Ints]:
-        """Two arrays [height, width]: number of the pair of a pixel with its upper,
-        with its right neighbour, or -1.
-        """
+        """Two arrays [height, width]: number of a pixel's pair with its upper, its right neighbour, or -1."""
         upper = np.full(self.mask.shape, -1, dtype=np.int32)
         right = upper.copy()
         index = np.arange(len(self.first), dtype=np.int32)

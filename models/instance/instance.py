@@ -30,9 +30,7 @@ MOST_WEIGHT: Final = 1e6
 """Greatest weight of a term of the energy."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-"""Instance names: lower case, digits and underscores, at most 32 characters,
-as instance libraries ask for.
-"""
+"""Instance names, as instance libraries ask for: at most 32 lower-case letters, digits and `_`."""
 
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 
@@ -251,9 +249,7 @@ class Instance:
         return self._moved(self.mask[:, ::-1], pixels, np.pi - self.theta)
 
     def transposed(self) -> Instance:
-        """The instance with rows and columns exchanged:
-        mirrored at the line from top left to bottom right.
-        """
+        """The instance mirrored at the line from top left to bottom right: rows and columns exchanged."""
         return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -HALF - self.theta)
 
     def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:

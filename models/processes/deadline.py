@@ -23,8 +23,7 @@ def never() -> bool:
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment of a clock in seconds, `inf` for none;
-    that of `time.monotonic` is the same in all processes of a machine.
+    """A moment of `time.monotonic`, the same in all processes of a machine; `inf` for none.
 
     That holds on Linux and is promised nowhere. So a pickled deadline says how much is left when it is sent,
     and counts from its arrival.

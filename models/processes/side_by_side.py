@@ -1,5 +1,4 @@
-"""The same work on several tasks at once, in processes that Ctrl-C does not reach
-and that never outlive this one.
+"""The same work on several tasks in processes that Ctrl-C does not reach and never outlive this one.
 
 The pools of the standard library read the user's program again in every process, and they and joblib leave
 processes behind. These here are programs of the package: they get tasks through a pipe, and end when it
@@ -25,9 +24,7 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 MOST: Final = max(16, 2 * (os.cpu_count() or 1))
-"""Threads or processes that may be asked for: more than twice the cores make nothing quicker,
-and each takes its memory.
-"""
+"""Most threads or processes: beyond twice the cores nothing is quicker, and each takes memory."""
 
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -50,8 +47,7 @@ def cores() -> int:
 
 @contextmanager
 def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
-    """A function that does the work on each of some tasks, in that many processes,
-    and gives what was found in their order.
+    """A function that does the work on tasks in that many processes; results in the tasks' order.
 
     work: a function of a module, not of the user's program. A process starts when there is a task for it; all
     have ended afterwards. Raises what the work raises, InputError for a number of jobs that cannot be, and

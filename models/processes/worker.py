@@ -11,9 +11,7 @@ from .side_by_side import Raised, leave_with_parent, send
 
 
 def main() -> None:
-    """Do tasks from standard input, one after the other, and answer on standard output,
-    until the input closes.
-    """
+    """Do tasks from standard input one by one, answering on standard output, until it closes."""
     tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what a library prints is no answer

@@ -57,8 +57,9 @@ def least_in_box(
     tolerance: float = _SLOPE,
     over: Over = never,
 ) -> Floats:
-    """The point of least energy with lower <= x <= upper, searched from x; shapes (2n,),
-    bounds may be infinite.
+    """The point of least energy with lower <= x <= upper, shapes (2n,), searched from x.
+
+    Bounds may be infinite.
 
     Rounding, 500 steps, or time that is over end the search too: then the best point so far comes back.
     tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
@@ -87,8 +88,6 @@ def least_in_box(
 
 
 def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
-    """Whether a step lowers the energy by a fair share of what the slope promises;
-    a step of nothing does not.
-    """
+    """Whether a step, not of nothing, lowers the energy by a fair share of what the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised

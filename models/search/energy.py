@@ -53,9 +53,7 @@ class Quadratic:
 
 
 def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadratic:
-    """The 2-norm energy as a function of the angles,
-    summed over the pairs whose jump is known (None: all).
-    """
+    """The 2-norm energy as a function of the angles, over the pairs of known jump (None: all)."""
     grid, n, at = instance.grid, instance.grid.size, instance.stroke_index
     pairs = slice(None) if known is None else known
     i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
@@ -113,9 +111,7 @@ class Solver:
         self._inverse: Solve | None = None
 
     def step(self, matrix: Any, right: Floats, tolerance: float, free: Bools | None = None) -> Floats:
-        """The s with Hs = right on the free unknowns and s = 0 on the others,
-        to a relative residual of `tolerance`.
-        """
+        """The s with Hs = right on the free unknowns, 0 on others, to a residual of `tolerance`."""
         if free is not None and not free.all():
             only = sparse.diags_array(free.astype(np.float64))
             right, matrix = only @ right, only @ matrix @ only + sparse.diags_array(1.0 - free)
@@ -127,9 +123,7 @@ class Solver:
         return self.attempt(matrix, right, tolerance)[0]
 
     def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:
-        """The step by few conjugate gradients with the present factorisation,
-        and whether they were enough.
-        """
+        """The step by few conjugate gradients with the factorisation at hand; whether they sufficed."""
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
         pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
         step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)

@@ -1,6 +1,4 @@
-"""A piece of a field with the ring of pixels round it: small enough for an exact solver,
-and put back when it is solved.
-"""
+"""A piece of a field with the ring of pixels round it, for an exact solver; put back when solved."""
 
 from __future__ import annotations
 

@@ -41,21 +41,22 @@ class FreeField:
         self.alpha, self.beta = np.split(value, 2)
 
     @property
+    def field(self) -> CrossField:
+        """The same angles and jumps as a field."""
+        return CrossField(self.instance, self.alpha, self.beta, self.p)
+
+    @property
     def energy(self) -> float:
         """The 2-norm energy."""
-        return CrossField(self.instance, self.alpha, self.beta, self.p).energy().total
+        return self.field.energy().total
 
     def bounded(self, over: Over = never) -> CrossField:
-        """The field of least 2-norm energy for these crosses' jumps, inside the windows of alpha,
-        beta and p.
-        """
+        """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
         return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only,
-    for elsewhere every label will do.
-    """
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only."""
     size, at = instance.grid.size, instance.stroke_index
     lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
     upper = -lower

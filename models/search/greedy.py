@@ -32,8 +32,7 @@ _LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the sm
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
-    """The field of the greedy strategy: least 2-norm energy for its jumps, inside the windows of alpha,
-    beta and p.
+    """The field of the greedy strategy: least 2-norm energy for its jumps, within all bounds.
 
     The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
     all angles are solved for again (docs/mathematics.md, 10). The windows are kept by the last solve alone,
@@ -70,9 +69,7 @@ def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over
 
 
 def _settle(state: FreeField, known: Bools, solver: Solver | None) -> None:
-    """Bring the angles up to date with the known jumps, well enough to rank the others; without a solver,
-    locally.
-    """
+    """Bring angles up to date, enough to rank the unknown jumps; locally without a solver."""
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if solver is None:

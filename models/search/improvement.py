@@ -1,5 +1,4 @@
-"""Local improvement of a field: angles and jumps in turn,
-and whole curves that change to the other family of lines.
+"""Local improvement of a field: angles and jumps in turn, and curves that change their family.
 
 A stroke is carried by line u. Which of two crossing curves is u where they meet is a choice of the jumps
 between them, and where curves cross at less than 45 degrees the cheapest jump takes both for one family. So
@@ -33,8 +32,7 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """The greedy field, improved as far as time allows: what solvers and searches start from,
-    and whose jumps `qp-fixed` has by default.
+    """The greedy field, improved as time allows: where searches start, and `qp-fixed`'s jumps.
 
     Deterministic where time does not cut it off.
     """
@@ -42,8 +40,9 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 
 
 def improved(field: CrossField, over: Over = never) -> CrossField:
-    """A field of no more 2-norm energy, from which neither best jumps, nor best angles,
-    nor the turn of a curve lead further down.
+    """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
+
+    Its 2-norm energy is at most that of the one given.
 
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
     turning seldom pays.
@@ -60,9 +59,7 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
 
 
 def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
-    """Solve within the bounds and choose jumps again, in turn,
-    as long as the energy falls and until the time is over.
-    """
+    """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts."""
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
@@ -97,12 +94,10 @@ def _swap_lines(state: FreeField) -> None:
 
 
 def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
-    """Let curves change to the other family of lines where that lowers the energy,
-    those first that miss most.
-    """
+    """Let curves change their family of lines where that lowers the energy, the worst first."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
-    miss = CrossField(instance, state.alpha, state.beta, state.p).residual_r ** 2 * instance.w
+    miss = state.field.residual_r**2 * instance.w
     worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
     of_pixel = np.append(curve, -1)[nearest_strokes(instance)]
     for number in worst:
@@ -145,9 +140,7 @@ def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
 
 
 def stroke_curves(instance: Instance) -> Ints:
-    """The number of the curve of each stroke pixel:
-    neighbours of nearly the same direction belong together. Shape (s,).
-    """
+    """The curve of each stroke pixel, (s,): neighbours of nearly the same direction belong together."""
     count = len(instance.theta)
     number = np.full(instance.grid.size, -1)
     number[instance.stroke_index] = np.arange(count)

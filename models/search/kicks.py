@@ -1,5 +1,4 @@
-"""Random changes of several jumps at once, by which a search leaves a valley that changes of
-single jumps do not lead out of.
+"""Random changes of several jumps at once, out of a valley that single changes do not leave.
 
 - `shift`: along a path of 2 x 2 blocks, which moves the turn at its start to its end: a singularity moves,
   two opposite ones meet, or a pair of them is made;
@@ -95,10 +94,7 @@ class Kicks:
 
 
 def _blocks_of_pairs(blocks: Ints, pairs: int) -> Ints:
-    """The blocks of which a pair is the bottom or right side [0], and the top or left side [1]; -1: none.
-
-    Shape (pairs, 2).
-    """
+    """Blocks of which a pair is bottom or right side [0], top or left side [1], or -1; (pairs, 2)."""
     beside = np.full((pairs, 2), -1)
     for side in range(4):
         beside[blocks[:, side], 0 if side < 2 else 1] = np.arange(len(blocks))

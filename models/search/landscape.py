@@ -1,5 +1,4 @@
-"""The least energy as a function of the jumps: what every single jump would change, at once,
-and any change of jumps in no time.
+"""The least energy as a function of the jumps, and what each single change of one would do.
 
 For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
 (models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
@@ -49,9 +48,7 @@ _DRIFT: Final = (
 
 
 class Point(NamedTuple):
-    """Angles (alpha, beta) of the whole field, shape (2n,), jumps (m,),
-    and the 2-norm energy that they have by definition.
-    """
+    """Angles (alpha, beta) (2n,) and jumps (m,) of the whole field; the 2-norm energy they have."""
 
     energy: float
     x: Floats
@@ -180,9 +177,7 @@ class Landscape:
         return gains
 
     def change(self, pairs: Ints, steps: Ints) -> None:
-        """Add steps, shape (c,), to the jumps of the patch's pairs with those local numbers,
-        each at most once.
-        """
+        """Add steps (c,) to the jumps of the patch's pairs with those local numbers, each at most once."""
         try:
             self._follow(pairs, steps)
         except np.linalg.LinAlgError:
@@ -230,9 +225,7 @@ class Landscape:
         self._fresh = True
 
     def _settle(self) -> None:
-        """Keep the bounds, and solve anew where the updates have lost the energy;
-        then bounds are kept once more.
-        """
+        """Keep the bounds; solve anew where the updates have lost the energy, then bounds once more."""
         for _ in range(2):
             with suppress(np.linalg.LinAlgError):
                 self._keep_bounds()
@@ -273,9 +266,7 @@ class Landscape:
         return places + len(self.patch.pixels), added
 
     def _small(self, places: Ints, added: Floats) -> Floats:
-        """C (1 + G C)^-1 for couplings C that are added at these places:
-        H + C has the inverse G - G (...) G.
-        """
+        """C (1 + G C)^-1 for added couplings C: H + C has the inverse G - G (...) G."""
         inside = self._inverse[np.ix_(places, places)]
         small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
         return small

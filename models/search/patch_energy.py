@@ -1,6 +1,4 @@
-"""The energy of a field as a function of the angles in a patch, by its definition: squares of residuals,
-which no update can spoil.
-"""
+"""The energy by its definition as a function of the angles in a patch: no update can spoil it."""
 
 from __future__ import annotations
 
@@ -18,9 +16,7 @@ if TYPE_CHECKING:
 
 
 class PatchEnergy:
-    """The 2-norm energy of the whole field where only the angles in a patch and the
-    jumps between its pixels change.
-    """
+    """The field's 2-norm energy where only angles and jumps within a patch change."""
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
         """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the patch stay."""
@@ -55,9 +51,7 @@ class PatchEnergy:
 
 
 def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
-    """The part of the energy that is none of the patch's: of other pixels,
-    and without these pairs and strokes.
-    """
+    """The energy that is none of the patch's: of other pixels, without these pairs and strokes."""
     instance = field.instance
     pair = field.residual_a**2 + field.residual_b**2
     stroke, skew = instance.w * field.residual_r**2, field.beta[~free] ** 2

@@ -54,8 +54,7 @@ _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found: the field, the whole rounds it took, (round, energy) of every improvement,
-    and how it ended.
+    """What a search found: field, whole rounds, (round, energy) of every improvement, its end.
 
     ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
     """
@@ -76,8 +75,9 @@ def search(
     start: CrossField | None = None,
     progress: RoundProgress = lambda *_: None,
 ) -> Search:
-    """The field of least 2-norm energy that was found, never above `start` nor, unless time cuts it off,
-    the improved greedy field.
+    """The field of least 2-norm energy found, never above `start`.
+
+    Nor is it above the improved greedy field, unless time cuts that off.
 
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
@@ -85,11 +85,13 @@ def search(
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
     jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy and
     power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so far. Raises
-    InputError for a limit that is not positive, and for too many jobs.
+    InputError for a limit that is not positive and too many jobs, InstanceError for a start on another one.
     """
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     checked(jobs)
+    if start is not None:
+        start.check_instance(instance)
     with interruptible() as interrupted:
         limits = _Limits(
             Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
@@ -142,9 +144,7 @@ class _Limits:
 def _from_coarse(
     instance: Instance, seed: int, limits: _Limits, explorers: Explorers
 ) -> Iterator[CrossField]:
-    """Fields that were found on the grid of half the resolution, brought to this one,
-    the best of there first.
-    """
+    """Fields found on the grid of half the resolution, brought to this one, the best there first."""
     coarse = halved(instance)
     if coarse is None:
         return
@@ -161,9 +161,7 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of the greedy field, of what the user gives, and, if there is time, of the power field,
-    all improved while there is.
-    """
+    """The best of greedy field, given field and, in time, power field, each improved in time."""
     fields = [first_field(instance, limits.over)]
     if given is not None:
         fields.append(improved(given, limits.over))
@@ -244,8 +242,7 @@ class _Hunt:
         if not self.large:
             yield from [self._reached] * _PATCHES
             return
-        field = CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
-        high = field.pixel_energy + 1e-12
+        high = self._state.field.pixel_energy + 1e-12
         for number in range(_PATCHES):
             centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
@@ -258,9 +255,7 @@ class _Hunt:
         for task, better in sorted(lower, key=lambda pair: pair[1].energy):
             self._adopt(task, better, over)
         if any(found) and self._unsettled:
-            self._latest.append(
-                CrossField(self._instance, self._state.alpha, self._state.beta, self._state.p)
-            )
+            self._latest.append(self._state.field)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:

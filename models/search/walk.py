@@ -1,5 +1,4 @@
-"""A walk over the jumps of one patch of the grid: kick, follow the valley down,
-keep what is lower (iterated local search).
+"""Iterated local search over the jumps of a patch: kick, go down the valley, keep what is lower.
 
 After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump
 at every step, uphill too, but none of a jump that has just changed, unless that is the lowest point so far.
@@ -49,8 +48,7 @@ class Task:
 
 
 class Explored(NamedTuple):
-    """The point of least energy, outside the patch that of the task,
-    or None when none was lower by more than 1e-7.
+    """The point of least energy, the task's outside the patch; None when none was 1e-7 lower.
 
     whole: whether all kicks were tried; if not, the clock has had a say in the point.
     """

@@ -34,11 +34,8 @@ _ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are average
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
-_NOISE, _FULL = (
-    0.15,
-    0.85,
-)  # of the strokes' ink: below it paper and compression noise, above it full darkness
-_BAND: Final = 1 << 22  # pixels of a picture that are looked at together
+_NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
+_BAND: Final = 1 << 20  # pixels of a picture that are looked at together
 _SILENCE: Final = threading.Lock()
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
@@ -72,9 +69,7 @@ class Picture:
 
     @cached_property
     def stroke_width(self) -> float:
-        """Typical width of a stroke in pixels of the arrays, at least 1:
-        twice its area over the length of its two edges.
-        """
+        """Typical width of a stroke in pixels of the arrays, at least 1: twice area over length of edges."""
         down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
         # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is
         # turned.
@@ -82,12 +77,10 @@ class Picture:
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
     def covers(self, frame: Frame) -> tuple[Cover, Cover]:
-        """The cover by curvature lines and by other strokes;
-        everything is a curvature line unless red and other both occur.
-        """
+        """The cover by curvature lines and by other strokes, told apart where red and others occur."""
         share = float((self.ink * self.red).sum() / self.ink.sum())
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
-            return self._cover(self.ink, frame), _no_cover(frame)
+            return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
 
     def _cover(self, ink: Ink, frame: Frame) -> Cover:
@@ -101,14 +94,8 @@ class Picture:
         return Cover(dark / min(1.0, self.stroke_width * self.reduced / frame.pixel), direction)
 
 
-def _no_cover(frame: Frame) -> Cover:
-    return Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
-
-
 def stroke_directions(ink: Ink, width: float) -> Ink:
-    """Double-angle vectors (y up) of the strokes, as long as the structure tensor is coherent (0..1);
-    shape [h, w, 2].
-    """
+    """Double-angle vectors [h, w, 2] (y up) of strokes, as long as the tensor is coherent (0..1)."""
     from scipy import ndimage
 
     # Derivatives of a Gaussian favour no direction, unlike differences of neighbours.
@@ -135,7 +122,9 @@ def read_picture(data: bytes, size: int) -> Picture:
     image = _opened(data)
     width, height = image.size
     reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
-    rgb = _on_paper(image, reduced)
+    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
+    del image  # of all that is held at any time its pixels are the most
+    rgb = _on_paper(pixels)
     raw = ink_of(rgb)
     strongest = float(raw.max())
     if strongest < _FAINTEST:
@@ -151,7 +140,12 @@ def read_picture(data: bytes, size: int) -> Picture:
 def read_white(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError as read_picture."""
     image = _opened(data)
-    return np.concatenate([pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _bands(image, 1)])
+    white = np.empty(image.size[::-1], dtype=bool)
+    top = 0
+    for pixels in _bands(image, 1):
+        white[top : top + len(pixels)] = pixels.mean(axis=-1, dtype=np.float32) >= 127.5
+        top += len(pixels)
+    return white
 
 
 def _opened(data: bytes) -> Any:
@@ -187,9 +181,7 @@ def _check_size(width: int, height: int) -> None:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile: libtiff writes its complaints there by itself,
-    Pillow by its log.
-    """
+    """Nothing goes to standard error meanwhile, where libtiff and Pillow's log write complaints."""
     with _SILENCE:
         try:
             kept = os.dup(2)
@@ -239,9 +231,7 @@ def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
 
 
 def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
-    """The picture composited on white as uint8 [h, w, 1 or 3];
-    greys of which `white` is the lightest are scaled down.
-    """
+    """The picture on white as uint8 [h, w, 1 or 3]; greys up to `white` are scaled down."""
     from PIL import Image
 
     if white is not None:
@@ -267,17 +257,15 @@ def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     return np.asarray(small).reshape(small.height, small.width, channels)
 
 
-def _on_paper(image: Any, reduced: int) -> Floats:
-    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1], averaged down by a whole factor."""
-    pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
-    channels = pixels.shape[-1]
-    colours = pixels.astype(np.float32)
+def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
+    """Colours [h, w, 1 or 3] relative to the paper, in [0, 1]."""
     # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
-    paper = np.percentile(colours.reshape(-1, channels), 75, axis=0).astype(np.float32)
+    paper = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
     if paper.max() < _DARKEST_PAPER:
         raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
-    clipped: Floats = np.minimum(colours / np.maximum(paper, 1), 1)
-    return clipped
+    colours: Floats = pixels.astype(np.float32)
+    colours /= np.maximum(paper, 1)
+    return np.minimum(colours, 1, out=colours)
 
 
 def _specks(ink: Ink) -> Bools:
@@ -291,9 +279,7 @@ def _specks(ink: Ink) -> Bools:
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
-    """1 where the ink around is red, else 0: colour is coarser than brightness in JPEG,
-    so it is looked at blurred.
-    """
+    """1 where the blurred ink is red, else 0: in JPEG colour is coarser than brightness."""
     from scipy import ndimage
 
     if rgb.shape[-1] == 1:

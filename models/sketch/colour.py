@@ -18,18 +18,13 @@ REDDISH: Final = 0.4
 
 
 def ink_of(rgb: Floats) -> Floats:
-    """How much ink a colour is, 1 - min(red, green, blue), in [0, 1]; 1 for black and for pure red.
-
-    Shape (...,).
-    """
+    """Ink of a colour, 1 - min(red, green, blue) in [0, 1], shape (...,): 1 for black and for pure red."""
     ink: Floats = 1 - rgb.min(axis=-1)
     return ink
 
 
 def redness(rgb: Floats) -> Floats:
-    """How much red ink a colour holds: red - max(green, blue), less what orange and purple differ;
-    shape (...,).
-    """
+    """How much red ink a colour holds, (...,): red - max(green, blue), less orange and purple."""
     red, green, blue = np.moveaxis(rgb, -1, 0)
     excess: Floats = np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0)
     return excess

@@ -33,9 +33,7 @@ _NUDGE: Final = 1e-9  # of a pixel: what runs exactly along a pixel edge is shar
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the grid lies on the sketch: top left corner (x, y), side of a pixel,
-    rows and columns; y down.
-    """
+    """Where the grid lies on the sketch: top left (x, y), side of a pixel, rows, columns; y down."""
 
     x: float
     y: float
@@ -50,9 +48,7 @@ class Frame:
 
     @property
     def edges(self) -> tuple[Floats, Floats]:
-        """Where the rows begin and end in y, shape (height + 1,), and the columns in x,
-        shape (width + 1,).
-        """
+        """Edges of the rows in y, shape (height + 1,), and of the columns in x, shape (width + 1,)."""
         rows: Floats = self.y + np.arange(self.height + 1.0) * self.pixel
         columns: Floats = self.x + np.arange(self.width + 1.0) * self.pixel
         return rows, columns
@@ -72,18 +68,14 @@ class Cover:
 
     @property
     def weight(self) -> Floats:
-        """Weight min(1, amount) * R in [0, 1], and 0 where R < LEAST_R; shape [height,
-        width] (docs/mathematics.md, 1).
-        """
+        """Weight [height, width], min(1, amount) R or 0 where R < LEAST_R (docs/mathematics.md, 1)."""
         single = np.minimum(1.0, vector_length(*np.moveaxis(self.direction, -1, 0)))
         weight: Floats = np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
         return weight
 
 
 def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
-    """The frame of `size` pixels on its longer side round a box (left, top, right, bottom),
-    which sits in its middle.
-    """
+    """The frame of `size` pixels on its longer side centred on a box (left, top, right, bottom)."""
     left, top, right, bottom = box
     longer = max(right - left, bottom - top)
     border = MARGIN if margin else 0.0
@@ -162,9 +154,7 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
 
 
 def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
-    """Sums [c, height, width] of values (c, m) at points (m, 2) given in pixels;
-    what falls off the grid is left out.
-    """
+    """Sums [c, height, width] of values (c, m) at points (m, 2) in pixels on the grid."""
     column, row = np.floor(points).astype(np.int64).T
     kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
     cell = row[kept] * frame.width + column[kept]

@@ -37,8 +37,7 @@ def lines_as_cubics(start: Floats, end: Floats) -> Floats:
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:
-    """Straight segments (m, 2, 2) that stay within `tolerance` of the curves (k, 4, 2),
-    and the curve (m,) of each.
+    """Segments (m, 2, 2) within `tolerance` of the curves (k, 4, 2); the curve (m,) of each.
 
     A cubic cut into n equal steps is off by at most 3/4 M / n^2, with M the longer second difference of its
     control points, because |B''| <= 6 M. Raises InputError when that needs more than MAX_SEGMENTS.
@@ -57,9 +56,7 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
 
 
 def bounding_box(points: Floats) -> tuple[float, float, float, float]:
-    """Least x, least y, greatest x, greatest y of the curves themselves (their
-    control points may lie outside).
-    """
+    """Least x, least y, greatest x, greatest y of the curves, not of their control points."""
     span = float(np.ptp(points.reshape(-1, 2), axis=0).max())
     corners = flatten(points, _BOX_TOLERANCE * span)[0].reshape(-1, 2) if span > 0 else points.reshape(-1, 2)
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()

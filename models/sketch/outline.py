@@ -9,19 +9,13 @@ import numpy as np
 from ..instance.grid import Bools, Floats
 
 GAPS: Final = (0.03, 0.06, 0.12)
-"""Widths of gaps in an outline that still count as closed, in parts of the grid's longer side,
-tried in turn.
-"""
+"""Gaps in an outline that count as closed, in parts of the grid's longer side, tried in turn."""
 ENCLOSED: Final = 0.25
 """Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
 CRUMB: Final = 0.01
-"""Least share of a region for a part of its own;
-smaller ones are left over where a stroke grazes the outline.
-"""
+"""Least share of a region for a part of its own: a stroke that grazes the outline leaves less."""
 HELD: Final = 2.0
-"""Least length of stroke, in pixel sides, for a part of its own;
-less is a stroke that ends a little beyond an outline.
-"""
+"""Least stroke length, in pixel sides, for a part of its own: a stroke's loose end has less."""
 
 
 def inside_outline(strokes: Bools) -> Bools:
@@ -84,3 +78,12 @@ def _hull_area(strokes: Bools) -> float:
     row, column = np.nonzero(strokes)
     corners = np.concatenate([np.stack([row + a, column + b], axis=1) for a in (0, 1) for b in (0, 1)])
     return float(ConvexHull(corners).volume)
+
+
+def largest_part(mask: Bools) -> Bools:
+    """The 4-connected part of a mask with most pixels, the first of equal ones."""
+    from scipy import ndimage
+
+    label, _ = ndimage.label(mask)
+    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:])
+    return part

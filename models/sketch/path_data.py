@@ -237,9 +237,7 @@ class _Outline:
             raise too_many_curves()
 
     def _reflected(self, kind: int) -> complex:
-        """The first control point of a smooth curve: the last one reflected,
-        after a curve of the same kind.
-        """
+        """A smooth curve's first control point: the last one reflected after a curve of its kind."""
         return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
 
     def _at(self, point: Coordinates) -> complex:

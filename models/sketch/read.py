@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +15,13 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools
 from ..instance.instance import Gauge, Instance
 from ..storage import read_bytes
-from .bitmap import Picture, read_picture, read_white
+from .bitmap import read_picture, read_white
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .outline import inside_outline, parts_with
@@ -34,9 +33,7 @@ MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
 LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w carry no direction worth a constraint: a corner that is barely touched,
-a crossing.
-"""
+"""Stroke pixels with a smaller w carry no direction worth a constraint: grazed corners, crossings."""
 CUT: Final = 0.5 - 1e-9
 """Length in pixel sides from which another stroke (silhouette, crease) takes a pixel out of the mask.
 
@@ -87,11 +84,9 @@ def read_sketch(
     with_mask = None if mask is None else Path(mask)
     data = _bytes_of(path)
     try:
-        return instance_of(
-            data, size=size, mask=with_mask, gauge=gauge, name=name or name_from(path.stem), source=path.name
-        )
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
+        with naming(path):
+            name = name or name_from(path.stem)
+            return instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
 
@@ -99,10 +94,7 @@ def read_sketch(
 def instance_of(
     data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
 ) -> Instance:
-    """The instance of a sketch that is given as the bytes of a file; otherwise as read_sketch.
-
-    Raises InputError.
-    """
+    """The instance of a sketch given as the bytes of a file, as read_sketch. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower())
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
@@ -128,17 +120,13 @@ def instance_of(
 
 
 def name_from(text: str) -> str:
-    """An instance name made from any text: lower case, runs of other characters as `_`, a letter first,
-    at most 32 long.
-    """
+    """An instance name made from any text, at most 32 long; runs of other characters become `_`."""
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     return (name if re.match(r"[a-z]", name) else f"sketch_{name}".strip("_"))[:32].rstrip("_")
 
 
 def check_memory(pixels: int, available: int | None) -> None:
-    """Nothing, or InputError when a grid of so many pixels needs more bytes than
-    are available (None: not known).
-    """
+    """Nothing, or InputError when a grid needs more bytes than available (None: not known)."""
     needed = pixels * BYTES_PER_PIXEL
     if available is not None and needed > available:
         raise InputError(
@@ -168,20 +156,12 @@ def check_size(size: int) -> None:
 
 def _bytes_of(path: Path) -> bytes:
     """The content of a regular file of bearable length, at least one byte."""
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot be read: {reason.lower()}; check the path", file=path) from error
-    if not stat.S_ISREG(status.st_mode):
+    if path.exists() and not path.is_file():
         raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
-    if status.st_size == 0:
+    data = read_bytes(path, MAX_BYTES, "simplify the sketch")
+    if not data:
         raise InputError("is empty; save the sketch again", file=path)
-    if status.st_size > MAX_BYTES:
-        raise InputError(
-            f"has {status.st_size} bytes; at most {MAX_BYTES} are read, simplify the sketch", file=path
-        )
-    return read_bytes(path)
+    return data
 
 
 def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
@@ -191,12 +171,13 @@ def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return _of_curves(read_svg(data))
-    picture = _PICTURE.match(data) is not None
-    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and not picture):
+    drawn = _PICTURE.match(data) is None
+    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
         return _of_curves(read_scap(data))
-    if suffix == ".svg" and not picture:
+    if suffix == ".svg" and drawn:
         return _of_curves(read_svg(data))
-    return _of_picture(read_picture(data, size))
+    picture = read_picture(data, size)
+    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
 
 
 def _of_curves(curves: Curves) -> _Sketch:
@@ -209,10 +190,6 @@ def _of_curves(curves: Curves) -> _Sketch:
     return _Sketch(bounding_box(curves.points), curves.canvas, covers)
 
 
-def _of_picture(picture: Picture) -> _Sketch:
-    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
-
-
 def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
     if max(box[2] - box[0], box[3] - box[1]) <= 0:
         raise InputError("draws no stroke: everything is one point")
@@ -222,15 +199,9 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 
 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask file, and the mask on it.
-
-    Raises InputError about the mask's file.
-    """
-    try:
-        white = read_white(_bytes_of(path))
-        return _mask_on_grid(white, page, size)
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
+    """The frame round the white part of a mask file, and the mask on it, or InputError about the file."""
+    with naming(path):
+        return _mask_on_grid(read_white(_bytes_of(path)), page, size)
 
 
 def _mask_on_grid(

@@ -16,9 +16,7 @@ Kind = Literal["sketch", "analytic"]
 
 @dataclass(frozen=True)
 class Sample:
-    """A built-in sample: its name, whether it is a drawing (`sketch`) or a computed surface (`analytic`),
-    one line about it.
-    """
+    """A built-in sample: name, whether a drawing (`sketch`) or a surface (`analytic`), one line."""
 
     name: str
     kind: Kind
@@ -76,10 +74,7 @@ def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Ins
 
 
 def sample_svg(name: str) -> str:
-    """The SVG text of a built-in sketch.
-
-    Raises InputError for an unknown name or one that is not a drawing.
-    """
+    """The SVG text of a built-in sketch. Raises InputError for a name that is none, or no drawing."""
     if _known(name).kind == "analytic":
         drawings = ", ".join(sample.name for sample in samples() if sample.kind == "sketch")
         raise InputError(f"sample {name!r} is computed, not drawn; choose one of {drawings}")

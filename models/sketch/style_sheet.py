@@ -16,20 +16,9 @@ from typing import Any, Final, NamedTuple
 from ..errors import InputError
 from ..input_limits import MAX_RULE_CHECKS, MAX_STYLE
 
-KNOWN: Final = frozenset(
-    {
-        "stroke",
-        "fill",
-        "visibility",
-        "color",
-        "stroke-width",
-        "stroke-opacity",
-        "fill-opacity",
-        "display",
-        "opacity",
-        "transform",
-    }
-)
+PAINT: Final = ("stroke", "fill", "visibility", "color", "stroke-width", "stroke-opacity", "fill-opacity")
+"""The properties that decide how a stroke shows; elements inside of others inherit them."""
+KNOWN: Final = frozenset({*PAINT, "display", "opacity", "transform"})
 """The properties that decide which strokes there are."""
 
 

@@ -1,5 +1,4 @@
-"""Instances with a known answer: curved surfaces under orthographic projection,
-and their exact curvature lines.
+"""Instances with a known answer: curved surfaces, projected, with their exact curvature lines.
 
 Each surface is parametrised by its lines of curvature: position(s, t), turned in space and looked at along
 -z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
@@ -19,7 +18,8 @@ from ..instance.angles import wrap
 from ..instance.elementary import arctangent, cosine, length, sine, turned
 from ..instance.grid import Bools, Floats
 from ..instance.instance import Gauge, Instance
-from .cover import Cover, Frame, cover_by_segments, fit_frame
+from .cover import Frame, cover_by_segments, fit_frame
+from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
 
 _NEWTON: Final = 12
@@ -71,9 +71,7 @@ class AnalyticInstance:
 
 
 def _turn(tilt: float, spin: float) -> Floats:
-    """The rotation that tips the top away from the viewer by `tilt` about x and then spins the
-    picture by `spin` about z (degrees).
-    """
+    """The rotation by `tilt` about x, the top away, then by `spin` about z (degrees)."""
     a, b = np.radians([-tilt, spin])
     about_x = np.array([[1, 0, 0], [0, cosine(a), -sine(a)], [0, sine(a), cosine(a)]])
     about_z = np.array([[cosine(b), -sine(b), 0], [sine(b), cosine(b), 0], [0, 0, 1]])
@@ -172,17 +170,8 @@ def _parameters(surface: Surface, frame: Frame) -> tuple[Floats, Floats, Bools]:
     on_patch = (miss < 1e-9) & _within(s, surface.s_range) & _within(t, surface.t_range)
     if not on_patch.any():
         raise InputError("no pixel centre lies on the surface; choose a larger size")
-    mask = _largest_part(on_patch.reshape(frame.shape))
+    mask = largest_part(on_patch.reshape(frame.shape))  # tips may touch the rest at corners only
     return s[mask.ravel()], t[mask.ravel()], mask
-
-
-def _largest_part(mask: Bools) -> Bools:
-    """The 4-connected part with most pixels: tips of a patch may touch the rest at corners only."""
-    from scipy import ndimage
-
-    label, _ = ndimage.label(mask)
-    part: Bools = label == 1 + np.argmax(np.bincount(label.ravel())[1:])
-    return part
 
 
 def _within(value: Floats, ends: tuple[float, float]) -> Bools:
@@ -190,9 +179,7 @@ def _within(value: Floats, ends: tuple[float, float]) -> Bools:
 
 
 def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
-    """Parameters whose projection is `wanted` (n, 2),
-    by Newton's method from the nearest point of a lattice.
-    """
+    """Parameters whose projection is `wanted` (n, 2), by Newton's method from a near lattice point."""
     from scipy.spatial import cKDTree
 
     lattice = np.meshgrid(np.linspace(*surface.s_range, _SEEDS), np.linspace(*surface.t_range, _SEEDS))
@@ -205,22 +192,17 @@ def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
         area = ax * by - ay * bx
         # Away from the patch the projection may fold; such pixels only have to stay finite.
         area = np.where(np.abs(area) < 1e-3, np.copysign(1e-3, area), area)
-        s = np.clip(
-            s + (by * error[:, 0] - bx * error[:, 1]) / area,
-            surface.s_range[0] - 0.5,
-            surface.s_range[1] + 0.5,
-        )
-        t = np.clip(
-            t + (ax * error[:, 1] - ay * error[:, 0]) / area,
-            surface.t_range[0] - 0.5,
-            surface.t_range[1] + 0.5,
-        )
+        s = _kept_near(s + (by * error[:, 0] - bx * error[:, 1]) / area, surface.s_range)
+        t = _kept_near(t + (ax * error[:, 1] - ay * error[:, 0]) / area, surface.t_range)
     return s, t
 
 
+def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
+    return np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
+
+
 def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of the drawn lines, 0 outside the mask,
-    and which pixels (n,) carry a line of family u.
+    """Weight [height, width] of drawn lines; which pixels (n,) carry a line of family u.
 
     The spacing of the lines is bisected by ratio; the best share seen wins.
     """
@@ -238,18 +220,11 @@ def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools
 
 
 def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
-    """Weight and family, as in _strokes, of lines about `spacing` pixels apart,
-    at least one of each family.
-    """
+    """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one a family."""
     u_lines, v_lines = _lines(surface, frame, spacing)
     of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
     both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)
-    return np.where(mask, both.weight, 0.0), _dominates(of_u, of_v)[mask]
-
-
-def _dominates(first: Cover, second: Cover) -> Bools:
-    dominates: Bools = first.amount >= second.amount
-    return dominates
+    return np.where(mask, both.weight, 0.0), (of_u.amount >= of_v.amount)[mask]
 
 
 def _lines(surface: Surface, frame: Frame, spacing: float) -> tuple[Floats, Floats]:

@@ -39,21 +39,12 @@ from ..instance.grid import Floats
 from .colour import is_paper, is_red
 from .curves import Curves
 from .path_data import SHAPES, outline, pixels, too_many_curves
-from .style_sheet import KNOWN, StyleSheet, style_properties, style_sheet
+from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
 _GREATEST: Final = 1e9
 _SVG: Final = "http://www.w3.org/2000/svg"
 _HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
-_INHERITED: Final = (
-    "stroke",
-    "fill",
-    "visibility",
-    "color",
-    "stroke-width",
-    "stroke-opacity",
-    "fill-opacity",
-)
 _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
 
 
@@ -79,7 +70,8 @@ def read_svg(data: bytes) -> Curves:
             f"its root element is <{root.tag.split('}')[-1][:30]}>, not <svg>; expected an SVG drawing"
         )
     canvas = _canvas(root)
-    walk = _Walk(style_sheet(_style_texts(root)), canvas)
+    texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
+    walk = _Walk(style_sheet(texts), canvas)
     shapes = list(walk.shapes(root))
     if not sum(len(points) for _, points in shapes):
         raise InputError(
@@ -110,10 +102,6 @@ def _parsed(data: bytes) -> Element:
     return root
 
 
-def _style_texts(root: Element) -> Iterator[str]:
-    return ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-
-
 @dataclass(eq=False)
 class _Walk:
     """A walk through a drawing. What depends on an element alone is found once and kept for all its uses."""
@@ -128,9 +116,7 @@ class _Walk:
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
-        """The style of every visible shape and its control points in the units of the root,
-        in drawing order.
-        """
+        """Style and control points, in the root's units, of every visible shape in drawing order."""
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -139,7 +125,7 @@ class _Walk:
             place = self._styled(stack.pop())
             tag, element = _tag(place.element), place.element
             self._count()
-            if _hidden(place.style):
+            if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES and _painted(place.style):
                 yield place.style, self._placed(place)
@@ -161,7 +147,7 @@ class _Walk:
             style = _own_style(place.element, self.sheet)
             self.own[place.element] = style, _transform(place.element, style)
         own, transform = self.own[place.element]
-        inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
+        inherited = {key: place.style[key] for key in PAINT if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
         return _Place(place.element, style, matrix, place.uses)
@@ -250,9 +236,7 @@ def _transform(element: Element, style: Mapping[str, str]) -> Any:
 
 
 def _view(place: _Place, element: Element) -> Any:
-    """The transform inside an inner svg or a symbol: its viewBox fitted into its width and height,
-    centred.
-    """
+    """The transform inside an inner svg or symbol: its viewBox centred in its width and height."""
     from svgelements import Matrix
 
     if _tag(element) not in ("svg", "symbol"):
@@ -268,10 +252,6 @@ def _view(place: _Place, element: Element) -> Any:
     return Matrix.translate(-x, -y) * Matrix.scale(scale) * centre * corner
 
 
-def _hidden(style: Mapping[str, str]) -> bool:
-    return style.get("display") == "none" or _number(style.get("opacity")) == 0
-
-
 def _painted(style: Mapping[str, str]) -> bool:
     """True when a shape shows: a stroke or a fill that is neither none, transparent, nor white like paper."""
     return style["visibility"] not in ("hidden", "collapse") and not bool(
@@ -280,9 +260,7 @@ def _painted(style: Mapping[str, str]) -> bool:
 
 
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
-    """Red, green, blue in [0, 1] of the stroke, or of the fill when there is no stroke;
-    white when there is neither.
-    """
+    """Red, green, blue in [0, 1] of the stroke, else of the fill; white when there is neither."""
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour

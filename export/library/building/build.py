@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ....models.errors import CrossfieldError
+from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, are_whole, read_about, read_library, read_sidecar
-from ..documents.lock import Progress, changing
+from ..documents.lock import locked
 from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
@@ -32,7 +33,7 @@ def build(
     *,
     jobs: int = 1,
     scheduler: str | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> Library:
     """The library of a specification, now in the folder.
 
@@ -45,7 +46,7 @@ def build(
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
-        with changing(folder, "a build of the library", progress):
+        with locked(folder, "a build of the library", progress):
             return _built(spec, plans, folder, jobs=jobs, scheduler=scheduler, progress=progress)
     except BaseException:
         if is_new:
@@ -63,10 +64,7 @@ def _built(
     scheduler: str | None,
     progress: Progress,
 ) -> Library:
-    """The library, by a caller who holds its lock.
-
-    The ledger is written when all else is there: a build that is refused leaves none.
-    """
+    """The library, by a caller who holds its lock; the ledger comes last, so a refused build has none."""
     _sweep(folder)
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
@@ -83,23 +81,21 @@ def _built(
     return read_library(folder)
 
 
-def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """A library brought up to date after its ledger changed; only what the change touches is made again."""
     folder = read_library(folder).folder
-    with changing(folder, "a build of the library", progress):
+    with locked(folder, "a build of the library", progress):
         return rebuilt(folder, jobs=jobs, progress=progress)
 
 
-def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = lambda _: None) -> Library:
+def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """As `rebuild`, for a caller who holds the lock of the library."""
     spec = read_library(folder).spec
     return _built(spec, plan(spec), folder, jobs=jobs, scheduler=None, progress=progress)
 
 
 def unmatched(library: Library) -> list[Record]:
-    """The records of a library's ledger that count for nothing:
-    the problem of their entry has changed since.
-    """
+    """Records of a library's ledger that count for nothing: their entry's problem has changed since."""
     records = read_ledger(library.folder).records
     names = {record.entry for record in records} & set(library.document["entries"])
     problems = {name: library.entry(name)["problem_sha256"] for name in names}

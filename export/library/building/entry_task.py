@@ -47,8 +47,7 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe, what is known of its instance, that instance's files,
-    and what the ledger says.
+    """The task of an entry: its recipe, and what is known of its instance.
 
     records and submitted: what the ledger has of all entries of the instance, records and kept fields;
     relatives: names of the entries that may be related.
@@ -99,8 +98,7 @@ def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
         (folder / name).write_bytes(data)
     known = {}
     for role, facts in task.about["fields"].items():
-        provenance = Provenance(facts["solver"], facts["version"], facts["seconds"], facts["by"])
-        known[role] = Known(read_field(folder / facts["file"]), provenance)
+        known[role] = Known(read_field(folder / facts["file"]), Provenance.of(facts))
     instance = read_instance(folder / task.about["instance"]["file"])
     for place, each in enumerate(task.submitted):
         submitted = each.known()
@@ -135,9 +133,7 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the files of the best point that are now in the folder: MIPLIB's kind,
-    and AMPL's where there is a .nl.
-    """
+    """Facts of the best point's files, now in the folder: MIPLIB's kind, and AMPL's beside a .nl."""
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -166,9 +162,7 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]:
-    """The best dual bound of each solver on this problem or one with the same optimum,
-    as the ledger has them; and what follows from the point.
-    """
+    """The best dual bound of each solver with a record of this optimum, and what the point implies."""
     chosen: dict[str, Record] = {}
     for record in sorted(_records(task, best, instance), key=lambda each: _preference(each, task.name)):
         chosen.setdefault(record.solver, record)
@@ -180,10 +174,7 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
 
 
 def _within(told: dict[str, Any], best: Best, entry: str) -> float:
-    """A bound, cut to the objective of the best point.
-
-    Raises InputError for one that the point contradicts.
-    """
+    """A bound, cut to the best point's objective. Raises InputError where the point contradicts it."""
     bound = float(told["bound"])
     if contradicts(bound, best.objective):
         raise InputError(
@@ -213,28 +204,15 @@ def _preference(record: Record, entry: str) -> tuple[Any, ...]:
 
 
 def _bound(record: Record, entry: str) -> dict[str, Any]:
-    return {
-        "solver": record.solver,
-        "version": record.version,
-        "bound": record.bound,
-        "status": record.status,
-        "seconds": record.seconds,
-        "threads": record.threads,
-        "via": None if record.entry == entry else record.entry,
-    }
+    told = ("solver", "version", "bound", "status", "seconds", "threads")
+    via = None if record.entry == entry else record.entry
+    return {key: getattr(record, key) for key in told} | {"via": via}
 
 
 def _tangent(bound: float) -> dict[str, Any]:
     mine = ours("tangent at the point")
-    return {
-        "solver": mine.solver,
-        "version": mine.version,
-        "bound": bound,
-        "status": "computed",
-        "seconds": None,
-        "threads": None,
-        "via": None,
-    }
+    found = {"solver": mine.solver, "version": mine.version, "bound": bound, "status": "computed"}
+    return found | {"seconds": None, "threads": None, "via": None}
 
 
 def _greatest(bounds: list[dict[str, Any]]) -> float | None:

@@ -43,17 +43,13 @@ class _Here(Executor):
 
 
 def ahead(jobs: int, scheduler: str | None) -> int:
-    """How many tasks are handed out at once:
-    what is handed out and not done is lost when a build is killed.
-    """
+    """How many tasks are handed out at once; a build that is killed loses those that are not done."""
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
 
 
 @contextmanager
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Where tasks run. Raises InputError when no scheduler answers or dask is missing;
-    BuildError when workers die.
-    """
+    """Where tasks run. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
         with _cluster(scheduler) if scheduler else _local(jobs) as chosen:
             yield chosen
@@ -129,9 +125,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 class Tasks:
-    """Tasks under way, at most so many at once: each is a function, its value,
-    and what is done here with its result.
-    """
+    """Tasks under way, a limited number at once: function, value, and what to do with the result."""
 
     def __init__(self, chosen: Executor, most: int) -> None:
         self._executor, self._most = chosen, most
@@ -139,7 +133,8 @@ class Tasks:
         self._running: dict[Future[Any], Callable[[Any], None]] = {}
 
     def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
-        """Have the function called with the value somewhere, and `finish` here with its result;
+        """Have the function called with the value somewhere, and `finish` here with its result.
+
         `finish` may add more, which goes first.
         """
         self._waiting.append((function, value, finish))

@@ -1,6 +1,4 @@
-"""The files about a library as a whole: texts, drawings, checker, library.solu,
-library.json and SHA256SUMS.
-"""
+"""The files about a library as a whole: texts, drawings, checker, optima, index and SHA256SUMS."""
 
 from __future__ import annotations
 
@@ -33,15 +31,14 @@ _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
 
 def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None:
-    """Write all that is about the library as a whole, SHA256SUMS last;
-    files of entries that are no longer in it are removed.
-    """
+    """Write all that is about the library as a whole; files of entries that left it are removed."""
     plans = tuple(plans)
     sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
     written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
     for name, data in written.items():
         write_bytes(folder / name, data)
-    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *_of_ledger(folder)]
+    points = (record.point for record in read_ledger(folder).records if record.point is not None)
+    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *points]
     _remove_stale(folder, set(present))
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
     write_bytes(folder / SUMS, sums.encode())
@@ -76,9 +73,7 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell of a rung: its sizes, and how many entries it has and how many
-    of them have a proven optimum.
-    """
+    """What the texts tell of a rung: sizes, number of entries, and how many have a proven optimum."""
     sizes = sorted({each["source"]["size"] for each in sidecars})
     proven = sum(each["status"] == "optimal" for each in sidecars)
     return {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven}
@@ -119,10 +114,6 @@ def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
         for each in sidecars
         for name in (f"{each['name']}.json", *(file["name"] for file in each["files"]))
     ]
-
-
-def _of_ledger(folder: Path) -> list[str]:
-    return [record.point for record in read_ledger(folder).records if record.point is not None]
 
 
 def _remove_stale(folder: Path, present: set[str]) -> None:

@@ -1,6 +1,4 @@
-"""From what each file of a library is made: its tasks, put together from specification and ledger,
-for building and for verifying alike.
-"""
+"""What each file of a library is made from, for building and verifying alike."""
 
 from __future__ import annotations
 
@@ -30,19 +28,12 @@ class Inputs:
         return Preparation(each.recipe, self._submitted(each))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
-        """The tasks of its entries, once its files are in a folder.
-
-        Raises as `preparation`, InputError for a file that is missing.
-        """
+        """The tasks of its entries. Raises as `preparation`, InputError for a file that is missing."""
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
         relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
         records = self._records(each)
         for recipe in each.entries:
             yield Entry(recipe, about, files, records, submitted, relatives)
-
-    def provenances(self, each: InstancePlan) -> set[Provenance]:
-        """Who, by the ledger, found a field that is kept for an entry of an instance."""
-        return {submitted.provenance for submitted in self._submitted(each)}
 
     def _records(self, each: InstancePlan) -> tuple[Record, ...]:
         names = {entry.name for entry in each.entries}

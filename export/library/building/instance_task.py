@@ -71,10 +71,7 @@ def about_file(instance: str) -> str:
 
 
 def prepare(task: Preparation) -> Files:
-    """The files of an instance: itself, its fields, and last what is known of it.
-
-    Raises InputError for a sketch that gives none.
-    """
+    """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
     chosen = _chosen(instance, task)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
@@ -98,9 +95,7 @@ def field_bytes(field: CrossField) -> bytes:
 
 
 def _chosen(instance: Instance, task: Preparation) -> dict[str, Known]:
-    """The field of each role. The baseline never depends on the ledger:
-    the jumps of `qp-fixed` are part of an instance.
-    """
+    """The field of each role; not the ledger but the instance decides on the baseline, for `qp-fixed`."""
     baseline, searched = baseline_field(instance), searched_field(instance)
     found = better_in_1norm(searched.field, task.recipe.rung)
     staged = [Known(fitted(each.field), ours("two stages")) for each in found]

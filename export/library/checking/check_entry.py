@@ -1,5 +1,4 @@
-"""Checking an entry of a library against its problem, formulated again from the instance: facts, model files,
-points, bounds.
+"""Checking an entry of a library against its problem, formulated again from the instance.
 
 The entry is made again from what it was made of, and compared with what is in the library, model files
 unpacked; the best known point is read by the readers of solution files and evaluated, and, by the checker
@@ -25,7 +24,7 @@ from ..ledger.dual_bounds import is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger
 from ..ledger.points import complete_point
-from .finding import BUILD, FEASIBLE, Finding, close, of_error
+from .finding import FEASIBLE, Finding, close, of_error
 from .made_again import entry_findings
 
 
@@ -77,27 +76,25 @@ def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Fin
     }
     for key, value in facts.items():
         if sidecar[key] != value:
-            yield Finding(name, f"tells another {key} than its problem has", BUILD)
+            yield Finding(name, f"tells another {key} than its problem has")
 
 
 def _points(folder: Path, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
-    """The files of the best known point can be read and have the objective and the
-    violations that the sidecar tells.
-    """
+    """The files of the best known point can be read and have the objective that the sidecar tells."""
     best, listed = sidecar["best"], {file["name"] for file in sidecar["files"]}
     for key in ("point", "nl_point"):
         name = best[key]
         if name is None:
             continue
         if name not in listed:
-            yield Finding(f"{sidecar['name']}.json", f"names {name} as a point and does not list it", BUILD)
+            yield Finding(f"{sidecar['name']}.json", f"names {name} as a point and does not list it")
             continue
         try:
             solution = read_solution(folder / name, problem)
         except CrossfieldError as error:
             yield of_error(error, name)
             continue
-        yield from (Finding(name, what, BUILD) for what in _differences(best, solution))
+        yield from (Finding(name, what) for what in _differences(best, solution))
 
 
 def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
@@ -124,9 +121,7 @@ def _differences(best: dict[str, Any], solution: Solution) -> Iterator[str]:
 
 
 def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
-    """The checker finds the same without rounding: against the .mps,
-    and where jumps are variables against the instance.
-    """
+    """The checker finds the same without rounding, from the .mps and, where it can, the instance."""
     best, point = sidecar["best"], folder / sidecar["best"]["point"]
     models = [(file["name"], best["objective"]) for file in sidecar["files"] if file["format"] == "mps"]
     if sidecar["jumps"] is None:
@@ -135,21 +130,15 @@ def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
         try:
             found = check(str(folder / model), str(point))
         except BadInputError as error:
-            yield Finding(
-                point.name, f"the checker refuses it: {str(error).removeprefix(f'{folder}/')}", BUILD
-            )
+            yield Finding(point.name, f"the checker refuses it: {str(error).removeprefix(f'{folder}/')}")
             continue
         if float(found.worst) > FEASIBLE:
             yield Finding(
-                point.name,
-                f"is not feasible against {model}: worst violation {float(found.worst):.3g}",
-                BUILD,
+                point.name, f"is not feasible against {model}: worst violation {float(found.worst):.3g}"
             )
         if not close(float(found.objective), told):
             yield Finding(
-                point.name,
-                f"has {float(found.objective)!r} against {model}, but its sidecar tells {told!r}",
-                BUILD,
+                point.name, f"has {float(found.objective)!r} against {model}, but its sidecar tells {told!r}"
             )
 
 
@@ -171,7 +160,7 @@ def _unused(sidecar: dict[str, Any], problem: Problem, ledger: Ledger) -> Iterat
     told = sidecar["best"]["objective"]
     if objective < told and not close(objective, told):
         yield Finding(
-            f"{sidecar['name']}.json", f"tells a worse point than {record.point}, which the ledger has", BUILD
+            f"{sidecar['name']}.json", f"tells a worse point than {record.point}, which the ledger has"
         )
 
 
@@ -180,18 +169,14 @@ def _bounds(name: str, sidecar: dict[str, Any]) -> Iterator[Finding]:
     bounds = [each["bound"] for each in sidecar["bounds"] if each["bound"] is not None]
     bound = max(bounds, default=None)
     if sidecar["bound"] != bound:
-        yield Finding(
-            name, f"tells the bound {sidecar['bound']}, but the best of its bounds is {bound}", BUILD
-        )
+        yield Finding(name, f"tells the bound {sidecar['bound']}, but the best of its bounds is {bound}")
     if sidecar["best"] is None:
         return
     objective = sidecar["best"]["objective"]
     if bound is not None and bound > objective:
-        yield Finding(
-            name, f"has a dual bound {bound!r} above the objective {objective!r} of its point", BUILD
-        )
+        yield Finding(name, f"has a dual bound {bound!r} above the objective {objective!r} of its point")
     expected: tuple[str, float | None] = ("best known", None)
     if bound is not None:
         expected = "optimal" if is_proven(objective, bound) else "best known", relative_gap(objective, bound)
     if (sidecar["status"], sidecar["gap"]) != expected:
-        yield Finding(name, "tells another status or gap than follows from its bounds and its point", BUILD)
+        yield Finding(name, "tells another status or gap than follows from its bounds and its point")

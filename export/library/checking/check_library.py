@@ -1,5 +1,4 @@
-"""Checking a library as a whole: every file whole and accounted for, every document to its schema,
-every entry as its sidecar says.
+"""Checking a library as a whole: files, checksums, schemas, and every entry by its sidecar.
 
 Nothing that a file says is believed: problems are formulated again from their instances (`verify_entry`).
 """
@@ -7,13 +6,14 @@ Nothing that a file says is believed: problems are formulated again from their i
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field
+from ....models.processes.progress import Progress, silent
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
 from ..building.entry_task import Entry
@@ -24,6 +24,7 @@ from ..documents import check_point
 from ..documents.archive import opened
 from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
+from ..documents.lock import unchanged
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import plan
@@ -40,23 +41,23 @@ _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 _FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
 
 
-def verify_library(folder: str | Path, *, progress: Callable[[str], None] = lambda _: None) -> list[Finding]:
+def verify_library(folder: str | Path, *, progress: Progress = silent) -> list[Finding]:
     """What is wrong with a library in a folder or an archive; nothing when all is as it should be.
 
-    progress: called with a line for each step. Raises InputError when there is no library.
+    progress: called with a line for each step. Nobody changes the folder meanwhile. Raises InputError when
+    there is no library, OutputError when another process works on it for too long.
     """
     with opened(folder) as place:
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
             raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
-        return list(_Verification(place, progress).findings())
+        with unchanged(place, "a verification of the library", progress):
+            return list(_Verification(place, progress).findings())
 
 
 class _Verification:
-    """A verification under way: which files are there, which are not as SHA256SUMS says,
-    and which belong to something.
-    """
+    """A verification under way: files that are there, that are damaged, and that belong."""
 
-    def __init__(self, folder: Path, progress: Callable[[str], None]) -> None:
+    def __init__(self, folder: Path, progress: Progress) -> None:
         self.folder, self.progress = folder, progress
         self.present: set[str] = set()
         self.damaged: set[str] = set()
@@ -88,7 +89,7 @@ class _Verification:
                 kind = "a link" if path.is_symlink() else "a folder, or no plain file"
                 yield Finding(path.name, f"is {kind}; a library is flat and holds files alone", REMOVE)
             elif path.name.startswith(".") and path.name.endswith(".part"):
-                yield Finding(path.name, "was left by a build that was stopped", BUILD)
+                yield Finding(path.name, "was left by a build that was stopped")
             else:
                 self.present.add(path.name)
 
@@ -121,17 +122,15 @@ class _Verification:
             yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
 
     def _index(self, library: Library) -> Iterator[Finding]:
-        """The index names its sidecars, and they are those of its specification;
-        texts and checker are there.
-        """
+        """The index names the sidecars of its specification; texts and checker are there."""
         document = library.document
         names = document["entries"]
         if sorted(document["sha256"]) != sorted(names):
-            yield Finding(INDEX, "lists other entries than it has checksums for", BUILD)
+            yield Finding(INDEX, "lists other entries than it has checksums for")
         for name in names:
             path = self.folder / f"{name}.json"
             if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
-                yield Finding(path.name, f"has another SHA-256 than {INDEX} says", BUILD)
+                yield Finding(path.name, f"has another SHA-256 than {INDEX} says")
         try:
             spec = library.spec
             planned = [entry.name for each in plan(spec) for entry in each.entries]
@@ -140,7 +139,7 @@ class _Verification:
         else:
             self.known |= {name for sketch in spec.sketches for name in sketch.files}
             if planned != names:
-                yield Finding(INDEX, "lists other entries than its specification asks for", BUILD)
+                yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
         ours = read_bytes(Path(check_point.__file__))
@@ -149,7 +148,7 @@ class _Verification:
             and document["generator"] == generator()
             and read_bytes(self.folder / CHECKER) != ours
         ):
-            yield Finding(CHECKER, f"is not the checker of {generator()}", BUILD)
+            yield Finding(CHECKER, f"is not the checker of {generator()}")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
         """Ledger, instances, entries and library.solu."""
@@ -180,9 +179,7 @@ class _Verification:
             yield from self._texts(library, sidecars)
 
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
-        """What the library was made of; nothing, when its specification is damaged,
-        which is told with the index.
-        """
+        """What the library was made of; None when its specification is damaged, told with the index."""
         try:
             return Inputs(ledger, plan(library.spec))
         except CrossfieldError:
@@ -211,38 +208,38 @@ class _Verification:
             return  # told with the index
         for name in sorted({*made} - {CHECKER, SOLU}):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
-                yield Finding(name, "is not what follows from the specification and the sidecars", BUILD)
+                yield Finding(name, "is not what follows from the specification and the sidecars")
 
     def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger, inputs: Inputs) -> Iterator[Finding]:
         if sidecar["name"] != name:
-            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}", BUILD)
+            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}")
         lost = list(self._listed(f"{name}.json", sidecar["files"]))
         yield from lost
         try:
             if not lost:
                 yield from verify_entry(self.folder, sidecar, ledger, self._task(name, inputs))
         except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
-            yield Finding(f"{name}.json", "holds values that no entry can have", BUILD)
+            yield Finding(f"{name}.json", "holds values that no entry can have")
 
     def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
         """Every file that a document lists is there, with the size and the checksum that it says."""
         for file in files:
             name = file["name"]
             if not PLAIN.fullmatch(name):
-                yield Finding(by, f"names {name[:60]!r}, which is no plain file name", BUILD)
+                yield Finding(by, f"names {name[:60]!r}, which is no plain file name")
             elif name not in self.present:
                 yield Finding(name, f"is missing, but {by} lists it", FETCH)
             elif ((path := self.folder / name).stat().st_size, sha256_of(path)) != (
                 file["bytes"],
                 file["sha256"],
             ):
-                yield Finding(name, f"is not the file that {by} lists", BUILD)
+                yield Finding(name, f"is not the file that {by} lists")
 
     def _ledger(self, ledger: Ledger, library: Library) -> Iterator[Finding]:
         """Every record is about an entry of the library, and its field is there."""
         for record in ledger.records:
             if record.entry not in library.document["sha256"]:
-                yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library", BUILD)
+                yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library")
             if record.point is not None:
                 self.known.add(record.point)
                 try:
@@ -251,9 +248,7 @@ class _Verification:
                     yield of_error(error, record.point)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
-        """Every instance with its fields is as its own document says,
-        and as the sidecars of its entries do.
-        """
+        """Every instance and its fields are as its own document and the sidecars of its entries say."""
         self.progress("instances")
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
         for file, instance in sorted(wanted.items()):
@@ -268,7 +263,7 @@ class _Verification:
             lost = list(self._listed(name, about["files"]))
             yield from lost
             if about["instance"] != instance:
-                yield Finding(name, "is about another instance than the sidecars of its entries", BUILD)
+                yield Finding(name, "is about another instance than the sidecars of its entries")
             elif not lost:
                 yield from self._fields(name, about)
                 yield from self._recipe(name, about, inputs)
@@ -284,9 +279,7 @@ class _Verification:
             yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """Every field is on its instance and has the energies that are told of it;
-        the least ones are least.
-        """
+        """Every field is on its instance and has the energies told of it; the least ones are least."""
         fields = about["fields"]
         for role, facts in fields.items():
             try:
@@ -296,12 +289,12 @@ class _Verification:
                 continue
             told = (facts["energy_2norm"], facts["energy_1norm"])
             if field is None:
-                yield Finding(facts["file"], f"is not a field of {about['name']}", BUILD)
+                yield Finding(facts["file"], f"is not a field of {about['name']}")
             elif not all(map(close, told, (field.energy(2).total, field.energy(1).total))):
-                yield Finding(name, f"tells other energies of its field {role} than it has", BUILD)
+                yield Finding(name, f"tells other energies of its field {role} than it has")
         for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
             if fields[role][energy] > min(facts[energy] for facts in fields.values()):
-                yield Finding(name, f"its field {role} is not the one of least energy", BUILD)
+                yield Finding(name, f"its field {role} is not the one of least energy")
 
     def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
         """The field in a file that belongs to an instance, None when it does not."""
@@ -318,7 +311,7 @@ class _Verification:
         for number, line in enumerate(_text(self.folder / SOLU).splitlines(), 1):
             fact = _FACT.fullmatch(line)
             if fact is None or (fact[2], fact[1]) in told or not _is_number(fact[3]):
-                yield Finding(SOLU, f"line {number} is no fact, or there twice", BUILD)
+                yield Finding(SOLU, f"line {number} is no fact, or there twice")
             else:
                 told[fact[2], fact[1]] = float(fact[3])
         expected = {}
@@ -329,7 +322,7 @@ class _Verification:
             if not proven and sidecar["bound"] is not None:
                 expected[sidecar["name"], "bestdual"] = sidecar["bound"]
         for name, tag in sorted({key for key, _ in told.items() ^ expected.items()}):
-            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says", BUILD)
+            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says")
 
 
 def _text(path: Path) -> str:

@@ -20,7 +20,7 @@ class Finding:
 
     file: str
     what: str
-    remedy: str
+    remedy: str = BUILD
 
     def __str__(self) -> str:
         return f"{self.file}: {self.what}; {self.remedy}"
@@ -30,7 +30,7 @@ def of_error(error: CrossfieldError, file: str) -> Finding:
     """An error about a file as a finding; its message names what is wrong and what helps."""
     message = str(error).removeprefix(f"{error.file}: ")
     what, _, remedy = message.partition("; ")
-    return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message, BUILD)
+    return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message)
 
 
 def close(first: float, second: float) -> bool:

@@ -1,5 +1,4 @@
-"""What a library should say, made again from specification, instances, fields and ledger,
-and compared with what it says.
+"""What a library should say, made again from its sources and compared with what it says.
 
 Only what was searched for is taken from the library: the fields of each instance, and the records of the
 ledger. All else follows from these.
@@ -20,34 +19,29 @@ from ...formats.registry import FORMATS
 from ..building.entry_task import Entry, make_entry
 from ..building.instance_task import Files, Preparation, source_of
 from ..ledger.points import Provenance, ours
-from .finding import BUILD, Finding, close
+from .finding import Finding, close
 
 _FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
-"""Keys of a sidecar that are compared elsewhere: with the points that were read, with each other,
-and file by file.
-"""
+"""Keys of a sidecar that are compared elsewhere: with points, with each other, file by file."""
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """In what the files of an entry differ from those that its task makes today.
-
-    Raises CrossfieldError when it makes none.
-    """
+    """Where an entry's files differ from what its task makes today. Raises CrossfieldError without a task."""
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
     for key, value in made.items():
         if key not in _FROM_EACH_OTHER and not same(sidecar[key], value):
-            yield Finding(name, f"tells another {key} than follows from its instance and the ledger", BUILD)
+            yield Finding(name, f"tells another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
-        yield Finding(name, "tells other files, or other things of them, than are made of its problem", BUILD)
+        yield Finding(name, "tells other files, or other things of them, than are made of its problem")
     for key in ("point", "nl_point"):
         if sidecar["best"][key] != made["best"][key]:
-            yield Finding(name, f"names another {key} than is made of its problem", BUILD)
+            yield Finding(name, f"names another {key} than is made of its problem")
     if not close(sidecar["best"]["objective"], made["best"]["objective"]):
-        yield Finding(name, "does not tell the best of the known points", BUILD)
-    if provenance_of(sidecar["best"]) not in _known(task):
-        yield Finding(name, "says that somebody found its point who found none of the known fields", BUILD)
+        yield Finding(name, "does not tell the best of the known points")
+    if Provenance.of(sidecar["best"]) not in _known(task):
+        yield Finding(name, "says that somebody found its point who found none of the known fields")
 
 
 def same(told: Any, made: Any) -> bool:
@@ -72,9 +66,9 @@ def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Find
         if file["format"] not in FORMATS:
             continue
         if name not in made:
-            yield Finding(name, f"is not what is written as .{file['format']} of this problem", BUILD)
+            yield Finding(name, f"is not what is written as .{file['format']} of this problem")
         elif _content(made[name], name) != _content(read_bytes(folder / name), name):
-            yield Finding(name, "does not hold the problem that its sidecar describes", BUILD)
+            yield Finding(name, "does not hold the problem that its sidecar describes")
 
 
 def _content(data: bytes, name: str) -> bytes | None:
@@ -90,22 +84,15 @@ def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{key: file[key] for key in file if key not in {"bytes", "sha256"}} for file in files]
 
 
-def provenance_of(facts: dict[str, Any]) -> Provenance:
-    """Who found a field, by what a document says of it."""
-    return Provenance(facts["solver"], facts["version"], facts["seconds"], facts["by"])
-
-
 def _known(task: Entry) -> set[Provenance]:
     """Who found the fields that are known of an entry's instance."""
-    return {provenance_of(facts) for facts in task.about["fields"].values()} | {
+    return {Provenance.of(facts) for facts in task.about["fields"].values()} | {
         each.provenance for each in task.submitted
     }
 
 
 def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
-    """In what is said of an instance differs from its recipe: everything but the fields,
-    and who found those.
-    """
+    """Where what is said of an instance differs from its recipe, its fields aside."""
     recipe = task.recipe
     instance = read_instance(folder / about["instance"]["file"])
     expected = {
@@ -118,14 +105,12 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
     }
     for key, value in expected.items():
         if not same(about[key], value):
-            yield Finding(name, f"tells another {key} than follows from the specification", BUILD)
+            yield Finding(name, f"tells another {key} than follows from the specification")
     known = {each.provenance for each in task.submitted}
     for role, facts in about["fields"].items():
-        found = provenance_of(facts)
+        found = Provenance.of(facts)
         if found not in known and not _is_of_a_build(found):
-            yield Finding(
-                name, f"says that somebody found its field {role} of whom the ledger knows nothing", BUILD
-            )
+            yield Finding(name, f"says that somebody found its field {role} of whom the ledger knows nothing")
 
 
 def _is_of_a_build(found: Provenance) -> bool:

@@ -5,7 +5,7 @@ Each run starts from the best known point and uses one thread. What was measured
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any, Final
 from ....models.errors import InputError, SolutionError, SolverError
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
+from ....models.processes.progress import Progress, silent
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import DRIVEN, PROGRAMS
@@ -21,17 +22,15 @@ from ...solving.job import Limits
 from ...solving.local import refusal, solve
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
-from ..documents.lock import changing
+from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
-from ..ledger.ledger import Ending, Record, add_record, read_ledger
+from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
 
 GAP: Final = 1e-7
 """Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
 _BETTER: Final = 1e-9  # relative: a lower objective than this is no better point
-
-Progress = Callable[[str], None]
 
 
 def solve_library(
@@ -41,7 +40,7 @@ def solve_library(
     time_limit: float = 10.0,
     up_to: str | None = None,
     by: str | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """The new records, now in the ledger of the library, which is brought up to date in the end.
 
@@ -55,7 +54,7 @@ def solve_library(
     for number, (document, solver) in enumerate(runs):
         progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
         record, field = _run(library, document, solver, time_limit, by)
-        with changing(library.folder, "a solve of the library", progress):
+        with locked(library.folder, "a solve of the library", progress):
             found.append(asdict(add_record(library.folder, record, field)))
     rebuild(library.folder, progress=progress)
     return found
@@ -129,7 +128,7 @@ def _run(
         return record, None
     field = field_of(found.problem, found.point)
     primal = problem.objective_value(complete_point(problem, field))
-    record = replace(record, status=_ending(problem, solver, found), primal=primal)
+    record = replace(record, status=_run_status(problem, solver, found), primal=primal)
     return record, field if primal < best - _BETTER * max(abs(best), _BETTER) else None
 
 
@@ -139,7 +138,7 @@ def _start(library: Library, document: dict[str, Any], problem: Problem) -> Cros
     return None if known.point is None else field_of(known.problem, known.point)
 
 
-def _ending(problem: Problem, solver: str, found: Solution) -> Ending:
+def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
     if _proves(problem, solver, found):
         return "optimal"
     return "feasible" if found.status in {Status.OPTIMAL_LOCAL, Status.FEASIBLE} else "limit"

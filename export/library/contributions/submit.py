@@ -1,5 +1,4 @@
-"""Taking a solver's solution into a library: checked, compared with the best known point,
-kept in the ledger when it is better.
+"""Taking a solver's solution into a library: checked, compared, and kept when it is better.
 
 The ledger comes first and the rest of the library follows from it by a rebuild, which SHA256SUMS ends. So a
 submission that was stopped can be told by the checksum of ledger.json, and the next submission or build
@@ -16,6 +15,7 @@ from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError, SolutionError
 from ....models.formulations.problem import Problem, Violation
+from ....models.processes.progress import Progress, silent
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS, generator
 from ...solutions.readers.registry import read_raw
@@ -25,7 +25,7 @@ from ..building.build import rebuilt
 from ..building.index import SUMS
 from ..checking.finding import FEASIBLE, SAME
 from ..documents.documents import Library, problem_of, read_library
-from ..documents.lock import Progress, changing
+from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record, add_record
@@ -38,9 +38,7 @@ _TOLD: Final = 4  # names in a message
 
 @dataclass(frozen=True)
 class Submission:
-    """What happened to a point: entry, the objective it was compared with and its own,
-    and whether it was better and is now kept.
-    """
+    """What happened to a point: its entry, both objectives, whether it was better and is kept."""
 
     entry: str
     known: float
@@ -66,7 +64,7 @@ def submit_point(
     version: str | None = None,
     seconds: float | None = None,
     by: str | None = None,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> Submission:
     """What happened to the point in a solution file of any kind that is read.
 
@@ -82,7 +80,7 @@ def submit_point(
         if not text.isprintable() or len(text) > _LONGEST:
             raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
     library = _library(folder)
-    with changing(library.folder, f"a submission of {file.name}", progress):
+    with locked(library.folder, f"a submission of {file.name}", progress):
         library = _settled(library, progress)
         progress("checking the point")
         return _submitted(file, library, entry=entry, texts=texts, seconds=seconds, by=by, progress=progress)
@@ -177,9 +175,7 @@ def _by_columns(file: Path, raw: RawSolution, library: Library) -> str:
 
 
 def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Library) -> bool:
-    """Whether a file may be of an entry: it has all its columns, as one of its model files has them,
-    and no other.
-    """
+    """Whether a file may be of an entry: it has exactly the columns of one of its model files."""
     if raw.names is None:
         return False
     counts, pairs = sidecar["counts"], sidecar["instance"]["pairs"]
@@ -215,9 +211,7 @@ def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution
 
 
 def _violation(problem: Problem, solution: Solution) -> Violation:
-    """The worst violations of angles and jumps as the file has them,
-    with every other column at the value that follows from them.
-    """
+    """The worst violations of the file's angles and jumps, all other columns derived from them."""
     assert solution.point is not None
     assert solution.violation is not None
     completed = problem.violation(complete_point(problem, solution.field))

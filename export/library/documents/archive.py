@@ -1,5 +1,4 @@
-"""Libraries as they are handed around: a folder,
-or an archive (.zip, .tar, .tar.gz, .tar.bz2, .tar.xz) of one.
+"""Libraries as they are handed around: a folder, or an archive (.zip, .tar, .tar.gz/bz2/xz) of one.
 
 An archive is looked through before a byte of it is written: it may hold plain files and folders alone, inside
 its own folder, and no more than fits its size. Then it is unpacked into a temporary folder that is gone
@@ -99,9 +98,7 @@ def _unpack(path: Path, folder: Path) -> None:
 
 
 def _is_plain(entry: zipfile.ZipInfo) -> bool:
-    """Whether a member of a .zip is a file or a folder,
-    by the mode that Unix programs put in its upper half.
-    """
+    """Whether a member of a .zip is a file or a folder, by its Unix mode (the upper half)."""
     return stat.S_IFMT(entry.external_attr >> 16) in {0, stat.S_IFREG, stat.S_IFDIR}
 
 
@@ -125,9 +122,7 @@ def _check(members: Iterable[tuple[str, bool, int]], limit: int) -> None:
 
 @contextmanager
 def _tar(path: Path, limit: int) -> Iterator[tarfile.TarFile]:
-    """A .tar as a stream, unpacked by what it begins with;
-    it may not give more than its members and their headers.
-    """
+    """A .tar as a stream, unpacked by what it begins with; it gives its members and their headers alone."""
     head = _head(path)
     unpack = next((function for magic, function in _PACKED.items() if head.startswith(magic)), None)
     with (

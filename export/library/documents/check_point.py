@@ -35,9 +35,7 @@ from typing import NoReturn, Optional, TypeVar
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
 EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
-"""Arithmetic that raises an error rather than round;
-the longest sum of products of three numbers has some 3,000 digits.
-"""
+"""Arithmetic that raises an error rather than round; sums of products take some 3,000 digits."""
 
 INFINITE = Decimal("1e20")  # bounds from here on are none, as in all solvers
 
@@ -218,9 +216,7 @@ def lines_of(path: str) -> Iterator[tuple[int, str]]:
 
 
 class MpsReader:
-    """Reads free MPS, section by section: NAME, OBJSENSE, ROWS, COLUMNS, RHS, RANGES, BOUNDS,
-    quadratic sections, ENDATA.
-    """
+    """Reads free MPS section by section, ROWS to BOUNDS and the quadratic ones, until ENDATA."""
 
     def __init__(self) -> None:
         self.model = Model()
@@ -402,9 +398,7 @@ def _pairs(words: list[str], start: int) -> Iterator[tuple[str, str]]:
 
 
 def _products(section: str, matrix: Matrix) -> list[Product]:
-    """The monomials of a matrix: QUADOBJ and QSECTION hold one triangle, the others both;
-    only QCMATRIX has no one-half.
-    """
+    """The monomials of a matrix: QUADOBJ and QSECTION hold a triangle; only QCMATRIX has no 1/2."""
     triangle = section in ("QUADOBJ", "QSECTION")
     for (i, j), value in matrix.items():
         fits = i == j or ((j, i) not in matrix if triangle else matrix.get((j, i)) == value)
@@ -613,9 +607,7 @@ def _instance(document: dict[str, object]) -> Instance:
 
 
 class Field:
-    """The cross field of a point: angles of the pixels,
-    and of each pair the jump and the factor (-1)^p of its first skew.
-    """
+    """The cross field of a point: angles, and each pair's jump and (-1)^p of its first skew."""
 
     def __init__(self, instance: Instance, point: Point) -> None:
         self.instance = instance
@@ -631,9 +623,7 @@ class Field:
             self.p = [odd + TWO * even for odd, even in zip(self.p1, self.p2)]
 
     def as_given(self) -> Iterator[Jump]:
-        """Jump and factor of each pair; a parity p1 that is not whole counts as it stands,
-        of p the cosine of pi p.
-        """
+        """Jump and factor of each pair; a p1 that is not whole counts as it stands, p by cos(pi p)."""
         if not self.whole:
             yield from ((p, ONE - TWO * odd) for p, odd in zip(self.p, self.p1))
             return

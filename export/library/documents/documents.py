@@ -18,11 +18,10 @@ import numpy as np
 from ....models.errors import InputError, InstanceError
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem, formulate
-from ....models.input_limits import MAX_BYTES
-from ....models.instance.file import check_schema, check_version, parse_json, read_instance
+from ....models.instance.file import read_document, read_instance
 from ....models.instance.grid import Ints
 from ....models.instance.instance import Instance
-from ....models.storage import read_bytes, sha256_of
+from ....models.storage import sha256_of
 from ..plan.spec import Spec, spec_of
 
 FORMAT: Final = "crossfield-library-entry"
@@ -42,10 +41,7 @@ class Library:
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
-        """The sidecars of all entries, in order.
-
-        Raises InputError, InstanceError when one is missing or damaged.
-        """
+        """The sidecars of all entries. Raises InputError, InstanceError for a missing or damaged one."""
         return tuple(map(self.entry, self.document["entries"]))
 
     def entry(self, name: str) -> dict[str, Any]:
@@ -61,10 +57,7 @@ class Library:
 
 
 def read_library(folder: str | Path) -> Library:
-    """The library in a folder.
-
-    Raises InputError when there is none, InstanceError when its index is damaged.
-    """
+    """The library in a folder. Raises InputError without one, InstanceError when its index is damaged."""
     path = Path(folder) / INDEX
     if not path.is_file():
         raise InputError(
@@ -74,9 +67,7 @@ def read_library(folder: str | Path) -> Library:
 
 
 def read_sidecar(path: str | Path) -> dict[str, Any]:
-    """The sidecar in a file. Raises InputError when it cannot be read,
-    InstanceError with the place when it breaks its schema.
-    """
+    """The sidecar in a file. Raises InputError, or InstanceError where it breaks its schema."""
     return _read(Path(path), FORMAT, "library-entry")
 
 
@@ -86,14 +77,7 @@ def read_about(path: str | Path) -> dict[str, Any]:
 
 
 def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
-    try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, form, VERSION)
-        return check_schema(document, schema, __package__)
-    except UnicodeDecodeError as error:
-        raise InstanceError("is not JSON; build the library again", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    return read_document(path, form, VERSION, schema, __package__, remedy="build the library again")
 
 
 def as_bytes(document: dict[str, Any]) -> bytes:
@@ -123,9 +107,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def problem_from(
     instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
 ) -> Problem:
-    """The problem of a formulation with options, and with jumps where they are data: [pair,
-    jump] of those that are not zero.
-    """
+    """The problem of a formulation with options and, where they are data, jumps not zero as [pair, jump]."""
     jumps: Ints | None = None
     if FORMULATIONS[formulation].fixed:
         jumps = np.zeros(len(instance.grid.first), dtype=np.int32)

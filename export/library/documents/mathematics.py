@@ -1,6 +1,4 @@
-"""A formulation for a browser: MathML, made from its LaTeX when the site is written,
-in pieces between which a line may break.
-"""
+"""A formulation for a browser: MathML made from its LaTeX, in pieces between which lines may break."""
 
 from __future__ import annotations
 
@@ -53,10 +51,7 @@ def _model(formulation: str, options: tuple[tuple[str, Any], ...]) -> Model:
 
 
 def _lines(rows: list[str]) -> Iterator[Line]:
-    """Lines of an `aligned` environment: lead & formula && set, label.
-
-    Rows have labels, domains have none.
-    """
+    """Lines of an `aligned` environment, lead & formula && set, label; domains have no label."""
     last = ""
     for row in rows:
         lead, formula, *rest = (part.strip() for part in row.removesuffix(r" \\").split("&", maxsplit=2))
@@ -80,17 +75,13 @@ def _pieces(formula: str) -> Iterator[str]:
 
 
 def _formula(formula: str) -> tuple[str, ...]:
-    """The pieces as MathML; the operator that leads a later piece keeps the
-    space of one between two terms.
-    """
+    """The pieces as MathML; a leading operator keeps the space of one between two terms."""
     first, *others = map(_converted, _pieces(formula))
     return (first, *(_FIRST_OPERATOR.sub(r'\1<mo form="infix">', piece) for piece in others))
 
 
 def _converted(formula: str) -> str:
-    """LaTeX of our own declarations, never of a file, as an inline MathML element in display style;
-    empty for nothing.
-    """
+    """LaTeX of our own declarations, never of a file, as inline MathML in display style."""
     from latex2mathml.converter import convert
 
     return (

@@ -80,7 +80,7 @@ def _terms(problem: Problem) -> dict[str, int]:
 
 
 def curvature(problem: Problem) -> dict[str, Any]:
-    """Curvature of objective and constraints; the signs of the eigenvalues of the objective's Hessian, or the reason for none."""
+    """Curvature of objective and rows; signs of the Hessian's eigenvalues, or why there are none."""
     objective, reason = of_objective(problem)
     found = _eigenvalue_signs(problem) if problem.objective_degree == 2 else None
     return {
@@ -92,7 +92,7 @@ def curvature(problem: Problem) -> dict[str, Any]:
 
 
 def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
-    """How many eigenvalues of the Hessian of a quadratic objective are negative, zero and positive; None when it is large."""
+    """Numbers of negative, zero, positive eigenvalues of a Hessian; None above MOST_EIGEN variables."""
     index, value = problem.merged_objective(2)
     used, place = np.unique(index, return_inverse=True)
     if len(used) > MOST_EIGEN:
@@ -108,7 +108,7 @@ def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
 
 
 def ranges(problem: Problem) -> dict[str, list[float] | None]:
-    """Least and greatest absolute value of the nonzero coefficients, finite bounds and right sides; None where there is none."""
+    """Least and greatest size of nonzero coefficients, finite bounds and right sides, or None."""
     degree = problem.objective_degree
     costs = [problem.merged_objective(each)[1] for each in range(1, (degree if degree < 99 else 4) + 1)]
     rows = [
@@ -132,7 +132,7 @@ def _range(arrays: list[Floats]) -> list[float] | None:
 
 
 def tangent_bound(problem: Problem, point: Floats) -> float | None:
-    """A lower bound of a convex quadratic objective over finite bounds alone, from its tangent at a point; None for other problems.
+    """A lower bound of a convex quadratic objective over finite bounds, from a tangent, or None.
 
     f(x) >= f(x0) + g (x - x0), whose least value over the box is found coordinate by coordinate.
     """

@@ -9,9 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 PROVEN: Final = (1e-6, 1e-9)
-"""A point is optimal when it is no further above a dual bound than this: relative to its objective,
-plus this much.
-"""
+"""How far an optimal point may lie above a dual bound: relative to its objective, plus this much."""
 
 
 def slack(objective: float) -> float:
@@ -35,7 +33,5 @@ def is_proven(objective: float, bound: float) -> bool:
 
 
 def relative_gap(objective: float, bound: float) -> float:
-    """Objective minus bound over the objective's size, at least 0;
-    1 is the most that is told of an objective near 0.
-    """
+    """Objective minus bound over the objective's size, between 0 and 1."""
     return min(max(objective - bound, 0.0) / max(abs(objective), PROVEN[1]), 1.0)

@@ -12,18 +12,18 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, InstanceError
+from ....models.errors import InstanceError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field, write_field
-from ....models.input_limits import MAX_BYTES
-from ....models.instance.file import check_schema, check_version, parse_json
+from ....models.instance.file import read_document
 from ....models.storage import read_bytes, sha256_of, write_bytes
 from .. import documents
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
-Ending = Literal["optimal", "feasible", "limit", "no point"]
+RunStatus = Literal["optimal", "feasible", "limit", "no point"]
+"""What a run came to; of a submitted point `feasible`."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Record:
     problem_sha256: str
     solver: str
     version: str
-    status: Ending
+    status: RunStatus
     primal: float | None = None
     bound: float | None = None
     seconds: float | None = None
@@ -79,9 +79,7 @@ class Ledger:
         return self.elsewhere.get(str(record.point), self.folder / str(record.point))
 
     def field(self, record: Record) -> CrossField:
-        """The field of a record. Raises InputError, InstanceError when the file is missing,
-        damaged or another one.
-        """
+        """The field of a record. Raises InputError, InstanceError for a missing or another file."""
         path = self.path(record)
         if path.is_file() and sha256_of(path) != record.point_sha256:
             raise InstanceError(
@@ -105,14 +103,8 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
     path = Path(folder) / name
     if not path.exists():
         return Ledger(Path(folder))
-    try:
-        document = parse_json(read_bytes(path, MAX_BYTES).decode())
-        check_version(document, FORMAT, VERSION)
-        given = check_schema(document, "library-ledger", documents.__name__)["records"]
-    except UnicodeDecodeError as error:
-        raise InputError("is not JSON; give the ledger.json of a library", file=path) from error
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
+    schema, remedy = documents.__name__, "give the ledger.json of a library"
+    given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)["records"]
     return Ledger(Path(folder), tuple(Record(**each) for each in given))
 
 
@@ -123,8 +115,7 @@ def write_ledger(ledger: Ledger) -> Path:
 
 
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
-    """The record, now in the ledger of a folder; with a field that is better than the kept one of the entry,
-    that is from now on the kept one.
+    """The record, now in the ledger of a folder; a better field takes the place of the kept one.
 
     The caller holds the lock of the library. The field's file is written first, so that the ledger never
     names what is not there. Records of the same entry that named the file before lose their field, which is
@@ -142,9 +133,7 @@ def add_record(folder: str | Path, record: Record, field: CrossField | None = No
 
 
 def _is_better(record: Record, kept: Record | None) -> bool:
-    """Whether the field of a record is to be kept in place of another one,
-    which may have come while it was looked for.
-    """
+    """Whether a record's field is better than the kept one, which may have come meanwhile."""
     if kept is None or kept.problem_sha256 != record.problem_sha256 or kept.primal is None:
         return True
     return record.primal is None or record.primal < kept.primal
@@ -155,8 +144,7 @@ def _without_point(record: Record) -> Record:
 
 
 def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
-    """The ledger of a folder with the records of another one about these entries and their fields;
-    nothing is written yet.
+    """The ledger of a folder with another's records and fields of these entries; nothing is written.
 
     A field that the folder has for an entry already stays.
     """

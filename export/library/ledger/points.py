@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from ....models.field.field import CrossField
-from ....models.formulations.problem import Problem, formulate
+from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
 from ....models.search.greedy import greedy
@@ -25,14 +25,17 @@ _ROUNDS: Final = 8
 
 @dataclass(frozen=True)
 class Provenance:
-    """Who found a field: solver and version; seconds and the person where
-    somebody measured and submitted it.
-    """
+    """Who found a field: solver and version; seconds and person where somebody submitted it."""
 
     solver: str
     version: str
     seconds: float | None = None
     by: str | None = None
+
+    @classmethod
+    def of(cls, facts: dict[str, Any]) -> Provenance:
+        """Who found a field, by what a document says of it."""
+        return cls(facts["solver"], facts["version"], facts["seconds"], facts["by"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +53,7 @@ def ours(method: str) -> Provenance:
 
 
 def baseline_field(instance: Instance) -> Known:
-    """The greedy field, whose jumps are the data of `qp-fixed`: they are part of an instance,
-    so that no search may change them.
-    """
+    """The greedy field: its jumps are the data of `qp-fixed`, so that no search may change them."""
     return Known(greedy(instance), ours("greedy"))
 
 
@@ -127,8 +128,3 @@ def best_point(problem: Problem, known: Sequence[Known]) -> Best:
     """The point of least objective among those of the known fields, the first of equal ones."""
     points = [Best(problem, each, complete_point(problem, each.field)) for each in known]
     return min(points, key=lambda best: best.objective)
-
-
-def linearised(instance: Instance) -> Problem:
-    """The problem whose objective is the 1-norm energy: `milp-mccormick`."""
-    return formulate(instance, "milp-mccormick")

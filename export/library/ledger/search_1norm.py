@@ -9,11 +9,11 @@ from typing import Final
 
 from ....models.errors import SolutionError
 from ....models.field.field import CrossField
-from ....models.formulations.problem import Problem, with_integers_fixed
+from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ...bundle.starts import write_start
 from ...formats.registry import write
 from ...solutions.solution import read_solution
-from .points import Known, Provenance, field_of, linearised
+from .points import Known, Provenance, field_of
 
 NODES: Final = {"tiny": 1000, "small": 20}
 """Nodes of the branch and bound on a rung; none where the rung is missing."""
@@ -28,7 +28,7 @@ def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
     """
     if start.instance.grid.size > LP_UP_TO:
         return []
-    problem = linearised(start.instance)
+    problem = formulate(start.instance, "milp-mccormick")  # whose objective is the 1-norm energy
     fitted = _solved(with_integers_fixed(problem, start), nodes=0, start=None)
     found = [] if fitted is None else [fitted]
     if rung in NODES:

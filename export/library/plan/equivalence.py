@@ -1,9 +1,9 @@
-"""What is equivalent to what, and what is not: docs/mathematics.md, 5 to 7, as sentences, and what files change."""
+"""What is equivalent to what, and what is not (docs/mathematics.md, 5 to 7); what files change."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
+from typing import Any, Final
 
 from ....models.errors import UnsupportedByFormatError
 from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, TWO_NORM
@@ -11,6 +11,13 @@ from ....models.formulations.problem import Problem
 from ...formats.registry import FORMATS, carried
 from ...writing.canonical import Canonical
 from .recipe import EntryRecipe, entry_name
+
+_FACETS: Final = {
+    "hull": "the facet of the hull, z >= -(pi/4) p1: z = p1 beta_i there, and its optimum is at least as "
+    "high as this one",
+    "printed": "(26) as printed, z >= -pi/4, leaves z free where p1 = 0: a relaxation, whose optimum may be "
+    "lower",
+}
 
 
 def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
@@ -20,7 +27,7 @@ def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
 
 
 def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
-    """Formulations of the same instance that have the same optimum, and why. names: entries of the library."""
+    """Formulations of the instance with the same optimum, and why. names: entries of the library."""
     if recipe.facet == "printed":
         return []
     return [
@@ -28,7 +35,8 @@ def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, An
             recipe,
             other,
             names,
-            f"both minimise {declared.minimises}; {declared.how}; points transfer by alpha, beta and the jumps",
+            f"both minimise {declared.minimises}; {declared.how}; "
+            "points transfer by alpha, beta and the jumps",
         )
         for other, declared in FORMULATIONS.items()
         if other != recipe.formulation and declared.minimises == FORMULATIONS[recipe.formulation].minimises
@@ -63,15 +71,10 @@ def _difference(recipe: EntryRecipe, other: str) -> str:
 
 
 def _other_facet(recipe: EntryRecipe, names: Collection[str]) -> dict[str, Any]:
-    if recipe.facet == "printed":
-        why = "the facet of the hull, z >= -(pi/4) p1: z = p1 beta_i there, and its optimum is at least as high as this one"
-        facet = "hull"
-    else:
-        why = "(26) as printed, z >= -pi/4, leaves z free where p1 = 0: a relaxation, whose optimum may be lower"
-        facet = "printed"
+    facet = "hull" if recipe.facet == "printed" else "printed"
     name = entry_name(recipe.instance, recipe.formulation, facet)
     shown = f"{recipe.formulation} (facet {facet})"
-    return {"formulation": shown, "entry": name if name in names else None, "why": why}
+    return {"formulation": shown, "entry": name if name in names else None, "why": _FACETS[facet]}
 
 
 def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
@@ -92,11 +95,7 @@ def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, 
 
 def transformations(problem: Problem, formats: Collection[str]) -> list[str]:
     """Sentences about what the files change: products lifted, the column ONE, a free variable's bounds."""
-    found: list[str] = []
-    for name in formats:
-        notes = notes_of(problem, name)
-        found += [f".{name}: {note}" for note in notes]
-    return found
+    return [f".{name}: {note}" for name in formats for note in notes_of(problem, name)]
 
 
 def notes_of(problem: Problem, name: str) -> list[str]:

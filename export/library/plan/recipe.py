@@ -1,5 +1,4 @@
-"""What is to be made: every instance and every entry (an instance in one formulation) of a specification,
-with their names.
+"""What is to be made: all instances and entries (an instance in one formulation), with names.
 
 cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
 instance[_printed]_TOKEN              an entry: facet and formulation
@@ -45,9 +44,7 @@ class InstanceRecipe:
 
 @dataclass(frozen=True)
 class EntryRecipe:
-    """How an entry is made: the name of its instance, formulation, facet, formats,
-    and whether files are compressed.
-    """
+    """How an entry is made: instance, formulation, facet, formats, and whether files are compressed."""
 
     name: str
     instance: str

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Final, cast
 
 import numpy as np
-from scipy import ndimage
 
 from ....models.errors import CrossfieldError, InputError
-from ....models.instance.grid import Bools
 from ....models.instance.instance import Gauge, Instance
+from ....models.sketch.outline import largest_part
 from ....models.sketch.read import LEAST_WEIGHT, instance_of
 from ....models.sketch.samples import SAMPLES, sample
 from .recipe import InstanceRecipe
@@ -66,7 +65,7 @@ def random_instance(recipe: InstanceRecipe) -> Instance:
     rng = np.random.Generator(np.random.PCG64(recipe.seed))
     mask = np.ones((recipe.size, recipe.size), dtype=bool)
     if recipe.sketch.what == "ragged":
-        mask = _ragged(rng, recipe.size)
+        mask = largest_part(rng.random(mask.shape) < RAGGED_SHARE)
     inside = np.argwhere(mask)
     count = max(1, round(STROKE_SHARE * len(inside)))
     chosen = np.sort(rng.permutation(len(inside))[:count])
@@ -79,11 +78,3 @@ def random_instance(recipe: InstanceRecipe) -> Instance:
         gauge=cast("Gauge", recipe.gauge),
         source=f"random strokes on a {recipe.sketch.what} mask, seed {recipe.seed}",
     )
-
-
-def _ragged(rng: np.random.Generator, size: int) -> Bools:
-    """The largest 4-connected part of a random share of a square."""
-    label, _ = ndimage.label(rng.random((size, size)) < RAGGED_SHARE)
-    sizes = np.bincount(label.ravel(), minlength=2)[1:]
-    mask: Bools = label == 1 + int(np.argmax(sizes))
-    return mask

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from ....models.errors import InputError, shortened
+from ....models.errors import InputError, naming, shortened
 from ....models.formulations.declaration import FACETS, FORMULATIONS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
@@ -76,8 +76,7 @@ class Rung:
 
 @dataclass(frozen=True)
 class Sketch:
-    """Where instances come from: a sample, a file (its bytes, with those of a mask),
-    or random strokes of some seeds.
+    """Where instances come from: a sample, a file with its mask, or random strokes of some seeds.
 
     name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
     file's own name, or the shape of a random mask.
@@ -165,15 +164,10 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """The specification that a document describes, whose files are found beside `path`.
-
-    Raises InputError, naming `path`.
-    """
-    try:
+    """The specification of a document whose files lie beside `path`. Raises InputError, naming `path`."""
+    with naming(path):
         _check_form(document)
         return _spec(document, path.parent)
-    except InputError as error:
-        raise error if error.file is not None else InputError(str(error), file=path) from error
 
 
 def _check_form(document: dict[str, Any]) -> None:

@@ -1,5 +1,4 @@
-"""A library as a static site: a table of all entries, a page for each instance and each entry, pictures,
-and every file.
+"""A library as a static site: a table of entries, a page for each, pictures, and every file.
 
 Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/,
 files/ (the library itself). Links are relative, nothing is asked of any other place, and without JavaScript
@@ -12,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -26,6 +25,7 @@ from ....models.errors import InputError, InstanceError, OutputError
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.instance.file import read_instance
+from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
@@ -35,8 +35,6 @@ from ..building.instance_task import about_file
 from ..documents.documents import Library, read_about, read_library
 from ..documents.mathematics import model
 from ..plan.spec import RUNGS
-
-Progress = Callable[[str], None]
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")
 """Files of the templates that go into a site as they are."""
@@ -55,9 +53,7 @@ _ROLES: Final = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A field of an instance as it is shown. roles: keys of _ROLES; facts: who found it; told:
-    its singularities.
-    """
+    """A field as it is shown. roles: keys of _ROLES; facts: who found it; told: its singularities."""
 
     roles: tuple[str, ...]
     facts: dict[str, Any]
@@ -86,17 +82,14 @@ class Shown:
         return str(self.about["name"])
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
-        """The field that is shown with an entry: best for the norm that the entry minimises,
-        or the one whose jumps are its data.
-        """
+        """The field shown with an entry: the best in its norm, or the one whose jumps are its data."""
         meaning = FORMULATIONS[entry["formulation"]].minimises
         role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
         return next(each for each in self.pictures if role in each.roles)
 
 
-def write_site(folder: str | Path, output: str | Path, progress: Progress = lambda _: None) -> list[Path]:
-    """The pages of the site about the library in `folder`, written to `output`,
-    where an earlier site is replaced as a whole.
+def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:
+    """The pages of the site about the library in `folder`; an earlier site in `output` is replaced.
 
     Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
     OutputError when `output` cannot be written or holds something other than a site.
@@ -315,8 +308,7 @@ def size(number: int) -> str:
 
 @contextmanager
 def _replacing_folder(output: Path) -> Iterator[Path]:
-    """An empty neighbour of a folder that takes its place on success;
-    on failure it is removed and what stood there stays.
+    """An empty neighbour of a folder that takes its place on success; on failure it is removed.
 
     Raises OutputError when the folder holds something other than a site, or nothing can be written beside it.
     """
@@ -356,9 +348,7 @@ def _check_replaceable(output: Path) -> None:
 
 
 def _take_place(stage: Path, output: Path) -> None:
-    """Rename the new folder to the old one's name; the old one goes only after that,
-    and comes back if it fails.
-    """
+    """Rename the new folder to the old one's name; the old one comes back if that fails."""
     old = stage.with_suffix(".old")
     if output.exists():
         output.rename(old)

@@ -1,5 +1,5 @@
 """One module a kind of solution file.
 
-The table of readers, what they share (text), and a reader for each kind: AMPL, BARON, CBC, CPLEX, GAMS, GLPK, Gurobi, HiGHS, MIPLIB,
-SCIP, Xpress. A reader says what stands in a file; what that means for a problem is export/solutions.
+The table of readers, what they share (text), and a reader for each kind. A reader says what stands in a file;
+what that means for a problem is export/solutions.
 """

@@ -2,12 +2,12 @@
 
 Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl and ampl/mp):
 
-    optimal solution found          any lines of message; Bonmin and Couenne begin with an empty one, Minto writes none
+    optimal solution found          message: Bonmin and Couenne begin with an empty line, Minto has none
                                     an empty line
     Options
     3                               number k of options, the first number of the .nl file
     1
-    1                               if this one is 3, then k is 2 too large and a real number (vbtol) follows the counts
+    1                               if 3, then k is 2 too large and a number (vbtol) follows the counts
     0
     2                               number of constraints
     0                               number of dual values that follow: all or none
@@ -15,16 +15,17 @@ Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl an
     5                               number of values that follow: all or none
     10                              dual values, then values, in the order of the .nl file
     ...
-    objno 0 0                       number of the objective and solve code; the code or the line may be missing
+    objno 0 0                       objective's number and solve code; code or line may be missing
     suffix ...                      suffixes and other text, not needed here
 
-If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told apart
-without the problem. The binary form has the same parts as records between their lengths, as Fortran writes them:
-integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes too few.
+If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told
+apart without the problem. The binary form has the same parts as records between their lengths, as Fortran
+writes them: integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes
+too few.
 
-The solve code says `solved` and no more. It counts as a global proof only where the message names a solver that
-proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is left out for saying
-Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
+The solve code says `solved` and no more. It counts as a global proof only where the message names a solver
+that proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is
+left out for saying Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
 """
 
 from __future__ import annotations
@@ -41,20 +42,7 @@ import numpy as np
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
 from ....models.storage import replacing
-from .text import (
-    HEAD,
-    Cursor,
-    RawSolution,
-    Status,
-    is_number,
-    numbers,
-    one_line,
-    shown,
-    with_unix_ends,
-)
-
-TEXT: Final = "ampl-text"
-BINARY: Final = "ampl-binary"
+from .text import HEAD, Cursor, RawSolution, Reader, Status, begins, is_number, numbers, one_line, shown
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _AFTER_NUMBERS = re.compile(rb"^(?:objno|suffix)\b", re.MULTILINE)
@@ -95,20 +83,12 @@ _CODES: Final = (
 )
 
 
-def recognises_text(head: bytes) -> bool:
-    """Whether a file that begins so is an AMPL solution in text form."""
-    head = with_unix_ends(head)
+def _recognises_text(head: bytes) -> bool:
     return _OPTIONS.search(head) is not None or _start_of_numbers(head) is not None
 
 
-def recognises_binary(head: bytes) -> bool:
-    """Whether a file that begins so is an AMPL solution in binary form."""
-    return head.startswith(_MAGIC)
-
-
 def parse_text(data: bytes) -> RawSolution:
-    """The content of a text file. Raises SolutionError for files that are cut off or whose numbers do not fit."""
-    data = with_unix_ends(data)
+    """The content of a text file. Raises SolutionError where it is cut off or numbers do not fit."""
     found = _OPTIONS.search(data, 0, HEAD)
     if found is None:
         return _parse_without_options(data)
@@ -116,7 +96,7 @@ def parse_text(data: bytes) -> RawSolution:
     counts = _read_counts(cursor)
     values = _read_values(cursor, counts)
     code = _read_code(cursor)
-    return _solution(TEXT, data[: found.start()], code, values, counts.rows)
+    return _solution(data[: found.start()], code, values, counts.rows)
 
 
 def _start_of_numbers(head: bytes) -> int | None:
@@ -144,8 +124,8 @@ class _Counts(NamedTuple):
         if self.duals in {0, self.rows} and self.values in {0, self.columns}:
             return None
         return (
-            f"{self.duals} dual values are announced for {self.rows} constraints and {self.values} values for {self.columns} "
-            "variables, where all or none should be"
+            f"{self.duals} dual values are announced for {self.rows} constraints "
+            f"and {self.values} values for {self.columns} variables, where all or none should be"
         )
 
 
@@ -199,24 +179,20 @@ def _parse_without_options(data: bytes) -> RawSolution:
     start = _start_of_numbers(data[:HEAD])
     if start is None:
         raise SolutionError(
-            "there is neither an Options line nor a number after the message; let the solver write the file again"
+            "there is neither an Options line nor a number after the message; "
+            "let the solver write the file again"
         )
-    stop = _end_of_numbers(data, start)
-    return _solution(TEXT, data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
-
-
-def _end_of_numbers(data: bytes, start: int) -> int:
     found = _AFTER_NUMBERS.search(data, start)
-    return len(data) if found is None else found.start()
+    stop = len(data) if found is None else found.start()
+    return _solution(data[:start], _read_code(Cursor(data, stop)), numbers(data, start, stop), None)
 
 
-def _solution(reader: str, message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
+def _solution(message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
         raise SolutionError("the file says solved and holds no values; let the solver write the file again")
-    return RawSolution(
-        reader, _status(code, words, with_point=values.size > 0), words, None, None, values, rows=rows
-    )
+    status = _status(code, words, with_point=values.size > 0)
+    return RawSolution(status, words, None, None, values, rows=rows)
 
 
 def _status(code: int | None, message: str, *, with_point: bool) -> Status:
@@ -231,19 +207,20 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
 
 
 def parse_binary(data: bytes) -> RawSolution:
-    """The content of a binary file. Raises SolutionError for files that are cut off or whose records do not fit."""
+    """The content of a binary file. Raises SolutionError where it is cut off or does not fit."""
     records = _Records(data, len(_MAGIC))
     message = b"\n".join(iter(records.take, b""))
     counts = records.take_counts()
     duals, values = records.take_numbers("dual values"), records.take_numbers("values")
     if counts and (duals.size, values.size) != (counts.duals, counts.values):
         raise records.fault(
-            f"{counts.duals} dual values and {counts.values} values are announced, {duals.size} and {values.size} follow"
+            f"{counts.duals} dual values and {counts.values} values are announced, "
+            f"{duals.size} and {values.size} follow"
         )
     if np.isnan(values).any():
         raise records.fault("one of the values is not a number")
     rows = counts.rows if counts else duals.size
-    return _solution(BINARY, message, records.take_code(), values, rows)
+    return _solution(message, records.take_code(), values, rows)
 
 
 @dataclass
@@ -319,8 +296,8 @@ def write_ampl_sol(
     """The path, now holding an AMPL solution file, text or binary.
 
     primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
-    rows: number of constraints. code: solve code as in the head of this module. Numbers are written so that they are
-    read back bit by bit.
+    rows: number of constraints. code: solve code as in the head of this module. Numbers are read back bit by
+    bit.
 
     Raises SolutionError when a value is not finite, OutputError when the file cannot be written.
     """
@@ -369,3 +346,9 @@ def _binary_parts(message: str, primal: Floats, counts: tuple[int, ...], code: i
 def _record(content: bytes) -> bytes:
     length = len(content).to_bytes(4, "little")
     return length + content + length
+
+
+READERS: Final = (
+    Reader("ampl-binary", "AMPL .sol, binary", begins(_MAGIC), parse_binary, text=False),
+    Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text),
+)

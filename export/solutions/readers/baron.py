@@ -9,15 +9,17 @@
 
     The above solution has an objective value of:  -14.4
 
-Normal completion is a global proof: of the optimum, of infeasibility when there is no table, of unboundedness when a ray follows it.
-It is none when the options FirstFeas or FirstLoc stopped the search: then the point is called feasible. That bounds were missing, so that
-nothing is proven, only tim.lst says. sum.lst begins like res.lst and has no values: it is refused. A tim.lst has one line:
+Normal completion is a global proof: of the optimum, of infeasibility when there is no table, of unboundedness
+when a ray follows it. It is none when the options FirstFeas or FirstLoc stopped the search: then the point is
+called feasible. That bounds were missing, so that nothing is proven, only tim.lst says. sum.lst begins like
+res.lst and has no values: it is refused. A tim.lst has one line:
 
     problem 2 16 10189 50 0.18 0.19 1 1 0 13 5 3 0.24 0.37
 
-that is name, constraints, variables, (two more,) lower and upper bound, solver status, model status, missing bounds, iterations, node of
-the best point (-3: there is none), nodes in memory, seconds of processor and clock; older versions have fewer at the end. We always
-minimise. Model status 1 is claimed for FirstFeas too, which tim.lst does not tell. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
+that is name, constraints, variables, (two more,) lower and upper bound, solver status, model status, missing
+bounds, iterations, node of the best point (-3: there is none), nodes in memory, seconds of processor and
+clock; older versions have fewer at the end. We always minimise. Model status 1 is claimed for FirstFeas too,
+which tim.lst does not tell. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
 """
 
 from __future__ import annotations
@@ -31,19 +33,16 @@ from .text import (
     Bytes,
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     is_number,
     labelled_numbers,
     one_line,
     shown,
-    with_unix_ends,
     without_point,
 )
 
-RESULTS: Final = "baron-res"
-TIMES: Final = "baron-tim"
-
-_HEAD = re.compile(rb"=+\n BARON version ")
 _SUMMARY: Final = b"\n Best solution found at node:"
 _BANNER = re.compile(rb"^ *\*\*\* ([^*\n]{3,100}?) \*\*\* *$", re.MULTILINE)
 _TABLE: Final = b"\nThe best solution found is"
@@ -88,12 +87,7 @@ _UNPROVEN: Final = {
 _NO_NODE: Final = b"-3"
 
 
-def recognises_results(head: bytes) -> bool:
-    """Whether a file that begins so is a res.lst (or sum.lst)."""
-    return _HEAD.match(with_unix_ends(head)) is not None
-
-
-def recognises_times(head: bytes) -> bool:
+def _recognises_times(head: bytes) -> bool:
     """Whether a file that begins so is a tim.lst: one line of a name and numbers."""
     words = head.split()
     alone = len(head.strip().splitlines()) == 1 and _FEWEST_WORDS <= len(words) <= _MOST_WORDS
@@ -101,8 +95,7 @@ def recognises_times(head: bytes) -> bool:
 
 
 def parse_results(data: bytes) -> RawSolution:
-    """The content of a res.lst. Raises SolutionError for a sum.lst, a file that is cut off and what is not a number."""
-    data = with_unix_ends(data)
+    """The content of a res.lst. Raises SolutionError for a sum.lst and what is cut off or no number."""
     if _SUMMARY in data:
         raise SolutionError("this is the summary of BARON, which holds no values; give its results, res.lst")
     banners = [found[1] for found in _BANNER.finditer(data)]
@@ -120,11 +113,11 @@ def parse_results(data: bytes) -> RawSolution:
             raise SolutionError(
                 "the file is cut off: points were found, and the table of the best is not there"
             )
-        return without_point(RESULTS, status, words)
+        return without_point(status, words)
     names, values, objective = _table(data, at + 1)
     if abs(objective) >= _INFINITE:
-        return without_point(RESULTS, Status.UNBOUNDED, words)
-    return RawSolution(RESULTS, status, words, objective, names, values)
+        return without_point(Status.UNBOUNDED, words)
+    return RawSolution(status, words, objective, names, values)
 
 
 def _status(banner: bytes, *, has_table: bool, unbounded: bool) -> Status:
@@ -155,7 +148,7 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
 
 
 def parse_times(data: bytes) -> RawSolution:
-    """The status in a tim.lst, without a point. Raises SolutionError for codes that are none and a line that is cut off."""
+    """The status in a tim.lst, without a point. Raises SolutionError for unknown codes or a cut."""
     if not data.endswith(b"\n"):
         raise SolutionError("line 1: the line is cut off; let BARON write the file again")
     words = data.split()
@@ -168,7 +161,7 @@ def parse_times(data: bytes) -> RawSolution:
         status, text = _UNPROVEN.get(status, status), f"{text}, bounds are missing"
     if status is Status.LIMIT_WITHOUT_POINT and solver not in _LIMITS | {1}:
         status = Status.ERROR
-    return without_point(TIMES, status, f"{text}; {_SOLVER.get(solver, f'solver status {solver}')}")
+    return without_point(status, f"{text}; {_SOLVER.get(solver, f'solver status {solver}')}")
 
 
 def _code(word: bytes) -> int:
@@ -177,3 +170,9 @@ def _code(word: bytes) -> int:
             f"line 1: {shown(word)} is not the number of a status; let BARON write the file again"
         )
     return int(word)
+
+
+READERS: Final = (
+    Reader("baron-res", "BARON results (res.lst)", begins(rb"=+\n BARON version "), parse_results),
+    Reader("baron-tim", "BARON times (tim.lst), for the status alone", _recognises_times, parse_times),
+)

@@ -4,9 +4,10 @@
           0 x                     10                    -1.9      number, name, value, reduced cost
     **    3 y                    200                       0      ** before what is out of its bounds
 
-Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file. `printingOptions all` or
-`rows` puts the rows before the columns: their numbers start again, and what stands before must be no columns. Some versions and options omit columns at 0; a file that
-holds a value of 0 does not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
+Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file.
+`printingOptions all` or `rows` puts the rows before the columns: their numbers start again, and what stands
+before must be no columns. Some versions and options omit columns at 0; a file that holds a value of 0 does
+not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
 relaxation, (no integer solution - continuous used): both hold no point. Layouts: CBC 2.10.8.
 """
 
@@ -20,17 +21,16 @@ import numpy as np
 from .text import (
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     fault,
     labelled_numbers,
     line_after,
     one_line,
     shown,
-    with_unix_ends,
     without_point,
 )
-
-NAME: Final = "cbc"
 
 _HEAD = re.compile(rb"([A-Z][^\n]{2,100}?) - objective value +(\S+)")
 _MARK: Final = b"\n**"
@@ -45,25 +45,18 @@ _WORDS: Final = (
     (b"stopped on difficulties", Status.ERROR),
     (b"stopped", Status.LIMIT_WITH_POINT),
 )
-_WITH_POINT: Final = {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}
-
-
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by CBC."""
-    return _HEAD.match(head) is not None
 
 
 def parse(data: bytes) -> RawSolution:
     """The content of a file. Raises SolutionError for what is not a number and files that are cut off."""
-    data = with_unix_ends(data)
     cursor = Cursor(data)
     line = cursor.line("the status and the objective")
     head = _HEAD.fullmatch(line)
     if head is None:
         raise cursor.fault(f"{shown(line)} is not a status and the objective")
     status = _status(head[1])
-    if status not in _WITH_POINT:
-        return without_point(NAME, status, head[1])
+    if not status.promises_point:
+        return without_point(status, head[1])
     objective = cursor.number(head[2])
     names, numbers = labelled_numbers(
         data.replace(_MARK, b"\n  "), cursor.position, len(data), 4, label=1, numeric=(0, 2)
@@ -71,13 +64,10 @@ def parse(data: bytes) -> RawSolution:
     starts = np.flatnonzero(np.diff(numbers[:, 0]) <= 0) + 1
     if len(starts) > 1:
         at = line_after(data, cursor.position, int(starts[1]))
-        raise fault(
-            data, at, "the numbers start again for the second time; let the solver write the file again"
-        )
+        raise fault(data, at, "the numbers start again for the second time")
     first = int(starts[0]) if len(starts) else 0
     values = numbers[first:, 1].copy()
     return RawSolution(
-        NAME,
         status,
         one_line(head[1]),
         objective,
@@ -91,6 +81,9 @@ def parse(data: bytes) -> RawSolution:
 def _status(words: bytes) -> Status:
     known = (status for start, status in _WORDS if words.lower().startswith(start))
     status = next(known, Status.ERROR)
-    if _CONTINUOUS in words and status in _WITH_POINT:
+    if _CONTINUOUS in words and status.promises_point:
         return Status.LIMIT_WITHOUT_POINT
     return status
+
+
+READERS: Final = (Reader("cbc", "CBC, the file of its command solution", begins(_HEAD.pattern), parse),)

@@ -1,15 +1,16 @@
-"""Solution files of CPLEX, XML: one solution, or a pool of them, of which the first is taken: that is the incumbent.
+"""Solution files of CPLEX, XML: one solution, or a pool, of which the first is the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
-     <header objectiveValue="-14.4" solutionStatusValue="101" solutionStatusString="integer optimal solution" writeLevel="1"/>
+     <header objectiveValue="-14.4" writeLevel="1"
+      solutionStatusValue="101" solutionStatusString="integer optimal solution"/>
      <linearConstraints> ...               rows are not needed here
      <variables>
       <variable name="x" index="0" value="10"/>
 
-writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold the integer columns only. Status codes are those of
-CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones. A file of an infeasible problem has values too, which
-are no point. Without any solution CPLEX writes no file (error 1217). Nothing but elements is accepted: no DTD and no entities.
-Layouts: CPLEX 22.2.0.
+writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold the integer columns only.
+Status codes are those of CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones. A file of an
+infeasible problem has values too, which are no point. Without any solution CPLEX writes no file (error 1217).
+Nothing but elements is accepted: no DTD and no entities. Layouts: CPLEX 22.2.0.
 """
 
 from __future__ import annotations
@@ -23,9 +24,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
-from .text import RawSolution, Status, named_pairs, number_of, one_line, without_point
-
-NAME: Final = "cplex"
+from .text import RawSolution, Reader, Status, begins, named_pairs, number_of, one_line, without_point
 
 _HEAD = re.compile(rb"\s*<[?!C]")
 _ROOT: Final = b"<CPLEXSolution"
@@ -47,18 +46,11 @@ _STATUS: Final = {code: status for status, codes in _CODES.items() for code in c
 _STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
 """A continuous problem was stopped; the header says whether the point is feasible."""
 
-_POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED, Status.LIMIT_WITHOUT_POINT, Status.ERROR}
-
-
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by CPLEX."""
-    return _HEAD.match(head) is not None and _ROOT in head
-
 
 def parse(data: bytes) -> RawSolution:
     """The content of a file, of a pool its first solution, which the message then says.
 
-    Raises SolutionError, with the line, for XML that is damaged, cut off or has entities, and for values that are none.
+    Raises SolutionError, with the line, for XML that is damaged or has entities, and for what is no number.
     """
     first = _parsed(data)
     if first.header is None:
@@ -68,8 +60,8 @@ def parse(data: bytes) -> RawSolution:
     if first.solutions > 1:
         name = first.header.get("solutionName", "without a name")
         words += f"; {name}, the first of {first.solutions} solutions"
-    if status in _POINTLESS:
-        return without_point(NAME, status, words)
+    if not status.promises_point:
+        return without_point(status, words)
     return _with_point(first, status, words)
 
 
@@ -78,14 +70,15 @@ def _with_point(first: _FirstSolution, status: Status, words: str) -> RawSolutio
     level = header.get("writeLevel", "1")
     if level in _INTEGERS_ONLY:
         raise SolutionError(
-            f"the file was written with writeLevel {level} and holds the integer columns only; use level 1 (AllVars)"
+            f"the file was written with writeLevel {level} and holds the integer columns only; "
+            "use level 1 (AllVars)"
         )
     names, values = named_pairs(first.names, first.values)
     omits = level == _OMITS_ZEROS
     if not (omits or len(values)):
         raise SolutionError("the file holds no variables; let CPLEX write it again")
     objective = number_of(header.get("objectiveValue", "").encode(errors="replace"))
-    return RawSolution(NAME, status, one_line(words.encode()), objective, names, values, omits_zeros=omits)
+    return RawSolution(status, one_line(words.encode()), objective, names, values, omits_zeros=omits)
 
 
 def _status(header: dict[str, str]) -> Status:
@@ -98,7 +91,7 @@ def _status(header: dict[str, str]) -> Status:
 
 
 class _FirstSolution:
-    """Takes elements as they are parsed and keeps what is needed of the first solution, so that no tree is built."""
+    """Takes elements as they are parsed and keeps the first solution, so that no tree is built."""
 
     def __init__(self) -> None:
         self.header: dict[str, str] | None = None
@@ -148,3 +141,6 @@ def _parsed(data: bytes) -> _FirstSolution:
         line = parser.parser.CurrentLineNumber
         raise SolutionError(f"line {line}: {error}; let CPLEX write the file again") from error
     return first
+
+
+READERS: Final = (Reader("cplex", "CPLEX .sol (XML)", begins(rb"(?s)\s*(?=<[?!C]).*<CPLEXSolution"), parse),)

@@ -4,10 +4,11 @@
     solver_status,1
     problem,sha256_1a2b3c4d5e6f               older files have no such line
     objective, 5.565360828459345E-01
-    alpha_00_00, 1.146018366025520E-01     every column in order; EPS is a zero, +INF and -INF occur, NA and UNDF are no values
+    alpha_00_00, 1.146018366025520E-01     every column in order
 
-GAMS's numbers of the two states are in the manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves
-the start in the levels: values are then not read.
+EPS is a zero, +INF and -INF occur, NA and UNDF are no values. GAMS's numbers of the two states are in the
+manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves the start in the
+levels: values are then not read.
 """
 
 from __future__ import annotations
@@ -15,11 +16,8 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .text import Cursor, RawSolution, Status, named_numbers, shown, with_unix_ends, without_point
+from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, shown, without_point
 
-NAME: Final = "gams-csv"
-
-_HEAD: Final = b"model_status,"
 _EPS = re.compile(rb",[ ]*EPS[ ]*$", re.MULTILINE)
 _NO_VALUE: Final = {b"NA", b"UNDF"}
 
@@ -54,12 +52,6 @@ _SOLVER: Final = {
     13: "system failure",
 }
 _LIMITS: Final = {2, 3, 4, 8}
-_HAS_POINT: Final = {
-    Status.OPTIMAL_GLOBAL,
-    Status.OPTIMAL_LOCAL,
-    Status.FEASIBLE,
-    Status.LIMIT_WITH_POINT,
-}
 
 
 def status_of(model: int, solver: int) -> tuple[Status, str]:
@@ -72,28 +64,22 @@ def status_of(model: int, solver: int) -> tuple[Status, str]:
     return status, f"{words}; {_SOLVER.get(solver, f'solver status {solver}')}"
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by one of our GAMS files."""
-    return head.startswith(_HEAD)
-
-
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for NA, UNDF, what is not a number and a file that is cut off."""
-    data = with_unix_ends(data)
+    """The content of a file. Raises SolutionError for NA, UNDF, what is no number or is cut off."""
     cursor = Cursor(data)
     status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))
     if data.startswith(b"problem,", cursor.position):
         _field(cursor, b"problem")  # what reads every kind of file looks at it
     text = _field(cursor, b"objective")
     objective = None if text in _NO_VALUE else cursor.number(b"0" if text == b"EPS" else text)
-    if status not in _HAS_POINT:
-        return without_point(NAME, status, words)
+    if not status.promises_point:
+        return without_point(status, words)
     if b"EPS" in data:
         data = _EPS.sub(b",0", data)
     names, values = named_numbers(data.replace(b",", b" "), cursor.position, len(data), 2)
     if not len(values):
         raise cursor.fault("no columns follow")
-    return RawSolution(NAME, status, words, objective, names, values)
+    return RawSolution(status, words, objective, names, values)
 
 
 def _field(cursor: Cursor, expected: bytes) -> bytes:
@@ -109,3 +95,10 @@ def _state(cursor: Cursor, expected: bytes) -> int:
     if not re.fullmatch(rb"\d{1,3}", text):
         raise cursor.fault(f"{shown(text)} is not the number of a state")
     return int(text)
+
+
+READERS: Final = (
+    Reader(
+        "gams-csv", "GAMS, the CSV that our models write with --RESULTS", begins(rb"model_status,"), parse
+    ),
+)

@@ -1,11 +1,11 @@
-"""Listings of GAMS (.lst), for the status alone: their values have four decimals, so that no point is read from them.
+"""Listings of GAMS (.lst), for the status alone: values have four decimals, too few for a point.
 
                    S O L V E      S U M M A R Y
     **** SOLVER STATUS     1 Normal Completion
     **** MODEL STATUS      2 Locally Optimal
 
-Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model that does not compile leaves none, but `**** 2 ERROR(S)`.
-Layout: GAMS 54.6.1.
+Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
+that does not compile leaves none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
 """
 
 from __future__ import annotations
@@ -15,11 +15,8 @@ from typing import Final
 
 from ....models.errors import SolutionError
 from .gams_csv import status_of
-from .text import RawSolution, Status, with_unix_ends, without_point
+from .text import RawSolution, Reader, Status, begins, without_point
 
-NAME: Final = "gams-lst"
-
-_HEAD = re.compile(rb"GAMS [^\n]{1,200} Page 1[ \t]*$", re.MULTILINE)
 _SUMMARY: Final = b"S O L V E      S U M M A R Y"
 _LONGEST_SUMMARY: Final = 4096
 _END: Final = b"\n**** FILE SUMMARY"
@@ -29,17 +26,11 @@ _STATES = re.compile(
 _ERRORS = re.compile(rb"^\*\*\*\* +(\d+ ERROR\(S\)[^\n]*|USER ERROR\(S\) ENCOUNTERED)", re.MULTILINE)
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so is a listing of GAMS."""
-    return _HEAD.match(with_unix_ends(head)) is not None
-
-
 def parse(data: bytes) -> RawSolution:
     """The status of the last solve in a listing, without a point.
 
     Raises SolutionError when it is cut off or has neither a solve nor an error.
     """
-    data = with_unix_ends(data)
     at = data.rfind(_SUMMARY)
     if at < 0:
         return _without_solve(data)
@@ -49,11 +40,16 @@ def parse(data: bytes) -> RawSolution:
     if data.find(_END, states.end()) < 0:
         raise SolutionError("the listing is cut off after a solve: it has no FILE SUMMARY; run GAMS again")
     status, words = status_of(int(states[2]), int(states[1]))
-    return without_point(NAME, status, words)
+    return without_point(status, words)
 
 
 def _without_solve(data: bytes) -> RawSolution:
     found = _ERRORS.search(data)
     if found is None:
         raise SolutionError("the listing has no summary of a solve; let the GAMS file run to its end")
-    return without_point(NAME, Status.ERROR, found[1])
+    return without_point(Status.ERROR, found[1])
+
+
+_PAGE: Final = rb"(?m)GAMS [^\n]{1,200} Page 1[ \t]*$"
+
+READERS: Final = (Reader("gams-lst", "GAMS listing (.lst), for the status alone", begins(_PAGE), parse),)

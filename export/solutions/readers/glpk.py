@@ -7,11 +7,12 @@
     j 1 10                                 columns, in the order of the LP or MPS file
     e o f
 
-Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the primal and one for the
-dual side. The order of the columns is told by the problem's name: our LP files put ONE first and have no name, our MPS files put it last;
-in a .mod the objective is named energy, which is the first row too.
-`glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its style 2 and counts the objective as
-one more row, which is found out when the sizes are compared. Layouts: GLPK 5.0.
+Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the
+primal and one for the dual side. The order of the columns is told by the problem's name: our LP files put ONE
+first and have no name, our MPS files put it last; in a .mod the objective is named energy, which is the first
+row too. `glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its
+style 2 and counts the objective as one more row, which is found out when the sizes are compared. Layouts:
+GLPK 5.0.
 """
 
 from __future__ import annotations
@@ -27,18 +28,16 @@ from ...writing.canonical import Order
 from .text import (
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     fault,
     labelled_numbers,
     line_after,
     shown,
-    with_unix_ends,
     without_point,
 )
 
-NAME: Final = "glpk"
-
-_HEAD = re.compile(rb"c Problem:|s (?:mip|bas|ipt) ")
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"
 _GOAL_OF_MOD: Final = b"energy ="
@@ -58,7 +57,6 @@ _STATUS: Final = {
     b"n n": Status.INFEASIBLE,
     b"n u": Status.INFEASIBLE,
 }
-_WITH_POINT: Final = {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}
 
 
 class _Summary(NamedTuple):
@@ -71,14 +69,8 @@ class _Summary(NamedTuple):
     objective: float
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by GLPK, or by HiGHS in the manner of GLPK."""
-    return _HEAD.match(head) is not None
-
-
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for counts that do not fit and for a file that is cut off."""
-    data = with_unix_ends(data)
+    """The content of a file. Raises SolutionError for counts that do not fit and for a cut file."""
     cursor = Cursor(data)
     comments = _comments(cursor)
     order = _order(comments)
@@ -86,11 +78,11 @@ def parse(data: bytes) -> RawSolution:
     message = comments.get(b"Status", b"").decode(errors="replace").lower()
     if not data.rstrip().endswith(b"\n" + _END):
         raise SolutionError("the file is cut off: it has no line `e o f`; let the solver write it again")
-    if summary.status not in _WITH_POINT:
-        return without_point(NAME, summary.status, message, rows=summary.rows)
+    if not summary.status.promises_point:
+        return without_point(summary.status, message, rows=summary.rows)
     values = _columns(data, cursor.position, summary)
     return RawSolution(
-        NAME, summary.status, message, summary.objective, None, values, rows=summary.rows, order=order
+        summary.status, message, summary.objective, None, values, rows=summary.rows, order=order
     )
 
 
@@ -125,17 +117,12 @@ def _columns(data: bytes, start: int, summary: _Summary) -> Floats:
         data, start, stop, summary.words, label=0, numeric=(1, 2 + (summary.words == 5))
     )
     if len(letters) != summary.columns:
-        raise fault(
-            data,
-            start,
-            f"{summary.columns} columns are announced, {len(letters)} lines follow; let the solver write the file again",
-        )
+        raise fault(data, start, f"{summary.columns} columns are announced, {len(letters)} lines follow")
     wrong = (letters != b"j") | (numbers[:, 0] != np.arange(1, summary.columns + 1))
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise fault(
-            data,
-            line_after(data, start, at),
-            f"this is not the line of column {at + 1}; let the solver write the file again",
-        )
+        raise fault(data, line_after(data, start, at), f"this is not the line of column {at + 1}")
     return numbers[:, 1].copy()
+
+
+READERS: Final = (Reader("glpk", "GLPK, glpsol -w", begins(rb"c Problem:|s (?:mip|bas|ipt) "), parse),)

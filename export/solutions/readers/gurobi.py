@@ -1,17 +1,18 @@
-"""Solution files of Gurobi: .sol and .json. The .sol layout is also that of COPT, and of any plain list of names and values.
+"""Solution files of Gurobi: .sol and .json. COPT's .sol and plain lists of values are alike.
 
-    # Solution for model obj               comment lines; they vary from version to version, and the first may be missing
+    # Solution for model obj               comment lines, which vary; the first may be missing
     # Objective value = -1.44e+01
     x 10                                   name and value of every column, zeros too
 
-A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one and holds the
-integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
+A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one
+and holds the integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
 
     { "SolutionInfo": { "Status": 2, "ObjVal": ..., "ObjBound": ..., ... },
       "Vars": [ { "VarName": "x", "X": 10}, ... ]}
 
-Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further solutions too, which are not
-read: X is the incumbent. Without a solution there is no Vars, and bounds are 1e+100. Layouts: Gurobi 13.0.3.
+Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further
+solutions too, which are not read: X is the incumbent. Without a solution there is no Vars, and bounds are
+1e+100. Layouts: Gurobi 13.0.3.
 """
 
 from __future__ import annotations
@@ -26,21 +27,18 @@ from .text import (
     Bytes,
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     is_number,
     named_numbers,
     named_pairs,
-    with_unix_ends,
     without_point,
 )
-
-NAME: Final = "gurobi"
-JSON: Final = "gurobi-json"
 
 _MARK = re.compile(rb"# ?(?:Solution for model|Objective value|MIP start)\b", re.IGNORECASE)
 _OBJECTIVE = re.compile(rb"# ?Objective value ?=? *(\S+)", re.IGNORECASE)
 _START = re.compile(rb"# ?MIP start\b", re.IGNORECASE)
-_JSON = re.compile(rb'\s*\{\s*"SolutionInfo"')
 _LINES_TO_TELL: Final = 5
 _INFINITE: Final = 1e100
 
@@ -63,13 +61,10 @@ _STATUS: Final = {
     19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # no proof of anything, and no point
 }
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
-_WITHOUT_POINT: Final = {
-    Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT,
-    Status.FEASIBLE: Status.ERROR,
-}
+_WITHOUT_POINT: Final = {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.FEASIBLE: Status.ERROR}
 
 
-def recognises(head: bytes) -> bool:
+def _recognises(head: bytes) -> bool:
     """Whether a file that begins so is a .sol of Gurobi, or a list of names and values without comments."""
     if _MARK.match(head):
         return True
@@ -85,14 +80,8 @@ def _is_pair(line: bytes) -> bool:
     )
 
 
-def recognises_json(head: bytes) -> bool:
-    """Whether a file that begins so is a .json of Gurobi."""
-    return _JSON.match(head) is not None
-
-
 def parse(data: bytes) -> RawSolution:
-    """The content of a .sol. Raises SolutionError for a MIP start, for no values at all and for what is not a number."""
-    data = with_unix_ends(data)
+    """The content of a .sol. Raises SolutionError for a MIP start, no values, and no number."""
     cursor, objective = Cursor(data), None
     while data.startswith(b"#", cursor.position):
         line = cursor.line("the end of a comment")
@@ -103,11 +92,11 @@ def parse(data: bytes) -> RawSolution:
     names, values = named_numbers(data, cursor.position, len(data), 2)
     if not len(values):
         raise SolutionError("the file holds no values; let the solver write it again")
-    return RawSolution(NAME, Status.FEASIBLE, "", objective, names, values)
+    return RawSolution(Status.FEASIBLE, "", objective, names, values)
 
 
 def parse_json(data: bytes) -> RawSolution:
-    """The content of a .json: the incumbent. Raises SolutionError for damaged JSON and for values that are none."""
+    """The incumbent in a .json. Raises SolutionError for damaged JSON and for values that are none."""
     content = _document(data)
     information, variables = content.get("SolutionInfo"), content.get("Vars")
     if not isinstance(information, dict) or not isinstance(information.get("Status"), int):
@@ -118,10 +107,10 @@ def parse_json(data: bytes) -> RawSolution:
     if variables is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError("the file says optimal and holds no Vars; let Gurobi write it again")
-        return without_point(JSON, _WITHOUT_POINT.get(status, status), words)
+        return without_point(_WITHOUT_POINT.get(status, status), words)
     names, values = _columns(variables)
     objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
-    return RawSolution(JSON, status, words, objective, names, values, omits_zeros=True, bound=bound)
+    return RawSolution(status, words, objective, names, values, omits_zeros=True, bound=bound)
 
 
 def _finite(value: Any) -> float | None:
@@ -134,7 +123,8 @@ def _document(data: bytes) -> dict[str, Any]:
         content = json.loads(data, object_pairs_hook=_object, parse_int=_integer)
     except json.JSONDecodeError as error:
         raise SolutionError(
-            f"line {error.lineno}: the JSON is damaged or cut off at column {error.colno}; let Gurobi write the file again"
+            f"line {error.lineno}: the JSON is damaged or cut off at column {error.colno}; "
+            "let Gurobi write the file again"
         ) from error
     except (ValueError, RecursionError) as error:
         raise SolutionError("the JSON is damaged; let Gurobi write the file again") from error
@@ -162,3 +152,9 @@ def _columns(variables: Any) -> tuple[Bytes, Floats]:
 
 def _is_column(entry: Any) -> bool:
     return isinstance(entry, tuple) and isinstance(entry[0], str) and type(entry[1]) in {int, float}
+
+
+READERS: Final = (
+    Reader("gurobi-json", "Gurobi .json", begins(rb'\s*\{\s*"SolutionInfo"'), parse_json),
+    Reader("gurobi", "Gurobi .sol, or any list of names and values", _recognises, parse),
+)

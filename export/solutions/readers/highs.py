@@ -11,11 +11,11 @@ Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
     # Columns 5                     style 4: minus the number of columns that are not zero
     x 10                            name and value; style 4: and the column's number
     ...
-    # Rows 2                        style 0 alone; rows, dual values and a basis follow and are not needed here
+    # Rows 2                        style 0 alone; rows, dual values and a basis follow, not needed here
 
-Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style 2 has GLPK's layout
-and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic problems, which it does not take on paper: what
-class of problem it was given has to be checked where it is called.
+Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style
+2 has GLPK's layout and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic
+problems, which it does not take on paper: what class of problem it was given is checked where it is called.
 """
 
 from __future__ import annotations
@@ -27,11 +27,8 @@ import numpy as np
 
 from ....models.errors import SolutionError
 from ....models.instance.grid import Floats
-from .text import Bytes, Cursor, RawSolution, Status, named_numbers, one_line, shown, with_unix_ends
+from .text import Bytes, Cursor, RawSolution, Reader, Status, named_numbers, one_line, shown
 
-NAME: Final = "highs"
-
-_HEAD: Final = b"Model status\n"
 _OTHER_STYLES: Final = {
     re.compile(rb"Columns\n +Index +Status"): "style 1 (pretty), which has six digits only",
     re.compile(rb"Problem:"): "style 3 (GLPK pretty), which has six digits only",
@@ -39,7 +36,7 @@ _OTHER_STYLES: Final = {
 _STATUS: Final = {
     b"Optimal": Status.OPTIMAL_GLOBAL,
     b"Infeasible": Status.INFEASIBLE,
-    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # a sum of squares or absolute values is bounded below
+    b"Primal infeasible or unbounded": Status.INFEASIBLE,  # our objectives are bounded below
     b"Unbounded": Status.UNBOUNDED,
     b"Bound on objective reached": Status.LIMIT_WITH_POINT,
     b"Target for objective reached": Status.LIMIT_WITH_POINT,
@@ -54,18 +51,11 @@ _STATUS: Final = {
 _COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})")
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by HiGHS, in whatever style."""
-    head = with_unix_ends(head)
-    return head.startswith(_HEAD) or _other_style(head) is not None
-
-
 def parse(data: bytes) -> RawSolution:
     """The content of a file of style 0 or 4.
 
-    Raises SolutionError for other styles, files that are cut off, counts that do not fit and what is not a number.
+    Raises SolutionError for other styles, what is cut off or no number, and counts that do not fit.
     """
-    data = with_unix_ends(data)
     if (style := _other_style(data)) is not None:
         raise SolutionError(
             f"this is HiGHS {style}; write it with write_solution_style = 0 (raw) or 4 (sparse)"
@@ -80,7 +70,7 @@ def parse(data: bytes) -> RawSolution:
     objective = _objective(cursor)
     sparse, names, values = _columns(cursor)
     status = _status(words, feasible=primal == b"Feasible")
-    return RawSolution(NAME, status, one_line(words), objective, names, values, sparse, _rows(cursor))
+    return RawSolution(status, one_line(words), objective, names, values, sparse, _rows(cursor))
 
 
 def _other_style(head: bytes) -> str | None:
@@ -116,7 +106,7 @@ def _without_point(words: bytes) -> RawSolution:
     if words == b"Optimal":
         raise SolutionError("line 5: the file says Optimal and holds no point; let the solver write it again")
     return RawSolution(
-        NAME, _status(words, feasible=False), one_line(words), None, np.empty(0, dtype="S1"), np.empty(0)
+        _status(words, feasible=False), one_line(words), None, np.empty(0, dtype="S1"), np.empty(0)
     )
 
 
@@ -153,3 +143,10 @@ def _rows(cursor: Cursor) -> int | None:
         return None
     cursor.line("the number of rows")
     return Cursor(cursor.data[cursor.before + len(b"# Rows ") : cursor.position]).count("the number of rows")
+
+
+def _recognises(head: bytes) -> bool:
+    return head.startswith(b"Model status\n") or _other_style(head) is not None
+
+
+READERS: Final = (Reader("highs", "HiGHS, solution style 0 (raw) or 4 (sparse)", _recognises, parse),)

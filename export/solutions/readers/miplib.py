@@ -1,32 +1,27 @@
 """Solution files of MIPLIB: `=obj= value`, then a name and a value a line; columns at 0 may be omitted.
 
-`=infeas=` instead stands for an infeasible instance (MIPLIB's solution checker). There is no other status: a point is called
-feasible, and no more.
+`=infeas=` instead stands for an infeasible instance (MIPLIB's solution checker). There is no other status: a
+point is called feasible, and no more.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from .text import Cursor, RawSolution, Status, named_numbers, shown, with_unix_ends, without_point
-
-NAME: Final = "miplib"
-
-
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so is of MIPLIB's kind."""
-    return head.startswith((b"=obj=", b"=infeas="))
+from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, shown, without_point
 
 
 def parse(data: bytes) -> RawSolution:
     """The content of a file. Raises SolutionError for what is not a number and for a file that is cut off."""
-    data = with_unix_ends(data)
     cursor = Cursor(data)
     label, *rest = cursor.line("the objective").split()
     if label == b"=infeas=":
-        return without_point(NAME, Status.INFEASIBLE, label)
+        return without_point(Status.INFEASIBLE, label)
     if label != b"=obj=" or len(rest) != 1:
         raise cursor.fault(f"{shown(b' '.join([label, *rest]))} is not =obj= and a number")
     objective = cursor.number(rest[0])
     names, values = named_numbers(data, cursor.position, len(data), 2)
-    return RawSolution(NAME, Status.FEASIBLE, "", objective, names, values, omits_zeros=True)
+    return RawSolution(Status.FEASIBLE, "", objective, names, values, omits_zeros=True)
+
+
+READERS: Final = (Reader("miplib", "MIPLIB .sol", begins(rb"=obj=|=infeas="), parse),)

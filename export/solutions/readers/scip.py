@@ -4,10 +4,11 @@ r"""Solution files of SCIP.
     objective value:                                -14.4
     b                                                   1 \t(obj:-3)
 
-The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may be +infinity or
--infinity; a partial solution has the value `unknown`, which no point can have. Without a point the last line is `no solution available`.
-SCIP adds columns of its own (nlobjvar, quadobjvar, qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts:
-SCIP 10.0; words of the status: SCIPprintStatus.
+The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may
+be +infinity or -infinity; a partial solution has the value `unknown`, which no point can have. Without a
+point the last line is `no solution available`. SCIP adds columns of its own (nlobjvar, quadobjvar,
+qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts: SCIP 10.0; words
+of the status: SCIPprintStatus.
 """
 
 from __future__ import annotations
@@ -17,16 +18,15 @@ from typing import Final
 from .text import (
     Cursor,
     RawSolution,
+    Reader,
     Status,
+    begins,
     labelled_numbers,
     one_line,
     shown,
-    with_unix_ends,
     without_point,
     words_of_line,
 )
-
-NAME: Final = "scip"
 
 _STATUS_LABEL: Final = b"solution status:"
 _OBJECTIVE_LABEL: Final = b"objective value:"
@@ -50,14 +50,8 @@ _WITHOUT_POINT: Final = {
 }
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins so was written by SCIP."""
-    return head.startswith((_STATUS_LABEL, _OBJECTIVE_LABEL, _NONE))
-
-
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for `unknown` values, what is not a number and files that are cut off."""
-    data = with_unix_ends(data)
+    """The content of a file. Raises SolutionError for `unknown` and what is no number or cut off."""
     cursor = Cursor(data)
     words, status = b"", Status.FEASIBLE
     line = cursor.line("the status or the objective")
@@ -66,7 +60,7 @@ def parse(data: bytes) -> RawSolution:
         status = _status(words)
         line = cursor.line("the objective")
     if line == _NONE:
-        return without_point(NAME, _WITHOUT_POINT.get(status, status), words or line)
+        return without_point(_WITHOUT_POINT.get(status, status), words or line)
     if not line.startswith(_OBJECTIVE_LABEL):
         raise cursor.fault(f"{shown(line)} stands where the objective should")
     text = line.removeprefix(_OBJECTIVE_LABEL).strip()
@@ -75,10 +69,15 @@ def parse(data: bytes) -> RawSolution:
     objective = cursor.number(text)
     per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost comes third
     names, values = labelled_numbers(data, cursor.position, len(data), per_line, label=0, numeric=(1,))
-    return RawSolution(NAME, status, one_line(words), objective, names, values[:, 0], omits_zeros=True)
+    return RawSolution(status, one_line(words), objective, names, values[:, 0], omits_zeros=True)
 
 
 def _status(words: bytes) -> Status:
     if words.endswith(b"limit reached"):
         return Status.LIMIT_WITH_POINT
     return _STATUS.get(words, Status.ERROR)
+
+
+READERS: Final = (
+    Reader("scip", "SCIP .sol", begins(b"|".join((_STATUS_LABEL, _OBJECTIVE_LABEL, _NONE))), parse),
+)

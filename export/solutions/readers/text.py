@@ -1,14 +1,14 @@
 """What a solution file says, before it is mapped onto a problem; and fast parsing of its columns of text.
 
-The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when something is
-wrong is the place looked for.
+The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when
+something is wrong is the place looked for.
 """
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -47,10 +47,10 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 def added_columns() -> dict[str, str]:
     """Patterns of the columns that programs add when they read or write a model, by title of the program.
 
-    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may hold them
-    beside the columns of the problem.
+    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may
+    hold them beside the columns of the problem.
     """
-    # Not above: a solver's child process, which writes such files, would load all of the formulations with the table.
+    # Not above: a solver's child process, which writes such files, would load formulations with the table.
     from ...solvers_table import PROGRAMS
 
     ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
@@ -58,7 +58,7 @@ def added_columns() -> dict[str, str]:
 
 
 class Status(StrEnum):
-    """What a solver claims about its answer, never more than its file says; and what remains of the claim once the point is checked.
+    """What a solver claims of its answer, and what remains of the claim once the point is checked.
 
     no-point: there is none, and no word why. unknown: the point contradicts the claim.
     """
@@ -89,16 +89,16 @@ _PROMISING: Final = frozenset(
 class RawSolution:
     """The content of one solution file.
 
-    reader: name of the reader that understood the file. status: the solver's claim. message: the solver's own words
-    on one line. objective: its objective value, or None. names: byte strings (k,), or None when the format is
-    positional. values: float (k,), in the order of the file; infinities may occur, NaN may not.
-    omits_zeros: whether a column that is not listed is 0. rows: number of constraints the file speaks of, or None.
-    order: the order of the values where there are no names. bound: the solver's dual bound, or None. of_rows: names (k,) that the file
-    lists as those of rows, whose values are left out. stamp: of the problem, where the solver repeated it, else empty.
-    A positional file with rows None does not say where its dual values end: it has one for each row, then the values.
+    status: the solver's claim. message: its own words on one line. objective: its objective value, or None.
+    names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
+    file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
+    number of constraints the file speaks of, or None: then a positional file has a dual value for each row
+    before the values. order: the order of the values where there are no names. bound: the solver's dual
+    bound, or None. of_rows: names (k,) that the file lists as those of rows, whose values are left out.
+    stamp: of the problem, where the solver repeated it, or empty. reader: name of the reader that understood
+    the file.
     """
 
-    reader: str
     status: Status
     message: str
     objective: float | None
@@ -110,6 +110,7 @@ class RawSolution:
     bound: float | None = None
     of_rows: Bytes | None = None
     stamp: str = ""
+    reader: str = ""
 
     @property
     def has_point(self) -> bool:
@@ -117,12 +118,31 @@ class RawSolution:
         return self.values.size > 0 or self.omits_zeros
 
 
-def without_point(
-    reader: str, status: Status, message: bytes | str, *, rows: int | None = None
-) -> RawSolution:
+def without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
     """What a file without a point says; the message is put on one line."""
     words = one_line(message if isinstance(message, bytes) else message.encode())
-    return RawSolution(reader, status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
+    return RawSolution(status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader of one kind of file.
+
+    recognises: whether a file with these first bytes is of this kind. parse: the content of a whole file, or
+    SolutionError. text: both are given lines that end as on Unix.
+    """
+
+    name: str
+    description: str
+    recognises: Callable[[bytes], bool]
+    parse: Callable[[bytes], RawSolution]
+    text: bool = True
+
+
+def begins(pattern: bytes) -> Callable[[bytes], bool]:
+    """For a Reader: whether a file's first bytes match a regular expression."""
+    compiled = re.compile(pattern)
+    return lambda head: compiled.match(head) is not None
 
 
 class NamedValues(NamedTuple):
@@ -136,10 +156,11 @@ class NamedValues(NamedTuple):
 def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     """The values of `names` (n,), unique byte strings, in their order.
 
-    A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in the file
-    that are not among `names` are counted as unknown, but for the columns that readers of models are known to add.
+    A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in
+    the file that are not among `names` are counted as unknown, but for the columns that programs add.
 
-    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of `names` as that of a row.
+    Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
+    `names` as that of a row.
     """
     listed = _listed(raw)
     _check_rows(names, raw)
@@ -160,7 +181,8 @@ def _listed(raw: RawSolution) -> Bytes:
     _check_point(raw)
     if raw.names is None:
         raise SolutionError(
-            f"the file lists values without names; it must be read by position, in the order of the .{raw.order} file"
+            "the file lists values without names; "
+            f"it must be read by position, in the order of the .{raw.order} file"
         )
     return raw.names
 
@@ -180,8 +202,8 @@ def _check_rows(names: Bytes, raw: RawSolution) -> None:
     if len(misplaced):
         name = misplaced[0].decode(errors="replace")
         raise SolutionError(
-            f"the column {name} stands before the numbers start again, where rows should; a line is there twice or out of order; "
-            "let the solver write the file again"
+            f"the column {name} stands before the numbers start again, where rows should; "
+            "a line is there twice or out of order; let the solver write the file again"
         )
 
 
@@ -205,11 +227,13 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     if (raw.rows, found) not in {(rows, columns), (None, rows + columns)}:
         if raw.order != "nl" and (raw.rows, found) == (rows + 1, columns):
             raise SolutionError(
-                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); write it with write_solution_style = 0 (raw) or 4 (sparse)"
+                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); "
+                "write it with write_solution_style = 0 (raw) or 4 (sparse)"
             )
         size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
-            f"the file is of {size}, the problem has {columns} columns and {rows} rows; give the solution of this very problem"
+            f"the file is of {size}, the problem has {columns} columns and {rows} rows; "
+            "give the solution of this very problem"
         )
     return raw.values[found - columns :].copy()
 
@@ -225,9 +249,9 @@ def with_unix_ends(data: bytes) -> bytes:
 
 
 def fault(data: bytes, position: int, text: str) -> SolutionError:
-    """An error that names the line of a byte position in a text."""
+    """An error that names the line of a byte position in a text, and the remedy."""
     line = data.count(b"\n", 0, position) + 1
-    return SolutionError(f"line {line}: {text}")
+    return SolutionError(f"line {line}: {text}; let the solver write the file again")
 
 
 def line_after(data: bytes, position: int, count: int) -> int:
@@ -253,11 +277,7 @@ class Cursor:
         """The next line, stripped. Raises SolutionError when the text ends before the line does."""
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise fault(
-                self.data,
-                self.position,
-                f"the file is cut off where {expected} should be; let the solver write it again",
-            )
+            raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
         self.before, self.position = self.position, end + 1
         return self.data[self.before : end].strip()
 
@@ -281,7 +301,7 @@ class Cursor:
 
     def fault(self, text: str) -> SolutionError:
         """An error about the line last read."""
-        return fault(self.data, self.before, f"{text}; let the solver write the file again")
+        return fault(self.data, self.before, text)
 
 
 def shown(text: bytes) -> str:
@@ -304,9 +324,9 @@ def number_of(text: bytes) -> float | None:
 
 
 def numbers(data: bytes, start: int, stop: int) -> Floats:
-    """The numbers in a text that has one on each line from byte `start` to `stop`; a new line must end the last one.
+    """The numbers in a text that has one on each line from byte `start` to `stop`.
 
-    Raises SolutionError with the line of what is not a number.
+    Raises SolutionError with the line of what is not a number, or is not ended by a new line.
     """
     pieces = [_floats(piece, _tokens(piece, 1)) for piece in _pieces(data, start, stop)]
     return np.concatenate([np.empty(0), *pieces])
@@ -326,7 +346,7 @@ def labelled_numbers(
 ) -> tuple[Bytes, Floats]:
     """Labels (k,) and numbers (k, len(numeric)) of a text of lines of `per_line` words.
 
-    label, numeric: places of the label and of the numbers among the words of a line; other words are left out.
+    label, numeric: places of the label and of the numbers among the words of a line; others are left out.
     Raises SolutionError with the line at fault.
     """
     names: list[Bytes] = [np.empty(0, dtype="S1")]
@@ -340,7 +360,7 @@ def labelled_numbers(
 
 
 def named_pairs(names: list[str], values: Sequence[float] | Floats) -> tuple[Bytes, Floats]:
-    """The names and values of a parsed document as arrays. Raises SolutionError for a name that is too long, or NaN."""
+    """Names and values of a document as arrays. Raises SolutionError for a long name or NaN."""
     long = next((name for name in names if len(name) > TOKEN_LIMIT), None)
     if long is not None:
         raise SolutionError(
@@ -372,7 +392,7 @@ class _Piece(NamedTuple):
         return np.frombuffer(self.data, np.uint8, self.stop - self.start, self.start)
 
     def fault(self, offset: int, text: str) -> SolutionError:
-        return fault(self.data, self.start + offset, f"{text}; let the solver write the file again")
+        return fault(self.data, self.start + offset, text)
 
 
 class _Tokens(NamedTuple):
@@ -389,9 +409,7 @@ def _pieces(data: bytes, start: int, stop: int) -> Iterator[_Piece]:
     while start < stop:
         end = data.rfind(b"\n", start, min(start + _PIECE, stop)) + 1 or data.find(b"\n", start, stop) + 1
         if not end:
-            raise fault(
-                data, start, "the file is cut off in the middle of this line; let the solver write it again"
-            )
+            raise fault(data, start, "the file is cut off in the middle of this line")
         yield _Piece(data, start, end)
         start = end
 
@@ -463,5 +481,5 @@ def _fast_floats(text: bytes) -> Floats | None:
 def _number(data: bytes, position: int, text: bytes) -> float:
     value = number_of(text)
     if value is None:
-        raise fault(data, position, f"{shown(text)} is not a number; let the solver write the file again")
+        raise fault(data, position, f"{shown(text)} is not a number")
     return value

@@ -148,7 +148,8 @@ def told(
 ) -> RawSolution:
     """What a program answers through an interface of its own, in the form in which files are read."""
     names = np.array([name.encode() for name in columns], dtype=np.bytes_)
-    return RawSolution(_TOLD, status, words, objective, names, np.array(values, dtype=float), bound=bound)
+    given = np.array(values, dtype=float)
+    return RawSolution(status, words, objective, names, given, bound=bound, reader=_TOLD)
 
 
 _INFINITY: Final = 1e20

@@ -345,7 +345,7 @@ def test_a_start_on_another_instance_is_refused(tmp_path, refused, instance):
         ["export", tmp_path / "tiny.json"],
     ):
         line = refused(*command, "--start", tmp_path / "other.npz", "-o", tmp_path / "out")
-        assert line.startswith(f"{tmp_path / 'other.npz'}: is a field on another instance")
+        assert line.startswith(f"{tmp_path / 'other.npz'}: the field is on another instance")
 
 
 # Solutions

@@ -185,7 +185,7 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     assert "lists 300000 stroke pixels, but its mask has 4 pixels" in said["strokes.json"]
     assert f"more than {input_limits.MAX_LINES} lines" in said["many.scap"]
     assert found["many.scap"][1] < 350
-    assert found["big.png"][1] < 800
+    assert found["big.png"][1] < 450
 
 
 def test_limits_of_drawings_are_told(monkeypatch):

@@ -1,6 +1,4 @@
-"""Changes of a library at the same time: each waits for the others, none is lost,
-and a crash locks nobody out.
-"""
+"""Work on a library at the same time: each waits for the others, none is lost, no crash locks anybody out."""
 
 import os
 import shutil
@@ -16,7 +14,7 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents import lock
 from crossfield.export.library.documents.documents import problem_of
-from crossfield.export.library.documents.lock import changing
+from crossfield.export.library.documents.lock import locked
 from crossfield.export.library.ledger.ledger import Record, add_record, keep, merged, read_ledger
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, OutputError
@@ -93,8 +91,8 @@ def test_submissions_at_one_moment_are_all_kept(tmp_path):
 HOLDER = """
 import sys
 from pathlib import Path
-from crossfield.export.library.documents.lock import changing
-with changing(Path(sys.argv[1]), "a test of the lock"):
+from crossfield.export.library.documents.lock import locked
+with locked(Path(sys.argv[1]), "a test of the lock"):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -114,14 +112,45 @@ def holder(copy):
 def test_who_waits_too_long_is_told_for_whom(copy, holder, monkeypatch, capsys):
     monkeypatch.setattr(lock, "PATIENCE", 0.3)
     said = []
-    with pytest.raises(OutputError) as caught, changing(copy, "this test", said.append):
+    with pytest.raises(OutputError) as caught, locked(copy, "this test", said.append):
         pass
     assert said[0].startswith(f"this test waits for a test of the lock, process {holder.pid} on ")
-    assert f"is being changed by a test of the lock, process {holder.pid} on " in str(caught.value)
+    assert f"is held by a test of the lock, process {holder.pid} on " in str(caught.value)
     assert "this test waited 0.3 s for it: run it again when that has ended" in str(caught.value)
     assert invoke(["library", "build", str(copy.parent / "none.toml"), "-o", str(copy)]) == 1
     assert "cannot be read" in capsys.readouterr().err  # what is wrong anyway waits for nobody
-    assert verify_library(copy) == []  # reading waits for nobody either
+
+
+def test_a_verification_waits_for_changes_and_changes_for_it(copy, holder, monkeypatch):
+    """Before, it looked at files while they were written, and found them damaged."""
+    monkeypatch.setattr(lock, "PATIENCE", 0.3)
+    said = []
+    with pytest.raises(
+        OutputError, match=r"is held by a test of the lock, .* a verification .* waited 0.3 s"
+    ):
+        verify_library(copy, progress=said.append)
+    assert said[0].startswith("a verification of the library waits for a test of the lock, process ")
+    holder.communicate()
+
+    def change(line):
+        with (
+            pytest.raises(OutputError, match=r"is held by a verification of the library"),
+            locked(copy, line),
+        ):
+            pass
+
+    assert verify_library(copy, progress=change) == []
+    assert not (copy / lock.FILE).exists()
+
+
+def test_a_folder_that_cannot_be_written_is_verified_without_a_lock(copy):
+    copy.chmod(0o555)
+    try:
+        if os.access(copy, os.W_OK):
+            pytest.skip("who runs the tests may write everywhere")
+        assert verify_library(copy) == []
+    finally:
+        copy.chmod(0o755)
 
 
 def test_a_process_that_was_killed_locks_nobody_out(copy, holder, monkeypatch):
@@ -130,7 +159,7 @@ def test_a_process_that_was_killed_locks_nobody_out(copy, holder, monkeypatch):
     assert (copy / lock.FILE).exists()
     assert verify_library(copy) == []
     monkeypatch.setattr(lock, "PATIENCE", 0.0)
-    with changing(copy, "this test"):
+    with locked(copy, "this test"):
         assert (copy / lock.FILE).exists()
     assert not (copy / lock.FILE).exists()
 

@@ -10,6 +10,7 @@ import numpy as np
 import places
 import pytest
 from crossfield.export.solutions.readers import ampl as ampl_sol
+from crossfield.export.solutions.readers import registry
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import (
@@ -21,6 +22,7 @@ from crossfield.export.solutions.readers.text import (
     values_in_order,
 )
 from crossfield.models.errors import InputError, OutputError, SolutionError
+from crossfield.models.input_limits import MAX_SOLUTION
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -61,9 +63,7 @@ def ampl(
 
 def named(**values):
     names = np.array([name.encode() for name in values])
-    return RawSolution(
-        "highs", Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float)
-    )
+    return RawSolution(Status.FEASIBLE, "", None, names, np.array(list(values.values()), dtype=float))
 
 
 # what real solvers write
@@ -735,3 +735,16 @@ def test_damaged_files_are_refused_or_read(path, damages):
 @for_each("head", [b"", b"Model status\n", b"\nOptions\n", b"m\n\n"])
 def test_long_repetitions_take_no_long_time(head, part):
     attempt(head + part * (300_000 // len(part)))
+
+
+def test_a_solution_beyond_the_limit_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "large.sol"
+    with path.open("wb") as stream:
+        stream.truncate(MAX_SOLUTION + 1)
+    told = r"large.sol: has 2147483649 bytes; at most 2147483648 are read, .* without columns at 0"
+    with pytest.raises(InputError, match=told):
+        read_raw(path)
+    monkeypatch.setattr(registry, "MAX_SOLUTION", 1000)
+    path.write_bytes(gzip.compress(bytes(1001)))
+    with pytest.raises(SolutionError, match=r"large.sol: unpacks to more than 1000 bytes; .* at 0"):
+        read_raw(path)

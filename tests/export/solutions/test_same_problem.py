@@ -1,4 +1,4 @@
-"""A solution belongs to one problem: files, solvers and manifests mean the same one, and readers see when they do not."""
+"""A solution belongs to one problem: files, solvers and manifests mean the same one."""
 
 import shutil
 import subprocess
@@ -57,7 +57,7 @@ def test_solve_leaves_the_manifest_that_reads_its_solution(solved, tmp_path):
 
 
 def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
-    """A manifest in the folder goes on listing the other files of the same problem; those of another problem go from it."""
+    """A manifest goes on listing other files of the same problem; those of another go from it."""
     shutil.copytree(solved / "files", tmp_path / "both")
     instance = only(tmp_path / "both", "*.instance.json")
 
@@ -74,7 +74,7 @@ def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
 
 
 def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
-    """The case that gave a field of energy 15.5 for an optimum of 1e-6: columns are named alike, the fixed jumps differ."""
+    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
     other = cf.write_problem(cf.formulate(ring, "qp-fixed", p=cf.greedy(ring).p), tmp_path / "files", ["nl"])
     assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
     assert "solution of another problem" in capsys.readouterr().err
@@ -159,7 +159,7 @@ def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
 
 
 def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):
-    """The jumps of the second stage are those of the MILP: only a manifest of its own can read its solution."""
+    """The second stage's jumps are the MILP's: only a manifest of its own can read its solution."""
     cf.two_stage(ring, tmp_path, limits=cf.Limits(5.0))
     manifest = cf.read_manifest(only(tmp_path, "*.qp-fixed.manifest.json"))
     solution = cf.read_solution(only(tmp_path, "*.qp-fixed.ipopt.sol"), manifest.problem())

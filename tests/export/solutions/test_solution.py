@@ -1,4 +1,4 @@
-"""From solution files to checked points: names, positions, lifted products, rounding, and recomputed claims."""
+"""From solution files to checked points: names, positions, products, rounding, true claims."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,8 @@ def by_name(path, names, values, *, objective=1.0, status="Optimal"):
     """A HiGHS solution file with these columns."""
     lines = "".join(f"{name} {value!r}\n" for name, value in zip(names, map(float, values), strict=True))
     path.write_text(
-        f"Model status\n{status}\n\n# Primal solution values\nFeasible\nObjective {objective!r}\n# Columns {len(names)}\n{lines}# Rows 0\n"
+        f"Model status\n{status}\n\n# Primal solution values\nFeasible\nObjective {objective!r}\n"
+        f"# Columns {len(names)}\n{lines}# Rows 0\n"
     )
     return path
 

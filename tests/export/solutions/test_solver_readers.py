@@ -1,4 +1,4 @@
-"""Solution files of every other solver than HiGHS and those of AMPL: each as the real solver wrote it for our own files."""
+"""Solution files of other solvers than HiGHS and AMPL's, as the real ones wrote them for our files."""
 
 import itertools
 import json
@@ -165,7 +165,10 @@ def test_spellings_of_numbers_in_every_list(word, value):
         f'1,"x ","C","BS",{word},0,0,{word},0\n2,"y ","C","BS",1,0,0,{word},0\n',
         f"model_status,1\nsolver_status,1\nobjective,1\nx,{word}\ny, 1\n",
         f"=obj= 1\nx {word}\ny 1\n",
-        f'<CPLEXSolution><header solutionStatusValue="1"/><variable name="x" value="{word}"/><variable name="y" value="1"/></CPLEXSolution>',
+        (
+            '<CPLEXSolution><header solutionStatusValue="1"/>'
+            f'<variable name="x" value="{word}"/><variable name="y" value="1"/></CPLEXSolution>'
+        ),
     ):
         assert parse_raw(data.encode()).values.tolist() == [value, 1]
 
@@ -219,9 +222,9 @@ def test_the_incumbent_of_a_pool_is_read():
 
 @for_each("code, status", [
         (1, GLOBAL), (101, GLOBAL), (102, GLOBAL), (129, GLOBAL), (24, LOCAL), (5, FEASIBLE), (127, FEASIBLE),
-        (3, INFEASIBLE), (4, INFEASIBLE), (103, INFEASIBLE), (119, INFEASIBLE), (2, UNBOUNDED), (118, UNBOUNDED),
-        (104, LIMIT), (107, LIMIT), (113, LIMIT), (131, LIMIT), (108, NOTHING), (114, NOTHING), (11, LIMIT),
-        (14, ERROR), (301, ERROR), (9999999, ERROR),
+        (3, INFEASIBLE), (4, INFEASIBLE), (103, INFEASIBLE), (119, INFEASIBLE), (2, UNBOUNDED),
+        (118, UNBOUNDED), (104, LIMIT), (107, LIMIT), (113, LIMIT), (131, LIMIT), (108, NOTHING),
+        (114, NOTHING), (11, LIMIT), (14, ERROR), (301, ERROR), (9999999, ERROR),
     ])  # fmt: skip
 def test_codes_of_cplex(code, status):
     raw = parse_raw(swapped(f"{C}_qp_optimal.sol", b'StatusValue="1"', f'StatusValue="{code}"'.encode()))
@@ -270,8 +273,9 @@ def test_infinite_values_of_scip():
 
 @for_each("words, status, without_point", [
         ("optimal solution found", GLOBAL, ERROR), ("gap limit reached", LIMIT, NOTHING),
-        ("node limit reached", LIMIT, NOTHING), ("user interrupt", LIMIT, NOTHING), ("infeasible", INFEASIBLE, INFEASIBLE),
-        ("infeasible or unbounded", INFEASIBLE, INFEASIBLE), ("unbounded", UNBOUNDED, UNBOUNDED), ("unknown", FEASIBLE, SILENT),
+        ("node limit reached", LIMIT, NOTHING), ("user interrupt", LIMIT, NOTHING),
+        ("infeasible", INFEASIBLE, INFEASIBLE), ("infeasible or unbounded", INFEASIBLE, INFEASIBLE),
+        ("unbounded", UNBOUNDED, UNBOUNDED), ("unknown", FEASIBLE, SILENT),
         ("words of a later version", ERROR, ERROR),
     ])  # fmt: skip
 def test_words_of_scip(words, status, without_point):
@@ -335,9 +339,10 @@ def test_one_comes_first_in_lp_and_last_in_mps(tmp_path, order):
 
 
 @for_each("kind, letters, status", [
-        ("mip", "o", GLOBAL), ("mip", "f", LIMIT), ("mip", "i", NOTHING), ("mip", "n", INFEASIBLE), ("mip", "u", NOTHING),
-        ("ipt", "o", GLOBAL), ("ipt", "u", NOTHING), ("bas", "f f", GLOBAL), ("bas", "f u", LIMIT), ("bas", "n u", INFEASIBLE),
-        ("bas", "f n", UNBOUNDED), ("bas", "u u", NOTHING), ("bas", "i f", NOTHING),
+        ("mip", "o", GLOBAL), ("mip", "f", LIMIT), ("mip", "i", NOTHING), ("mip", "n", INFEASIBLE),
+        ("mip", "u", NOTHING), ("ipt", "o", GLOBAL), ("ipt", "u", NOTHING), ("bas", "f f", GLOBAL),
+        ("bas", "f u", LIMIT), ("bas", "n u", INFEASIBLE), ("bas", "f n", UNBOUNDED),
+        ("bas", "u u", NOTHING), ("bas", "i f", NOTHING),
     ])  # fmt: skip
 def test_letters_of_glpk(kind, letters, status):
     line = {"mip": "2.5", "ipt": "2.5 7", "bas": "b 2.5 7"}[kind]
@@ -366,9 +371,10 @@ def test_special_values_of_gams(word, value):
 
 
 @for_each("model, solver, status", [
-        (1, 1, GLOBAL), (2, 1, LOCAL), (3, 1, UNBOUNDED), (4, 1, INFEASIBLE), (5, 1, NOTHING), (6, 3, NOTHING), (7, 1, FEASIBLE),
-        (7, 2, LIMIT), (8, 3, LIMIT), (8, 1, FEASIBLE), (10, 1, INFEASIBLE), (13, 10, ERROR), (14, 3, NOTHING), (14, 7, ERROR),
-        (19, 1, INFEASIBLE), (99, 1, ERROR),
+        (1, 1, GLOBAL), (2, 1, LOCAL), (3, 1, UNBOUNDED), (4, 1, INFEASIBLE), (5, 1, NOTHING),
+        (6, 3, NOTHING), (7, 1, FEASIBLE), (7, 2, LIMIT), (8, 3, LIMIT), (8, 1, FEASIBLE),
+        (10, 1, INFEASIBLE), (13, 10, ERROR), (14, 3, NOTHING), (14, 7, ERROR), (19, 1, INFEASIBLE),
+        (99, 1, ERROR),
     ])  # fmt: skip
 def test_states_of_gams(model, solver, status):
     data = text(f"{A}_conopt_qp_optimal.csv").replace(
@@ -397,9 +403,10 @@ def test_the_csv_and_the_listing_of_a_run_agree():
 
 
 @for_each("solver, model, missing, node, status", [
-        (1, 1, 0, 5, GLOBAL), (1, 1, -1, 5, LOCAL), (1, 2, 0, -3, INFEASIBLE), (1, 2, -1, -3, NOTHING), (1, 3, 0, -1, UNBOUNDED),
-        (1, 4, 0, 5, FEASIBLE), (4, 4, 0, 5, LIMIT), (4, 4, 0, -3, NOTHING), (3, 5, 0, -3, NOTHING), (5, 5, 0, -3, ERROR),
-        (9, 4, 0, 5, FEASIBLE), (10, 5, 0, -3, ERROR), (11, 5, -1, -3, ERROR),
+        (1, 1, 0, 5, GLOBAL), (1, 1, -1, 5, LOCAL), (1, 2, 0, -3, INFEASIBLE), (1, 2, -1, -3, NOTHING),
+        (1, 3, 0, -1, UNBOUNDED), (1, 4, 0, 5, FEASIBLE), (4, 4, 0, 5, LIMIT), (4, 4, 0, -3, NOTHING),
+        (3, 5, 0, -3, NOTHING), (5, 5, 0, -3, ERROR), (9, 4, 0, 5, FEASIBLE), (10, 5, 0, -3, ERROR),
+        (11, 5, -1, -3, ERROR),
     ])  # fmt: skip
 def test_codes_of_baron(solver, model, missing, node, status):
     raw = parse_raw(f"problem 2 16 10 5 0.1 0.2 {solver} {model} {missing} 13 {node} 3 0.2 0.3\n".encode())
@@ -542,12 +549,15 @@ LONG = 600_000
 """Bytes of a hostile file: ten minutes, if each of them were compared with each."""
 
 HEADS = [
-    b"# Solution for model obj\n", b"x 1\ny 2\n", b'{ "SolutionInfo": { "Status": 2}, "Vars": [ ', b'{"SolutionInfo":',
+    b"# Solution for model obj\n", b"x 1\ny 2\n",
+    b'{ "SolutionInfo": { "Status": 2}, "Vars": [ ', b'{"SolutionInfo":',
     b"<?xml version='1.0'?><CPLEXSolution>", b"<CPLEXSolution><header solutionStatusValue='1'/><variables>",
-    b"<!DOCTYPE a><CPLEXSolution>", b"solution status: infeasible\n", b"objective value: 3\n", b"NAME a\n  C x 1\n", b"ENDATA\n",
-    b' 1,"x ","C","BS",', b"Optimal - objective value 3\n", b"c Problem: a\n", b"s mip 1 1 o 3\n", b"model_status,1\n",
-    b"model_status,1\nsolver_status,1\nobjective,3\n", b"GAMS 54.6 Page 1\n", b"GAMS 54.6 Page 1\nS O L V E      S U M M A R Y\n",
-    b"===\n BARON version 1\n", b"===\n BARON version 1\n *** Normal completion ***\n\nThe best solution found is:\n\n  variable\n",
+    b"<!DOCTYPE a><CPLEXSolution>", b"solution status: infeasible\n", b"objective value: 3\n",
+    b"NAME a\n  C x 1\n", b"ENDATA\n", b' 1,"x ","C","BS",', b"Optimal - objective value 3\n",
+    b"c Problem: a\n", b"s mip 1 1 o 3\n", b"model_status,1\n",
+    b"model_status,1\nsolver_status,1\nobjective,3\n", b"GAMS 54.6 Page 1\n",
+    b"GAMS 54.6 Page 1\nS O L V E      S U M M A R Y\n", b"===\n BARON version 1\n",
+    b"===\n BARON version 1\n *** Normal completion ***\n\nThe best solution found is:\n\n  variable\n",
     b"problem 1 1 1 1 1 1 1 1 ", b"=obj= 3\n", b"=infeas=\n",
 ]  # fmt: skip
 
@@ -605,7 +615,7 @@ def test_damaged_files_are_refused_or_read(path, damages):
 )
 @for_each("head", HEADS)
 def test_long_repetitions_take_linear_time(head, part):
-    """Milliseconds; what looks at all that came before at every character would not end within the time of a test."""
+    """Milliseconds; looking back from every character would not end within the time of a test."""
     attempt(head + part * (LONG // len(part)))
 
 
@@ -654,7 +664,7 @@ def lines_of(form, count):
     ids=["gurobi", "scip"],
 )
 def test_lines_are_read_by_the_thousand_and_not_one_by_one(head, form):
-    """Some hundred calls, in Python and from it, for a hundred thousand lines; what looks at each line has more than one for each."""
+    """Some hundred calls for a hundred thousand lines; looking at each line takes more than one each."""
     data = head.encode() + lines_of(form, 100_000)
     calls = itertools.count()
     before = sys.getprofile()

@@ -1,4 +1,4 @@
-"""What is claimed of an answer is what its point bears out: relaxations, cut and damaged files, codes of failure, foreign values."""
+"""A claim is what its point bears out: relaxations, damaged files, codes of failure, foreign values."""
 
 import codecs
 import gzip
@@ -28,14 +28,17 @@ from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 
 MILP = "milp-mccormick"
-needs_glpk = pytest.mark.skipif(shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils")  # fmt: skip
+needs_glpk = pytest.mark.skipif(
+    shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils"
+)
 
 
 @pytest.fixture(scope="module")
 def skew(tmp_path_factory):
     """A folder with the MILP of a sample in LP, MPS and as an AMPL model, its instance and manifest."""
     folder = tmp_path_factory.mktemp("skew")
-    arguments = ["export", "skew", "--size", "4", "-f", MILP, "--format", "lp", "--format", "mps", "--format", "mod"]  # fmt: skip
+    formats = ["--format", "lp", "--format", "mps", "--format", "mod"]
+    arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats]
     assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
     return folder
 
@@ -108,7 +111,9 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
 def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp_path):
     relaxed, whole = tmp_path / "relaxed.sol", tmp_path / "whole.sol"
     stem = f"skew.{MILP}"
-    for arguments in (["--lp", f"{stem}.lp", "--nomip", "-w", relaxed], ["-m", f"{stem}.mod", "-d", f"{stem}.dat", "-w", whole]):  # fmt: skip
+    of_lp = ["--lp", f"{stem}.lp", "--nomip", "-w", relaxed]
+    of_mod = ["-m", f"{stem}.mod", "-d", f"{stem}.dat", "-w", whole]
+    for arguments in (of_lp, of_mod):
         subprocess.run(["glpsol", *map(str, arguments)], cwd=skew, check=True, capture_output=True)
     code, facts, _, written = reading(relaxed)
     assert (code, facts["status"], written) == (1, "unknown", False)
@@ -165,7 +170,9 @@ def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
     assert (found.status, found.claimed, found.bound) == ("unknown", "optimal-global", 0.9)
 
 
-@pytest.mark.parametrize("code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")])  # fmt: skip
+@pytest.mark.parametrize(
+    "code, status", [(200, "infeasible"), (300, "unbounded"), (470, "limit-without-point"), (500, "error")]
+)
 def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, tmp_path, code, status):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
@@ -216,7 +223,7 @@ def test_jumps_do_not_wrap_around(milp):
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
-    """For each reader the content of an answer that a real solver wrote, and its problem; where zeros may be left out also without them."""
+    """For each reader an answer that a real solver wrote, and its problem; also without zeros."""
     found = {}
     for path in GOOD:
         reader, status = FILES[path.name]
@@ -248,7 +255,7 @@ def answers(tmp_path_factory):
 
 
 def bears_out(solution):
-    """Whether a status that promises a point is what the point shows, by numbers that are not the package's own judgement."""
+    """Whether a point shows its promised status, by numbers that are not the package's judgement."""
     if not solution.status.promises_point or solution.point is None:
         return True
     off = solution.violation
@@ -263,7 +270,7 @@ def bears_out(solution):
 
 
 def attempt(path, data, of):
-    """The solution in damaged content; None where it is refused. Any other error than the package's own is a failure."""
+    """The solution in damaged content; None where refused. Only the package's errors are refusals."""
     path.write_bytes(data)
     try:
         return read_solution(path, of)
@@ -304,7 +311,7 @@ def test_files_of_a_status_alone_are_told_to_be_cut():
 
 
 def damages(data):
-    """Ways in which a file comes to harm: lines twice, out of order or longer, values replaced, ends of lines, marks."""
+    """Ways in which a file comes to harm: lines repeated, moved or longer, values replaced, marks."""
     lines = data.splitlines(keepends=True)
     for at in range(0, len(lines), max(1, len(lines) // 5)):
         yield b"".join([*lines[: at + 1], *lines[at:]])

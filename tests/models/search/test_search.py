@@ -8,6 +8,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from children import interrupted
+from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
@@ -157,6 +158,13 @@ def test_search_is_never_above_what_it_starts_from(name):
     assert (np.abs(found.beta) <= QUARTER).all()
     assert (found.alpha >= instance.alpha_lower).all()
     assert (found.alpha <= instance.alpha_upper).all()
+
+
+def test_a_start_on_another_instance_is_refused():
+    start = greedy(cf.sample("skew", 6))
+    for other in (cf.sample("skew", 5), start.instance.with_gauge("box")):
+        with pytest.raises(InstanceError, match=r"the field is on another instance .* not on this one"):
+            cf.search(other, rounds=0, jobs=1, start=start)
 
 
 def test_search_gets_below_the_greedy_field():
