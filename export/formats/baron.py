@@ -24,7 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
+from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.expressions import Language, wrapped
@@ -89,7 +89,7 @@ def _rows(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     yield from render([*parts, words(scalar_when_constant(family.limit)), b";\n"], family.count)
 
 
-def _monomial(term: Term, names: Names) -> list[Piece]:
+def _monomial(term: Monomial, names: Names) -> list[Piece]:
     """A signed term of a row, a coefficient of 1 left out."""
     assert term.degree in {1, 2}  # no declaration has other rows
     lead: list[Piece] = [b" ", words(coefficient(term), signed), b"*"]

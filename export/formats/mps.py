@@ -20,7 +20,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
+from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
@@ -94,7 +94,7 @@ def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> 
             yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
-def _incident(family: PlacedFamily, term: Term) -> list[tuple[int, Ints | None, Term]]:
+def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
     """Rows of a family in which a column of the term's block stands: (rank, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before

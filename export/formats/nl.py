@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import PlacedFamily, Term
+from ...models.formulations.problem import Monomial, PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.expressions import is_data, split
@@ -227,7 +227,7 @@ def _sum(code: Encoder, summands: list[Pieces]) -> Pieces:
     return [*(code.operator(ADD) if len(summands) == 2 else code.sum(len(summands))), *flat]
 
 
-def _monomial(layout: Layout, code: Encoder, term: Term) -> Pieces:
+def _monomial(layout: Layout, code: Encoder, term: Monomial) -> Pieces:
     parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(coefficient(term))]
     *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
     for factor in others:

@@ -1,5 +1,6 @@
-"""The one driver of HiGHS: `run` solves a written file in a process of its own, the rest serves those who
-need its model here.
+"""The one driver of HiGHS: `run` solves a written file in a process of its own.
+
+The rest serves those who need its model in theirs.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
+from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy
@@ -23,8 +24,6 @@ from ..solutions.solution import Solution
 from .job import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
 from .windows import WINDOW_SOLVERS, WindowSearch, search_windows
-
-Progress = Callable[[str], None]
 
 _STARTING: Final = 0.5  # share of the seconds that the field may take from which windows start
 
@@ -85,10 +84,6 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def _tell_nobody(_text: str) -> None:
-    pass
-
-
 @dataclass(frozen=True, eq=False)
 class Request:
     """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
@@ -103,7 +98,7 @@ class Request:
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
     solver: str | None = None
-    progress: Progress = _tell_nobody
+    progress: Progress = silent
 
     def begin(self, deadline: Deadline) -> CrossField:
         """The field to start from; the greedy one is improved for no more than half of the time."""

@@ -10,13 +10,14 @@ from typing import Any, Final
 from ...models.errors import CrossfieldError
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
+from ...models.processes.progress import Progress, silent
 from ...models.search.improvement import first_field
 from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..solutions.solution import Solution
 from .job import Limits
-from .methods import METHODS, Candidate, Method, Progress, Request, finite, solution_facts
+from .methods import METHODS, Candidate, Method, Request, finite, solution_facts
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 REPORT: Final = "report.json"
@@ -108,7 +109,7 @@ def run(
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
     jobs: int = 1,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> Report:
     """The report of a run.
 

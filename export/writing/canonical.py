@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Coefficient, Problem, Term
+from ...models.formulations.problem import Block, Coefficient, Monomial, Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .glpk_order import glpk_order
 from .names import Names
@@ -136,7 +136,7 @@ def _zero_to_one(block: Block) -> Bools:
     return found
 
 
-def coefficient(term: Term) -> Coefficient:
+def coefficient(term: Monomial) -> Coefficient:
     """The coefficient of a term of a row. Raises UnsupportedByFormatError for an extreme one."""
     check_coefficients(term.coefficient, f"row family {term.family.family.tag}")
     return term.coefficient

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem, Term
+from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
 from ...models.instance.grid import Bools, Ints
 from .names import OBJECTIVE, Names
 from .records import render
@@ -125,6 +125,6 @@ def runs(values: NDArray[Any]) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(cuts)]
 
 
-def nonlinear_terms(family: PlacedFamily) -> tuple[Term, ...]:
+def nonlinear_terms(family: PlacedFamily) -> tuple[Monomial, ...]:
     """The monomials of degree two and more."""
     return tuple(term for term in family.terms or () if term.degree > 1)

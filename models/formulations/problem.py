@@ -52,7 +52,7 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class Monomial:
     """A monomial of a family: symbols, each as often as its power, and coefficient (one or (count,))."""
 
     family: PlacedFamily
@@ -129,19 +129,19 @@ class PlacedFamily:
         return self.problem.data[name][way(self.problem.instance, kind)][self.elements]
 
     @cached_property
-    def terms(self) -> tuple[Term, ...] | None:
+    def terms(self) -> tuple[Monomial, ...] | None:
         """Its monomials, the constant one included, or None when it is no polynomial."""
         split = monomials(self.family, self.variables)
         if split is None:
             return None
-        return tuple(Term(self, symbols, self.data(c)) for symbols, c in split)
+        return tuple(Monomial(self, symbols, self.data(c)) for symbols, c in split)
 
     @property
     def degree(self) -> int:
         """Degree of the polynomial; 99 for what is none."""
         return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
 
-    def of_degree(self, degree: int) -> tuple[Term, ...]:
+    def of_degree(self, degree: int) -> tuple[Monomial, ...]:
         """Its monomials of that degree."""
         return tuple(term for term in self.terms or () if term.degree == degree)
 
@@ -366,7 +366,7 @@ class Problem:
         scale = np.concatenate([family.scale for _, family in terms])
         return merged(index, np.concatenate(coefficients), scale, self.columns)
 
-    def _merged_costs(self, terms: list[Term]) -> tuple[Ints, Floats]:
+    def _merged_costs(self, terms: list[Monomial]) -> tuple[Ints, Floats]:
         reached = [(term.family.block(term.symbols[0]), term) for term in terms]
         costs = [
             _costs([term for other, term in reached if other is block], block)
@@ -464,7 +464,7 @@ def _excess(sense: str, values: Floats) -> Floats:
     return values if sense == "<=" else -values
 
 
-def _costs(terms: list[Term], block: Block) -> tuple[Ints, Floats]:
+def _costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
     """As `merged`, for single columns of a block: one number each, terms added in turn."""
     if not terms:
         return np.zeros((0, 1), np.int32), np.zeros(0)
@@ -525,9 +525,9 @@ def lifted(problem: Problem) -> Problem:
 __all__ = [
     "FORMULATIONS",
     "Block",
+    "Monomial",
     "PlacedFamily",
     "Problem",
-    "Term",
     "Violation",
     "formulate",
     "lifted",
