@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -112,7 +113,8 @@ def main(arguments: list[str]) -> int:
     from ...models.processes.side_by_side import leave_with_parent
 
     leave_with_parent()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells have it ignored in the background
+    stop = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: stop.set())
     (model, solution, start), (deadline, gap, threads) = map(Path, arguments[:3]), arguments[3:]
     try:
         highs = loaded(model, silent=False, mip_rel_gap=float(gap), threads=int(threads))
@@ -120,7 +122,7 @@ def main(arguments: list[str]) -> int:
             highs.readSolution(str(start), _RAW)
         # It ends by itself, if it looks at the clock in time, before it is interrupted.
         set_options(highs, time_limit=max(Deadline(float(deadline)).left() - 2 * _TICK, LEAST))
-        _until_it_ends(highs)
+        _until_it_ends(highs, stop)
         leave(highs, solution)
     except CrossfieldError as error:
         print(error)  # noqa: T201 - what is printed is the log
@@ -131,18 +133,14 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _until_it_ends(highs: Any) -> None:
+def _until_it_ends(highs: Any, stop: threading.Event) -> None:
     """Solve; an interrupt ends the search and keeps the incumbent."""
     highs.HandleUserInterrupt = True
     highs.startSolve()
-    try:
-        _wait_for(highs)
-    except KeyboardInterrupt:
+    while not (stop.is_set() or highs.wait(_TICK)[0]):
+        pass
+    if stop.is_set():
         highs.cancelSolve()
-        _wait_for(highs)
-
-
-def _wait_for(highs: Any) -> None:
     while not highs.wait(_TICK)[0]:
         pass
 
