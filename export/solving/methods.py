@@ -23,7 +23,7 @@ from ...models.search.search import Search, search
 from ..solutions.solution import Solution
 from .job import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
-from .windows import WINDOW_SOLVERS, WindowSearch, search_windows
+from .patches import WINDOW_SOLVERS, WindowSearch, search_windows
 
 _STARTING: Final = 0.5  # share of the seconds that the field may take from which windows start
 

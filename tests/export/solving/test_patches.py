@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from children import interrupted
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.windows import WINDOW_SOLVERS, search_windows
+from crossfield.export.solving.patches import WINDOW_SOLVERS, search_windows
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import QUARTER
 from crossfield.models.search.excerpt import excerpt
@@ -126,7 +126,7 @@ def test_from_the_command_line_with_highs(tmp_path, capsys):
 CHILD = """
 import crossfield as cf
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.windows import search_windows
+from crossfield.export.solving.patches import search_windows
 from crossfield.models.search.improvement import first_field
 if True:
     tell = lambda windows, energy: print(windows, flush=True)
