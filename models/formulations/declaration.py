@@ -106,10 +106,10 @@ class Options:
 class Declaration:
     """A line of the table of formulations.
 
-    name; paper: its section, or `ours`; kind: the class as people call it; short: how names of library entries carry it;
-    minimises: what its objective is, the same words for formulations with the same optimum; how: why it says
-    the same as the others with these words; families: yields terms and rows for the options that it takes;
-    fixed: variables that are data.
+    name; paper: its section, or `ours`; kind: the class as people call it; short: how names of library
+    entries carry it; minimises: what its objective is, the same words for formulations with the same optimum;
+    how: why it says the same as the others with these words; families: yields terms and rows for the options
+    that it takes; fixed: variables that are data.
     """
 
     name: str
