@@ -23,7 +23,7 @@ from ...models.instance.grid import Bools, Ints
 from ...models.processes.deadline import Deadline
 from ...models.processes.interruption import interruptible
 from ...models.processes.side_by_side import side_by_side
-from ...models.search.energy import Solver
+from ...models.search.energy import LinearSolver
 from ...models.search.excerpt import Excerpt, excerpt
 from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
@@ -213,7 +213,7 @@ class _State:
     def _try(self, field: CrossField, free: Bools) -> bool:
         """Whether a field, brought up to date, is lower: then go on from it, patches near by open again."""
         state = FreeField.of(field)
-        settle(state, Solver())
+        settle(state, LinearSolver())
         better = state.bounded()
         if better.energy().total < self.energy - LOWER:
             self.field, self.energy = better, better.energy().total
