@@ -217,8 +217,8 @@ those of the relaxation, which say next to nothing.
 ## Strengthening the MILP
 
 On one thread, {milp_seconds:g} s each. *Odd cycles*: for every quad C, 2 x 2 pixels, and every odd subset F
-of its four pairs, the sum of p1 over F, less that over the others, is at most |F| - 1 + (2/pi) times the sum of s
-over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
+of its four pairs, the sum of p1 over F, less that over the others, is at most |F| - 1 + (2/pi) times the sum
+of s over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
 Means are geometric, shifted by 1 s and by 10 nodes, runs that met the limit counted as they stand.
 
 {means}
