@@ -41,18 +41,18 @@ def instance_of(height: int, width: int, seed: int) -> Instance:
 
 
 def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
-    """Add a row for every 2 x 2 block C and odd subset F of its pairs.
+    """Add a row for every quad C and odd subset F of its pairs.
 
     Sum of p1 over F less that over C - F <= |F| - 1 + (2/pi) sum of s over C.
     Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2
     at least.
     """
     p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
-    for block in problem.instance.grid.blocks:
+    for quad in problem.instance.grid.quads:
         for subset in range(16):
             inside = np.array([subset >> place & 1 for place in range(4)])
             if inside.sum() % 2:
-                columns = np.concatenate([p1[block], s[block]]).astype(np.int32)
+                columns = np.concatenate([p1[quad], s[quad]]).astype(np.int32)
                 values = np.concatenate([2.0 * inside - 1, np.full(4, -2 / np.pi)])
                 model.addRow(-np.inf, float(inside.sum() - 1), len(columns), columns, values)
 
@@ -216,9 +216,9 @@ those of the relaxation, which say next to nothing.
 
 ## Strengthening the MILP
 
-On one thread, {milp_seconds:g} s each. *Odd cycles*: for every 2 x 2 block C and every odd subset F of its
-four pairs, the sum of p1 over F, less that over the others, is at most |F| - 1 + (2/pi) times the sum of s
-over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
+On one thread, {milp_seconds:g} s each. *Odd cycles*: for every quad C, 2 x 2 pixels, and every odd subset F
+of its four pairs, the sum of p1 over F, less that over the others, is at most |F| - 1 + (2/pi) times the sum
+of s over C. *Bounds*: s and t at most pi/2, which some optimum keeps.
 Means are geometric, shifted by 1 s and by 10 nodes, runs that met the limit counted as they stand.
 
 {means}

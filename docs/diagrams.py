@@ -142,7 +142,7 @@ def facets(figure: Figure) -> None:
 
 
 def singular(figure: Figure) -> None:
-    """Two blocks of 2 x 2 crosses: in one they close, in the other they turn by a quarter."""
+    """Two quads of crosses: in one they close, in the other they turn by a quarter."""
     for axes, turn, title in zip(
         figure.subplots(1, 2), (0, 0.25), ("regular: sum of jumps 0", "singular: index +1/4"), strict=True
     ):

@@ -42,8 +42,8 @@ SKETCHES: Final = (".svg", ".png", ".scap")
 PROVERS: Final = ("gurobi", "cplex")
 PROOF_SECONDS: Final = 60.0
 RANDOM: Final = 8  # random instances of 5 x 5 pixels
-WINDOWED: Final = ("cylinder_bend", "mouse", "singular")
-WINDOW_SECONDS: Final = 40.0
+PATCHED: Final = ("cylinder_bend", "mouse", "singular")
+PATCH_SECONDS: Final = 40.0
 HUGE: Final = 256
 IPOPT_SIZE: Final = 64
 
@@ -215,27 +215,27 @@ def picture(sketch: Sketch, folder: Path) -> str:
     return f"![{name}: greedy on the left, search on the right](pictures/{path.name})"
 
 
-def windows(sketch: Sketch, folder: Path) -> list[str]:
+def patches(sketch: Sketch, folder: Path) -> list[str]:
     """What exact solvers reach from the improved greedy field, and from that of the search."""
     size, here = min(SIZES), place(folder, sketch, min(SIZES))
     start = here / "improved.npz"
     cf.write_field(cf.improved(cf.read_field(field_in(here / "greedy"))), start)
     cells = [sketch.name, f"{cf.read_field(start).energy().total:.4f}"]
-    walk = solved(sketch, size, "search", WINDOW_SECONDS, here / "walk", "--start", str(start))
-    cells.append(f"{walk['energy_2_norm']:.4f}")
+    again = solved(sketch, size, "search", PATCH_SECONDS, here / "again", "--start", str(start))
+    cells.append(f"{again['energy_2_norm']:.4f}")
     found = str(field_in(here / "search"))
     for solver, given in (("bonmin", str(start)), ("highs", str(start)), ("bonmin", found), ("highs", found)):
-        kept = here / f"windows-{solver}-{'start' if given == str(start) else 'search'}"
+        kept = here / f"patches-{solver}-{'start' if given == str(start) else 'search'}"
         options = ("--solver", solver, "--start", given)
-        facts = solved(sketch, size, "windows", WINDOW_SECONDS, kept, *options)
-        counts = [facts[key] for key in ("windows", "windows_closed", "windows_lower")]
+        facts = solved(sketch, size, "patches", PATCH_SECONDS, kept, *options)
+        counts = [facts[key] for key in ("patches", "patches_closed", "patches_lower")]
         cells.append(f"{facts['energy_2_norm']:.4f} ({' / '.join(map(str, counts))})")
     print(*cells, file=sys.stderr, flush=True)
     return cells
 
 
-WINDOW_COLUMNS: Final = (
-    "sketch", "improved", "walk", "Bonmin", "HiGHS", "search, then Bonmin", "search, then HiGHS",
+PATCH_COLUMNS: Final = (
+    "sketch", "improved", "search", "Bonmin", "HiGHS", "search, then Bonmin", "search, then HiGHS",
 )  # fmt: skip
 
 
@@ -405,7 +405,7 @@ def main() -> None:
         rows = [row(sketch, size, given.seconds, folder) for size in SIZES for sketch in every]
         large = [row(sketch, LARGE, given.seconds, folder) for sketch in every[-LARGE_SKETCHES:]]
         angles = [best_angles(sketch, folder) for sketch in every[-2:]]
-        exact = [windows(sketch, folder) for sketch in [*named(every, WINDOWED), every[-1]]]
+        exact = [patches(sketch, folder) for sketch in [*named(every, PATCHED), every[-1]]]
         closed = proofs()
         text = PAGE.format(
             said=said(f"python docs/fields.py --sketches FOLDER --seconds {given.seconds:g}"),
@@ -417,10 +417,10 @@ def main() -> None:
             table=markdown(COLUMNS, [each.cells() for each in rows]),
             large=markdown(COLUMNS, [each.cells() for each in large]),
             pictures="\n\n".join(picture(sketch, folder) for sketch in named(every, PICTURED)),
-            windows=markdown(WINDOW_COLUMNS, exact),
-            window_seconds=f"{WINDOW_SECONDS:g}",
+            patches=markdown(PATCH_COLUMNS, exact),
+            patch_seconds=f"{PATCH_SECONDS:g}",
             angles=markdown(QP_COLUMNS, angles),
-            window_size=min(SIZES),
+            patch_size=min(SIZES),
             proof_seconds=f"{PROOF_SECONDS:g}",
             proofs=closed,
         )
@@ -471,16 +471,16 @@ that is more.
 
 {angles}
 
-## Windows solved exactly
+## Patches solved exactly
 
-`crossfield solve --method windows` sets small windows of the grid free, fixes all else and hands each to a
-solver: `miqp-exact` to Bonmin, in windows of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in
-windows of 5 x 5 and more. Size {window_size}, {window_seconds} s each; *walk* is `search`, and both go on
-from the improved greedy field, the walk also from the improved power field where that is lower. The last two
-columns go on from the field of the search above. In brackets: windows solved / solved to the end / that
-lowered the energy.
+`crossfield solve --method patches` sets small patches of the grid free, fixes all else and hands each to a
+solver: `miqp-exact` to Bonmin, in patches of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in
+patches of 5 x 5 and more. Size {patch_size}, {patch_seconds} s each. Three columns start at the improved
+greedy field: *search*, also at the improved power field where that is lower, *Bonmin* and *HiGHS*. The last
+two go on from the field of the search in the first table. In brackets: patches solved / solved to the end /
+that lowered the energy.
 
-{windows}
+{patches}
 
 ## Against proven optima
 

@@ -51,10 +51,8 @@ def formulations() -> None:
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
         settable = ", ".join(sorted(recipe.settable)) or "none"
-        facts = (
-            f"Section {recipe.paper} of the paper. {recipe.kind}. "
-            f"{recipe.summary[0].upper()}{recipe.summary[1:]}. Options: {settable}."
-        )
+        told = (recipe.source, recipe.kind, recipe.summary, f"options: {settable}")
+        facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in told)
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
     parts += [
@@ -81,13 +79,13 @@ def kinds_in_short() -> str:
 
 INTRODUCTION = r"""[What the words and symbols mean](mathematics.md), step by step. In short: a cross at pixel
 $i$ has line $u$ at angle $\alpha_i + \beta_i$ and line $v$ at angle $\alpha_i + \pi/2 - \beta_i$. $I$ are the
-pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and reliability $w_i$, and $E$ the
+pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and weight $w_i$, and $E$ the
 ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in radians,
 counter-clockwise, $y$ up. The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data: under the
 gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere; under
 `box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the
 windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
-prints it."""
+prints it. Sections and numbers in brackets are those of the paper."""
 
 
 def methods(instance: Instance) -> Iterator[Candidate]:

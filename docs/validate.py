@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from argparse import ArgumentParser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -204,6 +205,7 @@ def capabilities() -> str:
 
 def main() -> None:
     """Run everything and write the page."""
+    ArgumentParser(description=__doc__).parse_args()
     begin = time.perf_counter()
     main_run = run("strokes", "hull", tuple(FORMULATIONS), SECONDS)
     rest = [
@@ -218,6 +220,7 @@ def main() -> None:
     parts = [
         "# One instance, all routes",
         said("python docs/validate.py"),
+        in_short(main_run, runs),
         (
             f"An instance of {grid}, in all formulations and all formats, handed to every program "
             "that can be had for free. Objectives are recomputed "
@@ -225,7 +228,6 @@ def main() -> None:
             "solve, on one thread where that can be set. "
             "Optima must agree to 1e-6. `crossfield verify DIR --solve` does the same for any folder."
         ),
-        in_short(main_run, runs),
         "## Reading",
         readings(runs),
         "## The same problem in several formulations",

@@ -140,8 +140,8 @@ class StartFile(NamedTuple):
     convex: bool = False
 
 
-class WindowUse(NamedTuple):
-    """What a solver solves of a window, and the side in pixels of the first: what it closes in seconds."""
+class PatchUse(NamedTuple):
+    """What a solver solves of a patch, and the side in pixels of the first: what it closes in seconds."""
 
     formulation: str
     side: int
@@ -155,7 +155,7 @@ class Solver:
     of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
     start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
     that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
-    problems for which others come first. window: how it solves windows, where it does.
+    problems for which others come first. patch: how it solves patches, where it does.
     """
 
     name: str
@@ -168,7 +168,7 @@ class Solver:
     start: StartFile | None = None
     driver: str = ""
     not_for: tuple[str, ...] = ()
-    window: WindowUse | None = None
+    patch: PatchUse | None = None
 
     def refusal(self, held: Problem, *stages: Stage) -> Refusal | None:
         """Its first refusal of a problem, as a format holds it, at one of these stages (all by default)."""
@@ -227,7 +227,7 @@ SOLVERS: Final = {
                 ),
             },
             start=StartFile("highs", ".sol", "highs --read_solution_file START.sol MODEL.mps"),
-            driver="highs", not_for=("QP",), window=WindowUse("milp-mccormick", 5),
+            driver="highs", not_for=("QP",), patch=PatchUse("milp-mccormick", 5),
         ),
         Solver(
             "scip", "SCIP", ("nl", "mps", "lp", "osil"), "scip",
@@ -259,7 +259,7 @@ SOLVERS: Final = {
                     "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
                 )
             },
-            proves="convex", driver="casadi", window=WindowUse("miqp-exact", 4),
+            proves="convex", driver="casadi", patch=PatchUse("miqp-exact", 4),
         ),
         Solver(
             "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",

@@ -189,7 +189,7 @@ def _degree(problem: Problem) -> int:
 def header(problem: Problem) -> list[str]:
     """Lines of comment that say what a file holds."""
     formulation, options = problem.formulation, problem.formulation.options
-    name, kept = f"{formulation.name} (section {formulation.paper})", "kept"
+    name, kept = f"{formulation.name} ({formulation.declaration.source})", "kept"
     if options.relax:
         name, kept = f"continuous relaxation of {name}", "dropped"
     norms = f"stroke norm {options.stroke_norm}, beta norm {options.beta_norm}"

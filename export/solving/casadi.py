@@ -17,7 +17,10 @@ _LIMIT: Final = 400
 
 
 def run(job: Job) -> RunEnd:
-    """How the solve of the job ended; its solution file and its log are there. Raises SolverError."""
+    """How the solve of the job ended; its solution file is there, and its log if the solver was started.
+
+    Raises SolverError.
+    """
     numbers = job.deadline.at, float(job.limits.gap)
     arguments = job.solver, job.model, job.solution, *map(repr, numbers), job.problem.stamp
     ended = solved_by("casadi_driver", map(str, arguments), job, lambda: _leave_start(job))

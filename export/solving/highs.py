@@ -80,7 +80,10 @@ def dual_bound(highs: Any) -> float | None:
 
 
 def run(job: Job) -> RunEnd:
-    """How the solve of the job ended; its solution file and its log are there. Raises SolverError."""
+    """How the solve of the job ended; its solution file is there, and its log if HiGHS was started.
+
+    Raises SolverError.
+    """
     from ..bundle.starts import LAYOUTS, Start
     from ..writing.sink import save
     from .child import solved_by
@@ -98,6 +101,9 @@ def run(job: Job) -> RunEnd:
 
 
 def _bound_in(log: Path) -> float | None:
+    """The dual bound that a log ends with; None without one, and without a log: no time was left to start."""
+    if not log.exists():
+        return None
     last = log.read_text("utf-8", "replace").splitlines()[-1:]
     return float(last[0].removeprefix(_BOUND)) if last and last[0].startswith(_BOUND) else None
 

@@ -22,10 +22,10 @@ from ...models.search.power_field import power_field
 from ...models.search.search import Search, search
 from ..solutions.solution import Solution
 from .job import Limits
+from .patches import PATCH_SOLVERS, PatchSearch, search_patches
 from .two_stage import find_jumps, fit_angles, jumps_until
-from .windows import WINDOW_SOLVERS, WindowSearch, search_windows
 
-_STARTING: Final = 0.5  # share of the seconds that the field may take from which windows start
+_STARTING: Final = 0.5  # share of the seconds that the field may take from which patches start
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,21 +147,21 @@ def _search(request: Request) -> Iterator[Candidate]:
     yield _searched("search", found, begin, rounds=found.rounds)
 
 
-def _windows(request: Request) -> Iterator[Candidate]:
+def _patches(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
-    request.progress("windows: greedy field")
-    found = search_windows(
+    request.progress("patches: greedy field")
+    found = search_patches(
         request.begin(deadline),
         seconds=request.limits.until(deadline).seconds,
         solver=request.solver or "bonmin",
         jobs=_processes(request),
-        progress=_teller(request, deadline, "windows", "windows"),
+        progress=_teller(request, deadline, "patches", "patches"),
     )
-    counts = {"windows": found.windows, "windows_closed": found.closed, "windows_lower": found.lower}
-    yield _searched("windows", found, begin, **counts)
+    counts = {"patches": found.patches, "patches_closed": found.closed, "patches_lower": found.lower}
+    yield _searched("patches", found, begin, **counts)
 
 
-def _searched(method: str, found: Search | WindowSearch, begin: float, **counts: int) -> Candidate:
+def _searched(method: str, found: Search | PatchSearch, begin: float, **counts: int) -> Candidate:
     """What a search came to that began at a time of the performance counter."""
     seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
     return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
@@ -216,10 +216,10 @@ METHODS: Final = {
             _search,
         ),
         Method(
-            "windows",
-            "windows of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit",
-            _windows,
-            solvers=tuple(WINDOW_SOLVERS),
+            "patches",
+            "patches of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit",
+            _patches,
+            solvers=tuple(PATCH_SOLVERS),
             in_runs=False,
         ),
         Method(

@@ -41,9 +41,9 @@ class Energy:
 
 @dataclass(frozen=True)
 class Singularities:
-    """2 x 2 blocks round which the crosses turn.
+    """Quads, 2 x 2 pixels, round which the crosses turn.
 
-    row, column: int (k,), the block's common corner is the lower right corner of pixel [row, column].
+    row, column: int (k,), the quad's common corner is the lower right corner of pixel [row, column].
     index: float (k,), turns of the cross on a counter-clockwise walk (y up): multiples of 1/4.
     """
 
@@ -146,9 +146,9 @@ class CrossField:
 
     @cached_property
     def singularities(self) -> Singularities:
-        """Blocks of 2 x 2 pixels with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
+        """Quads of 2 x 2 pixels with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
         grid = self.instance.grid
-        bottom, side, top, left = grid.blocks.T
+        bottom, side, top, left = grid.quads.T
         turn = self.p[bottom] + self.p[side] - self.p[top] - self.p[left]
         at = np.nonzero(turn)[0]
         corner = grid.first[bottom[at]]

@@ -9,7 +9,7 @@
             row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
 
 The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
-Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no 2 x 2 block
+Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no quad
 of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
 2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
 """

@@ -106,10 +106,10 @@ class Options:
 class Declaration:
     """A line of the table of formulations.
 
-    name; paper: its section; kind: the class as people call it; short: how names of library entries carry it;
-    minimises: what its objective is, the same words for formulations with the same optimum; how: why it says
-    the same as the others with these words; families: yields terms and rows for the options that it takes;
-    fixed: variables that are data.
+    name; paper: its section, or `ours`; kind: the class as people call it; short: how names of library
+    entries carry it; minimises: what its objective is, the same words for formulations with the same optimum;
+    how: why it says the same as the others with these words; families: yields terms and rows for the options
+    that it takes; fixed: variables that are data.
     """
 
     name: str
@@ -120,6 +120,11 @@ class Declaration:
     how: str
     families: Callable[..., Iterator[Family]]
     fixed: tuple[str, ...] = ()
+
+    @property
+    def source(self) -> str:
+        """Where it comes from: a section of the paper, or `ours`."""
+        return f"section {self.paper}" if self.paper[0].isdigit() else self.paper
 
     @property
     def summary(self) -> str:
@@ -193,7 +198,7 @@ class Formulation:
 
     @property
     def paper(self) -> str:
-        """Its section of the paper."""
+        """Its section of the paper, or `ours`."""
         return self.declaration.paper
 
     @property

@@ -1,4 +1,4 @@
-"""The pixel grid: mask, numbering, neighbour pairs and 2 x 2 blocks as index arrays.
+"""The pixel grid: mask, numbering, neighbour pairs and quads as index arrays.
 
 Arrays are indexed [row, column], row 0 at the top; x = column, y = -row (y up).
 """
@@ -94,8 +94,8 @@ class Grid:
         return upper, right
 
     @cached_property
-    def blocks(self) -> Ints:
-        """The 2 x 2 blocks inside the mask, shape (b, 4): pairs met on a counter-clockwise walk (y up).
+    def quads(self) -> Ints:
+        """The 2 x 2 pixels inside the mask, shape (q, 4): pairs met on a counter-clockwise walk (y up).
 
         Columns: bottom (left to right), right side (upwards), top (stored left to right, walked against),
         left side (stored upwards, walked against).

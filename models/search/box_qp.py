@@ -16,7 +16,7 @@ from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..instance.instance import QUARTER
 from ..processes.deadline import Over, never
-from .energy import Quadratic, Solver, energy_at
+from .energy import LinearSolver, Quadratic, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
 _NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
@@ -53,7 +53,7 @@ def least_in_box(
     lower: Floats,
     upper: Floats,
     *,
-    solver: Solver | None = None,
+    solver: LinearSolver | None = None,
     tolerance: float = _SLOPE,
     over: Over = never,
 ) -> Floats:
@@ -65,7 +65,7 @@ def least_in_box(
     tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
     solver: one that has met a system like this one, which spares a factorisation.
     """
-    solver = Solver() if solver is None else solver
+    solver = LinearSolver() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.vector).max())
     stiffness = energy.stiffness
     x = np.clip(x, lower, upper)

@@ -16,7 +16,7 @@ from ..field.jumps import parity_sign, stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
-from .energy import Solver
+from .energy import LinearSolver
 from .free_field import FreeField
 from .improvement import improved, settle
 
@@ -61,7 +61,7 @@ def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> Cro
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
-    settle(state, Solver(), over)
+    settle(state, LinearSolver(), over)
     return improved(state.bounded(over), over)
 
 

@@ -104,7 +104,7 @@ def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
     return step
 
 
-class Solver:
+class LinearSolver:
     """Solves of systems that differ little: one factorisation serves the next ones as a preconditioner."""
 
     def __init__(self) -> None:

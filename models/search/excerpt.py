@@ -1,4 +1,4 @@
-"""A piece of a field with the ring of pixels round it, for an exact solver; put back when solved."""
+"""A patch of a field with the ring of pixels round it, for an exact solver; put back when solved."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..instance.instance import Instance
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
-    """A piece of a field, as a field on an instance of its own.
+    """A patch and the pixels round it, as a field on an instance of its own.
 
-    free: pixels of the piece that may change, shape (k,); the others are its rim. pixels (n,), pairs (m,):
-    where the piece lies in the whole field.
+    free: which of these pixels are the patch and may change, shape (k,). pixels (n,), pairs (m,): where they
+    lie in the whole field.
     """
 
     field: CrossField
@@ -34,7 +34,7 @@ class Excerpt:
 
 
 def excerpt(field: CrossField, free: Bools) -> Excerpt:
-    """The piece of a field that holds these pixels (n,), their neighbours, and at least one stroke pixel.
+    """The excerpt of a field that holds these pixels (n,), their neighbours, and at least one stroke pixel.
 
     With all but the free pixels fixed, its energy differs from that of the whole field by a constant.
     """

@@ -17,7 +17,7 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from .energy import CLOSE, Solver, energy_at, local_step
+from .energy import CLOSE, LinearSolver, energy_at, local_step
 from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
@@ -51,7 +51,7 @@ def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Ov
 
 def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over: Over) -> None:
     """Decide the jumps between cells, cheapest first, in batches that cost at most `_BATCH_COST`."""
-    grid, solver = state.instance.grid, Solver()
+    grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
     _settle(state, known, solver)
     while not known.all():
@@ -68,7 +68,7 @@ def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over
             progress(int(known.sum()), len(known))
 
 
-def _settle(state: FreeField, known: Bools, solver: Solver | None) -> None:
+def _settle(state: FreeField, known: Bools, solver: LinearSolver | None) -> None:
     """Bring angles up to date, enough to rank the unknown jumps; locally without a solver."""
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)

@@ -20,7 +20,7 @@ from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from .box_qp import least_in_box
-from .energy import CLOSE, Solver, energy_at
+from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
 from .greedy import greedy
 from .nearest_stroke import chamfer, nearest_strokes
@@ -50,7 +50,7 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
     far comes back.
     The energy is that of docs/mathematics.md, 5; deterministic.
     """
-    state, solver = FreeField.of(field), Solver()
+    state, solver = FreeField.of(field), LinearSolver()
     settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)
@@ -58,7 +58,7 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: Solver, over: Over = never) -> None:
+def settle(state: FreeField, solver: LinearSolver, over: Over = never) -> None:
     """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts."""
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
@@ -93,7 +93,7 @@ def _swap_lines(state: FreeField) -> None:
     state.alpha, state.beta = alpha, beta
 
 
-def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
+def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> None:
     """Let curves change their family of lines where that lowers the energy, the worst first."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
@@ -108,7 +108,7 @@ def _exchange_families(state: FreeField, solver: Solver, over: Over) -> None:
             _turn_if_better(state, own, solver, over)
 
 
-def _turn_if_better(state: FreeField, own: Ints, solver: Solver, over: Over) -> None:
+def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Over) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way and keep what lowers the energy most.
 
     Without the bounds the energy of a trial is a lower bound, and usually the answer.
@@ -122,7 +122,7 @@ def _turn_if_better(state: FreeField, own: Ints, solver: Solver, over: Over) -> 
             state.x, state.p = best.x, best.p
 
 
-def _turned(state: FreeField, quarters: Ints, solver: Solver) -> FreeField:
+def _turned(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
     """The state after turning each pixel's labels back by `quarters`, solved: what v was before is now u.
 
     The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other

@@ -1,6 +1,6 @@
 """Random changes of several jumps at once, out of a valley that single changes do not leave.
 
-- `shift`: along a path of 2 x 2 blocks, which moves the turn at its start to its end: a singularity moves,
+- `shift`: along a path of quads, which moves the turn at its start to its end: a singularity moves,
   two opposite ones meet, or a pair of them is made;
 - `turn`: round a piece of a curve, or a disc: the strokes inside change to the other family of lines.
 
@@ -20,10 +20,10 @@ from .landscape import Patch
 
 Change = tuple[Ints, Ints]
 
-_LONGEST: Final = 16  # blocks of a path
+_LONGEST: Final = 16  # quads of a path
 _WIDEST: Final = 12.0  # pixels, radius of a disc
 _TURNS: Final = 0.6  # share of turns
-_SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a block on its counter-clockwise walk
+_SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-clockwise walk
 
 
 class Kicks:
@@ -35,44 +35,44 @@ class Kicks:
         self._patch = patch
         local = np.full(len(instance.grid.first), -1)
         local[patch.pairs] = np.arange(len(patch.pairs))
-        blocks = local[instance.grid.blocks]
-        self._blocks = blocks[(blocks >= 0).all(axis=1)]
-        self._beside = _blocks_of_pairs(self._blocks, len(patch.pairs))
+        quads = local[instance.grid.quads]
+        self._quads = quads[(quads >= 0).all(axis=1)]
+        self._beside = _quads_of_pairs(self._quads, len(patch.pairs))
         self._curve = curve[patch.pixels]
         self._strokes = np.nonzero(self._curve >= 0)[0]
         self._row = instance.grid.rows[patch.pixels].astype(np.float64)
         self._column = instance.grid.columns[patch.pixels].astype(np.float64)
 
     def draw(self, rng: np.random.Generator, p: Ints) -> Change:
-        """A random change for the present jumps p (m,); never an empty one where the patch has a block."""
+        """A random change for the present jumps p (m,); never an empty one where the patch has a quad."""
         kind = rng.random()
         change = self.turn(rng) if kind < _TURNS and len(self._strokes) else self.shift(rng, p)
         return change if len(change[0]) else self.shift(rng, p)
 
     def shift(self, rng: np.random.Generator, p: Ints) -> Change:
-        """The jumps along a random path of blocks, which starts at a singularity every other time."""
-        if not len(self._blocks):
+        """The jumps along a random path of quads, which starts at a singularity every other time."""
+        if not len(self._quads):
             pair = rng.integers(len(self._patch.pairs), size=1, dtype=np.int32)
             return pair, rng.choice(np.array([-1, 1], dtype=np.int32), size=1)
-        turns = p[self._patch.pairs[self._blocks]] @ np.array(_SIDES)
+        turns = p[self._patch.pairs[self._quads]] @ np.array(_SIDES)
         singular = np.nonzero(turns)[0]
         if len(singular) and rng.random() < 0.5:
-            block = int(rng.choice(singular))
-            direction = -int(np.sign(turns[block]))
+            quad = int(rng.choice(singular))
+            direction = -int(np.sign(turns[quad]))
         else:
-            block = int(rng.integers(len(self._blocks)))
+            quad = int(rng.integers(len(self._quads)))
             direction = int(rng.choice([-1, 1]))
-        return self._path(rng, block, direction)
+        return self._path(rng, quad, direction)
 
-    def _path(self, rng: np.random.Generator, block: int, direction: int) -> Change:
-        """The jumps of a path from a block that change its turn by `direction`."""
+    def _path(self, rng: np.random.Generator, quad: int, direction: int) -> Change:
+        """The jumps of a path from a quad that change its turn by `direction`."""
         steps: Counter[int] = Counter()
         side = int(rng.integers(4))
         for _ in range(int(_LONGEST ** rng.random())):
-            pair = int(self._blocks[block, side])
+            pair = int(self._quads[quad, side])
             steps[pair] += direction * _SIDES[side]
-            block = int(self._beside[pair, int(side < 2)])
-            if block < 0:  # the border of the patch: the turn has left
+            quad = int(self._beside[pair, int(side < 2)])
+            if quad < 0:  # the border of the patch: the turn has left
                 break
             if rng.random() < 0.3:
                 side = int(rng.integers(4))
@@ -93,9 +93,9 @@ class Kicks:
         return pairs, steps[pairs]
 
 
-def _blocks_of_pairs(blocks: Ints, pairs: int) -> Ints:
-    """Blocks of which a pair is bottom or right side [0], top or left side [1], or -1; (pairs, 2)."""
+def _quads_of_pairs(quads: Ints, pairs: int) -> Ints:
+    """Quads of which a pair is bottom or right side [0], top or left side [1], or -1; (pairs, 2)."""
     beside = np.full((pairs, 2), -1)
     for side in range(4):
-        beside[blocks[:, side], 0 if side < 2 else 1] = np.arange(len(blocks))
+        beside[quads[:, side], 0 if side < 2 else 1] = np.arange(len(quads))
     return beside

@@ -24,7 +24,7 @@ from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
 from ..processes.side_by_side import checked, side_by_side
 from .coarse import halved, prolonged
-from .energy import Solver
+from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
 from .improvement import first_field, improved, settle, stroke_curves
 from .landscape import Point
@@ -186,7 +186,7 @@ class _Hunt:
         self._start = start
         self._state = FreeField.of(start)
         self._bounds = free_bounds(instance)
-        self._solver = Solver()
+        self._solver = LinearSolver()
         self._latest = [start]
         self._unsettled = False
         # Parts without a stroke are constant and cost nothing.

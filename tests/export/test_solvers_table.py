@@ -36,9 +36,9 @@ def test_what_the_table_names_is_there():
     for solver in DRIVEN.values():
         driver = (ROOT / "export" / "solving" / f"{solver.driver}.py").read_text()
         assert "\ndef run(job: Job) -> RunEnd:" in driver
-        if solver.window is not None:
+        if solver.patch is not None:
             instance = make_instance("hole")
-            assert takes(cf.formulate(instance, solver.window.formulation), solver.name).answer == "yes"
+            assert takes(cf.formulate(instance, solver.patch.formulation), solver.name).answer == "yes"
     for program in PROGRAMS.values():
         module = (ROOT / "export" / "verify" / "programs" / f"{program.name}.py").read_text()
         wanted = {

@@ -26,7 +26,7 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
 
 
 def exact(instance):
-    """The least energy over all jumps in the bounds, with the windows of alpha and beta left out:
+    """The least energy over all jumps in the bounds, with the bounds of alpha and beta left out:
     a lower bound.
     """
     ranges = [np.arange(low, high + 1) for low, high in zip(instance.p_min, instance.p_max, strict=True)]

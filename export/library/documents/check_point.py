@@ -670,7 +670,7 @@ class Field:
         return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
 
     def violations(self) -> dict[str, Place]:
-        """Windows of alpha and beta, ranges of jumps, integrality."""
+        """Windows of alpha, bounds of beta, ranges of jumps, integrality."""
         quarter = (-PI / 4, PI / 4)
         bounds = []
         for alpha, beta, pixel in zip(self.alpha, self.beta, self.instance.pixels):

@@ -285,6 +285,7 @@ def test_header_says_what_the_file_holds():
     assert re.search(r"^\\ .*minlp-quartic \(section 2, \(8\)\), MIQP", quartic, re.MULTILINE)
     assert re.search(r"^\\ instance tiny, gauge box, sha256 [0-9a-f]{64}$", quartic, re.MULTILINE)
     assert "lifted" not in text_of(held("milp-mccormick gauge=box"), "mps")
+    assert "miqp-exact (ours), MIQP" in text_of(held("miqp-exact gauge=box"), "mps")
 
 
 # solvers that are picky

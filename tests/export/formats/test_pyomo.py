@@ -85,7 +85,7 @@ def test_start_is_the_point_of_the_field(label: str):
     for row in model.component_data_objects(pyo.Constraint):
         assert row.lslack() > -1e-12
         assert row.uslack() > -1e-12
-    with pytest.raises(InstanceError, match="not on this one \\(tiny"):
+    with pytest.raises(InstanceError, match=r"on another instance \(tiny: 5 x 1.*not on this one"):
         to_pyomo(problem, start=make_field(make_instance("row")))
 
 

@@ -123,3 +123,12 @@ def test_the_driver_of_a_solver_loads_neither_formulas_nor_writers():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "casadi" in done.stdout.split()
     assert not {"sympy", "scipy", "jinja2", "highspy"} & set(done.stdout.split())
+
+
+def test_highs_without_time_leaves_the_start_and_tells_no_bound(tmp_path):
+    instance = cf.sample("skew", 6)
+    start, problem = cf.greedy(instance), cf.formulate(instance, "milp-mccormick")
+    found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
+    assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
+    assert found.bound is None
+    assert not list(tmp_path.glob("*.log"))

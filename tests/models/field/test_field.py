@@ -137,7 +137,7 @@ def test_cross_error_takes_the_better_assignment():
 
 @pytest.mark.parametrize("index", [0.25, -0.25])
 def test_quarter_singularity_of_four_pixels(index):
-    # The middle of the block is the origin; the crosses turn by index * 360 degrees on the way round.
+    # The middle of the quad is the origin; the crosses turn by index * 360 degrees on the way round.
     way_round = np.radians([135, 45, 225, 315])
     alpha = np.mod(index * way_round, HALF)
     instance = pixels([[1, 1], [1, 1]], {(0, 0): np.degrees(alpha[0])}, gauge="box")
@@ -154,7 +154,7 @@ def test_half_singularity_by_its_jumps():
     assert CrossField(field.instance, np.zeros(4), np.zeros(4), [1, 0, 1, 0]).singularities.index.size == 0
 
 
-def test_singularity_is_found_at_its_block():
+def test_singularity_is_found_at_its_quad():
     rows, columns = np.mgrid[0:5, 0:6]
     way_round = np.arctan2(-(rows - 2.5), columns - 1.5).ravel()
     alpha = np.mod(-way_round / 4, HALF)

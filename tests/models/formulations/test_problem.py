@@ -217,8 +217,8 @@ def test_with_the_rest_fixed_only_what_lies_inside_is_free(name):
     grid = field.instance.grid
     problem = make_problem(name, field.instance)
     free = grid.rows > 0
-    window = with_rest_fixed(problem, field, free)
-    fixed = window.lower == window.upper
+    patch = with_rest_fixed(problem, field, free)
+    fixed = patch.lower == patch.upper
     inside = {"pixels": free, "pairs": free[grid.first] | free[grid.second]}
     point = problem.point(field)
     for quantity, block in problem.blocks.items():
@@ -226,17 +226,17 @@ def test_with_the_rest_fixed_only_what_lies_inside_is_free(name):
             expected = ~inside[block.over] | (problem.lower == problem.upper)[block.columns]
             assert (fixed[block.columns] == expected).all()
             outside = np.nonzero(~inside[block.over])[0] + block.offset
-            assert (window.lower[outside] == point[outside]).all()
+            assert (patch.lower[outside] == point[outside]).all()
         else:
             assert not fixed[block.columns].any()
-    assert window.integer.any() == problem.integer.any()
-    assert window.objective_value(point) == problem.objective_value(point)
+    assert patch.integer.any() == problem.integer.any()
+    assert patch.objective_value(point) == problem.objective_value(point)
     others = (
         problem,
         with_rest_fixed(problem, field, ~free),
         with_rest_fixed(problem, make_field(field.instance, 9), free),
     )
-    assert len({window.sha256, *(other.sha256 for other in others)}) == 4
+    assert len({patch.sha256, *(other.sha256 for other in others)}) == 4
 
 
 def test_free_pixels_are_told_for_the_whole_grid():

@@ -1,4 +1,4 @@
-"""Grid: numbering, neighbour pairs and blocks against small grids written out by hand."""
+"""Grid: numbering, neighbour pairs and quads against small grids written out by hand."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_two_by_two():
     assert upper.tolist() == [[-1, -1], [1, 3]]
     assert right.tolist() == [[0, -1], [2, -1]]
     # Bottom 2 -> 3, right side 3 -> 1, top 0 -> 1, left side 2 -> 0.
-    assert grid.blocks.tolist() == [[2, 3, 0, 1]]
+    assert grid.quads.tolist() == [[2, 3, 0, 1]]
 
 
 def test_three_by_three_with_a_hole():
@@ -43,22 +43,22 @@ def test_three_by_three_with_a_hole():
         (6, 7, False),
         (7, 4, True),
     ]
-    assert grid.blocks.shape == (0, 4)
+    assert grid.quads.shape == (0, 4)
     upper, right = grid.pair_number
     assert upper.tolist() == [[-1, -1, -1], [2, -1, 3], [4, -1, 7]]
     assert right.tolist() == [[0, 1, -1], [-1, -1, -1], [5, 6, -1]]
 
 
-def test_three_by_three_without_a_hole_has_four_blocks_row_by_row():
+def test_three_by_three_without_a_hole_has_four_quads_row_by_row():
     grid = Grid(np.ones((3, 3), bool))
-    corner = grid.first[grid.blocks[:, 0]]
+    corner = grid.first[grid.quads[:, 0]]
     assert corner.tolist() == [3, 4, 6, 7]
 
 
-def test_one_pixel_has_neither_pairs_nor_blocks():
+def test_one_pixel_has_neither_pairs_nor_quads():
     grid = Grid(np.array([[False, True]]))
     assert grid.size == 1
-    assert len(grid.first) == len(grid.second) == len(grid.upward) == len(grid.blocks) == 0
+    assert len(grid.first) == len(grid.second) == len(grid.upward) == len(grid.quads) == 0
     assert grid.number.tolist() == [[-1, 0]]
 
 
@@ -66,7 +66,7 @@ def test_one_pixel_has_neither_pairs_nor_blocks():
 def test_counts_of_a_full_grid(height, width):
     grid = Grid(np.ones((height, width), bool))
     assert len(grid.first) == 2 * height * width - height - width
-    assert len(grid.blocks) == (height - 1) * (width - 1)
+    assert len(grid.quads) == (height - 1) * (width - 1)
 
 
 def test_pixels_that_meet_in_a_corner_are_two_parts():
@@ -88,14 +88,14 @@ def test_pairs_are_all_upper_and_right_neighbours_in_order(mask):
 @given(MASKS)
 def test_walk_round_a_block_is_closed_and_counter_clockwise(mask):
     grid = Grid(mask)
-    for bottom, side, top, left in grid.blocks:
+    for bottom, side, top, left in grid.quads:
         assert grid.second[bottom] == grid.first[side]
         assert grid.second[side] == grid.second[top]
         assert grid.first[top] == grid.second[left]
         assert grid.first[left] == grid.first[bottom]
         assert grid.upward[[bottom, side, top, left]].tolist() == [False, True, False, True]
     full = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
-    assert len(grid.blocks) == full.sum()
+    assert len(grid.quads) == full.sum()
 
 
 @given(MASKS)

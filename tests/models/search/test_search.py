@@ -116,7 +116,7 @@ def test_angles_outside_the_patch_stay():
 
 
 def turns(instance, p):
-    bottom, side, top, left = instance.grid.blocks.T
+    bottom, side, top, left = instance.grid.quads.T
     return p[bottom] + p[side] - p[top] - p[left]
 
 

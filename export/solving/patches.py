@@ -1,7 +1,9 @@
-"""Large-neighbourhood search: windows of the grid are set free, all else fixed, and solved exactly.
+"""Large-neighbourhood search: patches of the grid are set free, all else fixed, and solved exactly.
 
-Where `search` walks over the jumps of some hundred pixels, this proves what is best on some ten. Windows lie
-at random, round singularities and where the energy is high; once all of a size are solved, they grow.
+A patch is what it is in models/search: pixels whose angles and jumps may change. Here the jumps to the pixels
+round it may too, and where `search` walks over the jumps of some hundred pixels, this proves what is best on
+some ten. Patches lie at random, round singularities and where the energy is high; once all of a size are
+solved, they grow.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from ...models.instance.grid import Bools, Ints
 from ...models.processes.deadline import Deadline
 from ...models.processes.interruption import interruptible
 from ...models.processes.side_by_side import side_by_side
-from ...models.search.energy import Solver
+from ...models.search.energy import LinearSolver
 from ...models.search.excerpt import Excerpt, excerpt
 from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
@@ -31,29 +33,29 @@ from .child import GRACE
 from .job import Limits
 from .local import solve
 
-WINDOW_SOLVERS: Final = {name: solver.window for name, solver in DRIVEN.items() if solver.window is not None}
-"""For each solver of windows what it solves, and the side of the first windows."""
+PATCH_SOLVERS: Final = {name: solver.patch for name, solver in DRIVEN.items() if solver.patch is not None}
+"""For each solver of patches what it solves, and the side of the first patches."""
 
-_WIDEST: Final = 8  # side at which a search ends: no solver here closes such a window
-_WINDOWS: Final = 4  # a round
-_SECONDS: Final = 5.0  # a window
+_WIDEST: Final = 8  # side at which a search ends: no solver here closes such a patch
+_PATCHES: Final = 4  # a round
+_SECONDS: Final = 5.0  # a patch
 _SHORTEST: Final = 0.5  # seconds: with less no solver is started
 _HAND_OVER: Final = 2 * GRACE  # seconds before the end at which solvers end: they may be late by their grace
 
-WindowProgress = Callable[[int, float], object]
-"""Is told how many windows are solved, and the least energy so far."""
+PatchProgress = Callable[[int, float], object]
+"""Is told how many patches are solved, and the least energy so far."""
 
 
 @dataclass(frozen=True)
-class WindowSearch:
-    """The field; how many windows were solved, to the end, and to a lower energy; how the search ended.
+class PatchSearch:
+    """The field; how many patches were solved, to the end, and to a lower energy; how the search ended.
 
-    side: of the windows that were solved last, in pixels. ended: `time`, `interrupted`, or `windows`: all
+    side: of the patches that were solved last, in pixels. ended: `time`, `interrupted`, or `patches`: all
     were solved, up to 8 x 8.
     """
 
     field: CrossField
-    windows: int
+    patches: int
     closed: int
     lower: int
     side: int
@@ -61,7 +63,7 @@ class WindowSearch:
 
 
 class _Task(NamedTuple):
-    """A window: the field round it, its free pixels (n,), solver, end of the search, folder for files."""
+    """A patch: the field round it, its free pixels (n,), solver, end of the search, folder for files."""
 
     field: CrossField
     free: Bools
@@ -71,63 +73,63 @@ class _Task(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """What a solver made of a window: the piece, and whether it was solved to the end."""
+    """What a solver made of a patch: where it lies, the field, and whether it was solved to the end."""
 
     piece: Excerpt
     field: CrossField | None
     closed: bool
 
 
-def search_windows(
+def search_patches(
     field: CrossField,
     *,
     seconds: float,
     solver: str = "bonmin",
     seed: int = 0,
     jobs: int = 2,
-    progress: WindowProgress = lambda *_: None,
-) -> WindowSearch:
-    """A field of no more 2-norm energy than the given one, each step down found by a solver in one window.
+    progress: PatchProgress = lambda *_: None,
+) -> PatchSearch:
+    """A field of no more 2-norm energy than the given one, each step down found by a solver in one patch.
 
     solver: `bonmin` solves `miqp-exact`; `highs` solves `milp-mccormick`, whose jumps the QP then follows.
-    seconds: when to end; jobs: processes. The seed decides on the first windows; how far each is solved, and
-    so what follows, depends on time. Ctrl-C ends the search after the windows at hand, a second one at once.
+    seconds: when to end; jobs: processes. The seed decides on the first patches; how far each is solved, and
+    so what follows, depends on time. Ctrl-C ends the search after the patches at hand, a second one at once.
     Raises InputError for limits that are not positive and for another solver.
     """
-    if solver not in WINDOW_SOLVERS:
-        raise InputError(f"{solver!r} solves no windows; choose one of {', '.join(WINDOW_SOLVERS)}")
+    if solver not in PATCH_SOLVERS:
+        raise InputError(f"{solver!r} solves no patches; choose one of {', '.join(PATCH_SOLVERS)}")
     if not seconds > 0 or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
     deadline = Deadline.after(seconds - min(_HAND_OVER, seconds / 4))
-    state = _State(field, WINDOW_SOLVERS[solver].side, np.random.default_rng(seed))
+    state = _State(field, PATCH_SOLVERS[solver].side, np.random.default_rng(seed))
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
         try:
             with interruptible() as interrupted, side_by_side(_solved, jobs) as explore:
                 while not (ended := _ended(state, deadline, interrupted())):
                     tasks = [
-                        _Task(state.field, free, solver, deadline, Path(folder)) for free in state.windows()
+                        _Task(state.field, free, solver, deadline, Path(folder)) for free in state.patches()
                     ]
                     state.take(tasks, explore(tasks))
                     progress(state.solved, state.energy)
         except KeyboardInterrupt:
             ended = "interrupted"
-    return WindowSearch(state.field, state.solved, state.closed, state.lower, state.side, ended)
+    return PatchSearch(state.field, state.solved, state.closed, state.lower, state.side, ended)
 
 
 def _ended(state: _State, deadline: Deadline, interrupted: bool) -> str:
     """Why a search is over; empty when it goes on."""
     late = deadline.later(-_SHORTEST).passed()
-    over = {"interrupted": interrupted, "windows": state.done, "time": late}
+    over = {"interrupted": interrupted, "patches": state.done, "time": late}
     return next((why for why, holds in over.items() if holds), "")
 
 
 def _solved(task: _Task) -> _Found | None:
-    """A window, solved from the file that is written for it; None where there was no time for it."""
+    """A patch, solved from the file that is written for it; None where there was no time for it."""
     deadline = task.deadline.within(_SECONDS)
     if deadline.later(-_SHORTEST).passed():
         return None
     piece = excerpt(task.field, task.free)
-    formulation = WINDOW_SOLVERS[task.solver].formulation
+    formulation = PATCH_SOLVERS[task.solver].formulation
     problem = with_rest_fixed(formulate(piece.field.instance, formulation), piece.field, piece.free)
     limits = Limits(threads=1).until(deadline)
     with tempfile.TemporaryDirectory(dir=task.folder) as folder:
@@ -137,7 +139,7 @@ def _solved(task: _Task) -> _Found | None:
 
 
 class _State:
-    """The field reached, and which windows of the present size are still to be solved."""
+    """The field reached, and which patches of the present size are still to be solved."""
 
     def __init__(self, field: CrossField, side: int, rng: np.random.Generator) -> None:
         self.field = field
@@ -149,16 +151,16 @@ class _State:
         self._open = np.ones(field.instance.grid.size, bool)
         self._chosen: list[int] = []
 
-    def windows(self) -> list[Bools]:
-        """The free pixels (n,) of the next windows, apart from each other where there is room."""
+    def patches(self) -> list[Bools]:
+        """The free pixels (n,) of the next patches, apart from each other where there is room."""
         self._chosen = list(self._centres())
         return [self._within(centre, self.side) for centre in self._chosen]
 
     def _centres(self) -> Iterator[int]:
-        """Pixels in the middle of windows: by energy, round singularities, at random, in turn."""
+        """Pixels in the middle of patches: by energy, round singularities, at random, in turn."""
         open_ = self._open.copy()
         kinds = [self.field.pixel_energy, self._round_singularities(), np.ones(len(open_))]
-        for number in range(_WINDOWS):
+        for number in range(_PATCHES):
             weight = np.where(open_, kinds[number % len(kinds)], 0.0)
             if not weight.any():
                 weight = open_.astype(float)
@@ -169,7 +171,7 @@ class _State:
             open_ &= ~self._within(centre, 2 * self.side + 2)
 
     def _round_singularities(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """1.0 at pixels whose window holds a singularity, 0.0 at others."""
+        """1.0 at pixels whose patch holds a singularity, 0.0 at others."""
         found, grid = self.field.singularities, self.field.instance.grid
         near = np.zeros(grid.size)
         for row, column in zip(found.row, found.column, strict=True):
@@ -188,7 +190,7 @@ class _State:
         return inside
 
     def take(self, tasks: list[_Task], found: list[_Found | None]) -> None:
-        """Take over what lowers the energy of the whole field, and note which windows are done with."""
+        """Take over what lowers the energy of the whole field, and note which patches are done with."""
         for centre, task, each in zip(self._chosen, tasks, found, strict=True):
             if each is None:
                 continue
@@ -197,7 +199,7 @@ class _State:
             self._open[centre] = False
             if each.field is not None and (each.field.p != each.piece.field.p).any():
                 lower = self._try(each.piece.put_back(each.field, self.field), task.free)
-                # Labels may have changed with another window's answer: then this one is solved once more.
+                # Labels may have changed with another patch's answer: then this one is solved once more.
                 self._open[centre] |= not lower and task.field is not self.field
         if not self._open.any():
             self._grow()
@@ -209,9 +211,9 @@ class _State:
         self._open[:] = True
 
     def _try(self, field: CrossField, free: Bools) -> bool:
-        """Whether a field, brought up to date, is lower: then go on from it, windows near by open again."""
+        """Whether a field, brought up to date, is lower: then go on from it, patches near by open again."""
         state = FreeField.of(field)
-        settle(state, Solver())
+        settle(state, LinearSolver())
         better = state.bounded()
         if better.energy().total < self.energy - LOWER:
             self.field, self.energy = better, better.energy().total
@@ -221,7 +223,7 @@ class _State:
         return False
 
     def _reached(self, free: Bools) -> Bools:
-        """Pixels whose window meets those that have changed."""
+        """Pixels whose patch meets those that have changed."""
         grid = self.field.instance.grid
         rows, columns = grid.rows[free], grid.columns[free]
         off = np.stack([_outside(grid.rows, rows), _outside(grid.columns, columns)])

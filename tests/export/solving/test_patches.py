@@ -1,4 +1,4 @@
-"""Windows that exact solvers solve: pieces of a field, the search over them, and what it promises."""
+"""Patches that exact solvers solve: pieces of a field, the search over them, and what it promises."""
 
 import json
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from children import interrupted
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.windows import WINDOW_SOLVERS, search_windows
+from crossfield.export.solving.patches import PATCH_SOLVERS, search_patches
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import QUARTER
 from crossfield.models.search.excerpt import excerpt
@@ -61,13 +61,13 @@ def test_a_piece_without_strokes_takes_the_nearest_one_along():
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_windows_as_large_as_the_grid_reach_the_optimum_over_all_jumps(seed):
+def test_patches_as_large_as_the_grid_reach_the_optimum_over_all_jumps(seed):
     instance = random_instance(seed, shape=(2, 2), strokes=4)
     start = instance_start(instance, seed)
-    found = search_windows(start, seconds=1000, jobs=1)
+    found = search_patches(start, seconds=1000, jobs=1)
     least = exact(instance)
-    assert found.ended == "windows"
-    assert found.closed == found.windows
+    assert found.ended == "patches"
+    assert found.closed == found.patches
     assert found.lower > 0
     assert found.field.energy().total >= least - 1e-9
     if np.abs(found.field.beta).max() < QUARTER - 1e-3:
@@ -83,11 +83,11 @@ def instance_start(instance, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", WINDOW_SOLVERS)
-def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
+@pytest.mark.parametrize("solver", PATCH_SOLVERS)
+def test_patches_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     start = first_field(cf.sample("mouse", 10))
     told = []
-    found = search_windows(
+    found = search_patches(
         start, seconds=2.0, solver=solver, jobs=2, progress=lambda *line: told.append(line)
     )
     field = found.field
@@ -96,41 +96,41 @@ def test_windows_never_raise_the_energy_and_stay_inside_the_bounds(solver):
     assert (np.abs(field.beta) <= QUARTER).all()
     assert (field.alpha >= field.instance.alpha_lower).all()
     assert (field.alpha <= field.instance.alpha_upper).all()
-    # On a busy machine no window ends within the time, and nothing is told.
-    assert told[-1:] == [(found.windows, field.energy().total)] * bool(found.windows)
-    assert 0 <= found.closed <= found.windows
-    assert found.ended in {"time", "windows"}
+    # On a busy machine no patch ends within the time, and nothing is told.
+    assert told[-1:] == [(found.patches, field.energy().total)] * bool(found.patches)
+    assert 0 <= found.closed <= found.patches
+    assert found.ended in {"time", "patches"}
 
 
 @pytest.mark.parametrize(
     "given", [{"seconds": 0}, {"seconds": 1, "jobs": 0}, {"seconds": 1, "solver": "ipopt"}]
 )
 def test_limits_and_solvers_that_cannot_be_are_refused(given):
-    with pytest.raises(cf.CrossfieldError, match=r"positive|solves no windows; choose one of highs, bonmin"):
-        search_windows(first_field(cf.sample("skew", 6)), **given)
+    with pytest.raises(cf.CrossfieldError, match=r"positive|solves no patches; choose one of highs, bonmin"):
+        search_patches(first_field(cf.sample("skew", 6)), **given)
 
 
 @pytest.mark.slow
 def test_from_the_command_line_with_highs(tmp_path, capsys):
-    """On a grid as small as a window all windows are solved to the end, long before the limit."""
+    """On a grid as small as a patch all patches are solved to the end, long before the limit."""
     instance = random_instance(1, shape=(2, 2), strokes=4)
     path = cf.write_instance(instance, tmp_path / "small.json")
-    command = ["solve", str(path), "--method", "windows", "--solver", "highs", "--time-limit", "1000"]
+    command = ["solve", str(path), "--method", "patches", "--solver", "highs", "--time-limit", "1000"]
     assert invoke([*command, "--json", "-o", str(tmp_path)]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["windows"] == facts["windows_closed"] > 0
-    assert facts["windows_lower"] >= 0
+    assert facts["patches"] == facts["patches_closed"] > 0
+    assert facts["patches_lower"] >= 0
     assert facts["energy_2_norm"] <= first_field(instance).energy().total
 
 
 CHILD = """
 import crossfield as cf
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.windows import search_windows
+from crossfield.export.solving.patches import search_patches
 from crossfield.models.search.improvement import first_field
 if True:
-    tell = lambda windows, energy: print(windows, flush=True)
-    found = search_windows(first_field(cf.sample("mouse", 12)), seconds=600, solver="highs", progress=tell)
+    tell = lambda patches, energy: print(patches, flush=True)
+    found = search_patches(first_field(cf.sample("mouse", 12)), seconds=600, solver="highs", progress=tell)
     print(found.ended, found.field.energy().total)
 """
 
