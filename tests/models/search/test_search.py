@@ -138,7 +138,9 @@ def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
     assert moved >= {0, 1, 2}
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(
+    "seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 10))]
+)
 def test_search_finds_the_optimum_over_all_jumps(seed):
     instance = random_instance(seed, shape=(2, 3), strokes=6)
     field = cf.search(instance, rounds=2).field
