@@ -32,22 +32,29 @@ if TYPE_CHECKING:
     from .models.instance.file import read_instance as read_instance
     from .models.instance.file import write_instance as write_instance
     from .models.instance.instance import Instance as Instance
+    from .models.proof.certificate import Certificate as Certificate
+    from .models.proof.certificate import read_certificate as read_certificate
+    from .models.proof.certificate import write_certificate as write_certificate
+    from .models.proof.dual_start import search as search
+    from .models.proof.prove import prove as prove
+    from .models.proof.record import Proof as Proof
     from .models.search.greedy import greedy as greedy
     from .models.search.improvement import improved as improved
     from .models.search.power_field import power_field as power_field
     from .models.search.search import Search as Search
-    from .models.search.search import search as search
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
     from .models.sketch.samples import samples as samples
     from .models.sketch.surfaces import analytic as analytic
 
 _HOME: Final = {
+    "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Instance": ".models.instance.instance",
     "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
+    "Proof": ".models.proof.record",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
     "analytic": ".models.sketch.surfaces",
@@ -57,6 +64,8 @@ _HOME: Final = {
     "greedy": ".models.search.greedy",
     "improved": ".models.search.improvement",
     "power_field": ".models.search.power_field",
+    "prove": ".models.proof.prove",
+    "read_certificate": ".models.proof.certificate",
     "read_field": ".models.field.file",
     "read_instance": ".models.instance.file",
     "read_manifest": ".export.bundle.manifest",
@@ -65,13 +74,14 @@ _HOME: Final = {
     "run": ".export.solving.run",
     "sample": ".models.sketch.samples",
     "samples": ".models.sketch.samples",
-    "search": ".models.search.search",
+    "search": ".models.proof.dual_start",
     "solve": ".export.solving.local",
     "to_pyomo": ".export.formats.pyomo_model",
     "two_stage": ".export.solving.two_stage",
     "with_integers_fixed": ".models.formulations.problem",
     "write": ".export.formats.registry",
     "write_all": ".export.bundle.manifest",
+    "write_certificate": ".models.proof.certificate",
     "write_field": ".models.field.file",
     "write_instance": ".models.instance.file",
     "write_problem": ".export.bundle.manifest",

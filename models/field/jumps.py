@@ -17,9 +17,9 @@ def parity_sign(p: Ints) -> Floats:
     return 1.0 - 2.0 * (p & 1).astype(np.float64)
 
 
-def best_jumps(instance: Instance, alpha: Floats, beta: Floats) -> Ints:
-    """The jump of least 2-norm energy in [p_min, p_max] of each pair, (m,), of equal ones the smaller."""
-    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max))[0]
+def best_jumps(instance: Instance, alpha: Floats, beta: Floats, norm: int = 2) -> Ints:
+    """The jump of least energy in [p_min, p_max] of each pair, (m,), of equal ones the smaller."""
+    return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max), norm)[0]
 
 
 def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
@@ -28,7 +28,7 @@ def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
 
 
 def _best(
-    grid: Grid, alpha: Floats, beta: Floats, within: tuple[Ints, Ints] | None = None
+    grid: Grid, alpha: Floats, beta: Floats, within: tuple[Ints, Ints] | None = None, norm: int = 2
 ) -> tuple[Ints, Floats]:
     difference = alpha[grid.first] - alpha[grid.second]
     near = np.floor(-difference / HALF).astype(np.int32)
@@ -37,7 +37,8 @@ def _best(
     candidates = near + around if within is None else np.clip(np.clip(near, *within) + around, *within)
     a = difference + HALF * candidates
     b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
-    cost = np.round(2 * (a * a + b * b), 12)  # equal costs must not be told apart by rounding
+    size = np.abs if norm == 1 else np.square
+    cost = np.round(2 * (size(a) + size(b)), 12)  # equal costs must not be told apart by rounding
     at = (np.argmin(cost, axis=0), np.arange(len(difference)))
     return candidates[at], cost[at]
 

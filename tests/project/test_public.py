@@ -156,7 +156,7 @@ def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
 
 def test_importing_the_package_loads_nothing_heavy():
     loaded = loaded_after("import crossfield")
-    assert not loaded & (SOLVERS_AND_LAYOUT | {"numpy", "scipy", "sympy", "PIL"})
+    assert not loaded & (SOLVERS_AND_LAYOUT | {"numpy", "scipy", "sympy", "numba", "PIL"})
 
 
 def test_pyomo_is_imported_in_one_file():

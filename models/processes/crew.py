@@ -1,0 +1,55 @@
+"""Threads that share compiled work: it runs without Python's lock.
+
+Parallel loops of Numba would do the same. But their threads spin while they wait, which doubled the time on a
+machine where others work; the OpenMP ones do not survive a fork, and the built-in ones no second thread of
+Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+
+from .side_by_side import checked
+
+_Part = TypeVar("_Part")
+
+
+class Crew:
+    """So many threads, this one among them."""
+
+    def __init__(self, count: int, others: ThreadPoolExecutor) -> None:
+        self._count, self._others = count, others
+
+    def parts(self, work: np.ndarray[Any, Any]) -> list[slice]:
+        """Neighbouring items for each thread, as equal in work as whole items allow."""
+        done = np.concatenate([[0.0], np.cumsum(work, dtype=np.float64)])
+        goals = np.linspace(0.0, done[-1], self._count + 1)
+        ends = np.abs(done[:, None] - goals).argmin(axis=0)
+        ends[0], ends[-1] = 0, len(work)
+        return [slice(a, b) for a, b in pairwise(ends) if a < b]
+
+    def equal_parts(self, many: int) -> list[slice]:
+        """So many items, cut into as many parts as there are threads."""
+        ends = [many * number // self._count for number in range(self._count + 1)]
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def run(self, work: Callable[[_Part], object], parts: Sequence[_Part]) -> None:
+        """Do the work on each of the parts at the same time."""
+        waiting = [self._others.submit(work, part) for part in parts[1:]]
+        for part in parts[:1]:
+            work(part)
+        for each in waiting:
+            each.result()
+
+
+@contextmanager
+def crew(count: int) -> Iterator[Crew]:
+    """A crew, whose threads have ended afterwards. Raises InputError for a number that cannot be."""
+    with ThreadPoolExecutor(max(1, checked(count) - 1)) as others:
+        yield Crew(count, others)

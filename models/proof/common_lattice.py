@@ -1,0 +1,94 @@
+"""The lattice of the 1-norm: one for all pixels, on which pairs lose nothing.
+
+alpha and beta of every label are multiples of h, and h divides pi/4. So the differences A and B of two
+labels are multiples of h too, at every jump. Round crosses by thresholds as models/proof/costs.py says: A
+and B each fall on one of two neighbouring multiples of h with the right mean, and |.| is linear between
+them, as it is for beta. Hence
+
+    pair    c = min over p of 2 (|A| + |B|)        E[c] <= 2 (|a| + |b|)
+    skew    w_beta |beta|                          E[.] = w_beta |beta|
+
+For strokes the line's misfit R = alpha + beta - theta is a sum of two that are rounded independently: it
+falls on one of three values h apart, with the right mean. They need not be multiples of h. With any -1 <= l
+<= 1 let
+
+    stroke  w d(R),  d(R) = |R| where |R| >= 2h, else l R        E[.] <= w |r|
+
+Either all three values are less than 2h in size. There d is linear, and its mean is l r <= |r|. Or one of
+them is 2h or more in size: as they span 2h, none has another sign. Then |.| is linear on them, d is nowhere
+more, and the mean of d is at most |r|. The same with R = alpha + pi/2 - beta - theta for line v, where l =
+0 is taken, and after any number of turns by pi. The least over lines and turns is nowhere more than any of
+them.
+
+The discrete problem is thus one whose local polytope holds every field at no more than its 1-norm energy.
+At the best angles for some jumps nothing is lost at all where l is the multiplier of the stroke in the
+linear program for them (models/search/box_lp.py): l R supports |R| at r, and the pairs hold it in balance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from ..field.field import CrossField, Norm
+from ..instance.angles import wrap
+from ..instance.grid import Floats
+from ..instance.instance import HALF
+from ..search.energy import stroke_weight
+from .lattice import Lattice, few_unreached, reached, strip
+
+
+@dataclass(frozen=True, eq=False)
+class CommonLattice(Lattice):
+    """The labels of one level in the 1-norm; centres are multiples of the spacing, those of beta 0.
+
+    slopes (s,): l of each stroke, in [-1, 1].
+    """
+
+    norm: ClassVar[Norm] = 1
+    slopes: Floats
+
+    @classmethod
+    def near(cls, field: CrossField, slopes: Floats, steps: int) -> CommonLattice:
+        """The lattice of spacing pi / (2 steps) with every cross of the strip in a cell.
+
+        steps: an even number. alpha covers pi/2 round the multiple of h next to that of the field.
+        """
+        h, size = HALF / steps, field.instance.grid.size
+        known, beta = reached(field.instance), np.zeros(size)
+        alpha = h * np.round(field.alpha * known / h)
+        beta_first, beta_last = strip(beta, h, beta)
+        alpha_first, alpha_count = np.full(size, -steps // 2, np.int32), np.full(size, steps + 1, np.int32)
+        ranges = few_unreached(known, alpha_first, alpha_count, beta_first, beta_last - beta_first + 1)
+        allowed = np.ones(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
+        return cls(field.instance, h, alpha, beta, field.p, *ranges, allowed, slopes)
+
+    @cached_property
+    def offset(self) -> Floats:
+        """0 at every pixel, shape (n,)."""
+        return np.zeros(self.instance.grid.size)
+
+    def unary_costs(self) -> Floats:
+        """D of each label, flat: skew and stroke term; inf where it is not allowed."""
+        cost: Floats = self.instance.w_beta * np.abs(self.angles[1])
+        weight = stroke_weight(self.instance)[self.pixel]
+        at = np.flatnonzero(weight)
+        pixel, alpha, beta = self.pixel[at], self.angles[0][at], self.angles[1][at]
+        target, slope = np.zeros((2, self.instance.grid.size))
+        target[self.instance.stroke_index], slope[self.instance.stroke_index] = (
+            self.instance.target,
+            self.slopes,
+        )
+        u = self._misfit(alpha + beta - target[pixel], slope[pixel])
+        v = self._misfit(alpha + HALF - beta - target[pixel], np.zeros(len(at)))
+        cost[at] += weight[at] * np.minimum(u, v)
+        return np.where(self.allowed, cost, np.inf)
+
+    def _misfit(self, r: Floats, slope: Floats) -> Floats:
+        """The cost d(R) of a line, a little less where rounding could make it more."""
+        r = wrap(r, -HALF, np.pi)
+        found: Floats = np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)
+        return found

@@ -1,0 +1,151 @@
+"""The lattice of a level: for every pixel the labels (alpha, beta) to which the bound rounds its cross.
+
+Label (k, l) of pixel i stands at alpha_i + h (k + o_i), beta_i + h (l + o_i) round a centre (alpha_i,
+beta_i), which is the cross of the best field known. The offset o is 0 on black and 1/2 on white pixels of the
+checkerboard, so that the differences of neighbours at that field lie in the middle between those of their
+labels, where a pair's discrete cost touches the true one. Rectangles of labels are stored one after the
+other, those of a pixel alpha-major; `allowed` says which of them are left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..field.field import CrossField, Norm
+from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.instance import HALF, QUARTER, Instance
+
+Starts = NDArray[np.int64]
+"""Where blocks of flat arrays begin, and where the last one ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """The labels of one level.
+
+    instance: the problem. h: spacing in radians. alpha, beta (n,), p (m,): the centres. alpha_first,
+    alpha_count, beta_first, beta_count (n,): the ranges k = first ... first + count - 1 and of l. allowed:
+    bool, one for each label of each pixel's rectangle, alpha-major, pixels in the grid's order. A pixel's
+    cross may be anywhere in a cell all of whose four vertices are allowed.
+    """
+
+    norm: ClassVar[Norm] = 2
+    instance: Instance
+    h: float
+    alpha: Floats
+    beta: Floats
+    p: Ints
+    alpha_first: Ints
+    alpha_count: Ints
+    beta_first: Ints
+    beta_count: Ints
+    allowed: Bools
+
+    @classmethod
+    def whole(cls, field: CrossField, steps: int) -> Lattice:
+        """The lattice of spacing pi / (2 steps) round a field, with every cross of the strip in a cell.
+
+        steps: an even number. alpha covers a window of length pi/2 round its centre, beta [-pi/4, pi/4].
+        Cells that stick out are kept. Pixels that no stroke reaches have less: see `reached`.
+        """
+        h, size = HALF / steps, field.instance.grid.size
+        alpha_first, alpha_count = np.full(size, -steps // 2, np.int32), np.full(size, steps + 1, np.int32)
+        beta_first, beta_last = strip(field.beta, h, offsets(field.instance.grid))
+        ranges = few_unreached(
+            reached(field.instance), alpha_first, alpha_count, beta_first, beta_last - beta_first + 1
+        )
+        allowed = np.ones(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
+        return cls(field.instance, h, field.alpha, field.beta, field.p, *ranges, allowed)
+
+    @cached_property
+    def offset(self) -> Floats:
+        """The offset o of each pixel in steps, 0 or 1/2; shape (n,)."""
+        return offsets(self.instance.grid)
+
+    @cached_property
+    def count(self) -> Ints:
+        """Number of labels in each pixel's rectangle, shape (n,)."""
+        return self.alpha_count * self.beta_count
+
+    @cached_property
+    def start(self) -> Starts:
+        """Where each pixel's labels begin in flat arrays, shape (n + 1,)."""
+        return starts(self.count)
+
+    @cached_property
+    def pixel(self) -> Ints:
+        """The pixel of each label, flat."""
+        return np.repeat(np.arange(len(self.count), dtype=np.int32), self.count)
+
+    @property
+    def steps(self) -> tuple[Ints, Ints]:
+        """The steps k and l of each label, flat."""
+        inside = np.arange(self.start[-1]) - self.start[self.pixel]
+        row, column = np.divmod(inside.astype(np.int32), self.beta_count[self.pixel])
+        return self.alpha_first[self.pixel] + row, self.beta_first[self.pixel] + column
+
+    @property
+    def angles(self) -> tuple[Floats, Floats]:
+        """Alpha and beta of each label in radians, flat."""
+        k, l = self.steps  # noqa: E741 - the letters of the equation
+        at, offset = self.pixel, self.offset[self.pixel]
+        return self.alpha[at] + self.h * (k + offset), self.beta[at] + self.h * (l + offset)
+
+    @property
+    def work(self) -> float:
+        """Additions that a pass takes at most: the size of all (min,+) products over one angle."""
+        i, j = self.instance.grid.first, self.instance.grid.second
+        rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
+        return float(2 * (rows[j] * columns[i] * (columns[j] + rows[i])).sum())
+
+    def share_starts(self, end: Ints) -> Starts:
+        """Where the shares of each pair at one of its ends begin in flat arrays, shape (m + 1,).
+
+        end: `first` or `second` of the grid.
+        """
+        return starts(self.count[end])
+
+
+def offsets(grid: Grid) -> Floats:
+    """0 on black pixels of the checkerboard (row + column even), 1/2 on white ones; shape (n,)."""
+    return 0.5 * ((grid.rows + grid.columns) % 2).astype(np.float64)
+
+
+def reached(instance: Instance) -> Bools:
+    """Whether each pixel's part of the mask (4-connected) has a stroke, shape (n,).
+
+    A part without strokes costs nothing where all its crosses are one with beta = 0, as its centres have to
+    be, and nothing costs less. So it is looked at nowhere else: its labels are k, l = -1, 0, 1 on every
+    level.
+    """
+    from scipy import ndimage
+
+    parts = ndimage.label(instance.mask)[0][instance.mask]
+    found: Bools = np.isin(parts, parts[instance.stroke_index])
+    return found
+
+
+def few_unreached(
+    reached: Bools, alpha_first: Ints, alpha_count: Ints, beta_first: Ints, beta_count: Ints
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """The ranges of steps, with -1, 0, 1 both ways where no stroke reaches."""
+    few = (np.int32(-1), np.int32(3), np.int32(-1), np.int32(3))
+    given = (alpha_first, alpha_count, beta_first, beta_count)
+    a, b, c, d = (np.where(reached, all_, some) for all_, some in zip(given, few, strict=True))
+    return a, b, c, d
+
+
+def starts(counts: Ints) -> Starts:
+    """Where blocks of those lengths begin when they stand one after the other, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+
+
+def strip(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
+    """Least and greatest step l with which the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
+    lower, upper = (-QUARTER - beta) / h - offset, (QUARTER - beta) / h - offset
+    return np.floor(lower).astype(np.int32), np.ceil(upper).astype(np.int32)

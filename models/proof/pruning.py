@@ -1,0 +1,252 @@
+"""What a level leaves for the next one: cells in which a field of at most the energy U may have its crosses.
+
+The rule, with what a checker has to compute in float64 from a LevelRecord and the U of the whole proof:
+
+1. A forward pass (models/proof/sweep.py) from the shares of the record. At each pixel i, when it has taken
+   from the pairs to its upper and left neighbours: theta_i(x) = D_i(x) + the sum of its shares, over allowed
+   labels x.
+2. Label x of pixel i survives where `bound` + theta_i(x) - min theta_i <= U + tolerance. For a field whose
+   crosses are rounded as in models/proof/costs.py, the mean of the left side over the label's law is at most
+   its energy: one vertex of the cell it lies in survives, whatever the pass has made of the shares before,
+   because the bound never falls in a pass.
+3. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
+4. In the next level, of half the spacing round the same centres, every label is allowed whose cells
+   meet a cell that is left, but for labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k,
+   l) begins at (2 k + o, 2 l + o): that is a vertex on black pixels and the middle of a cell on white ones.
+
+Pixels that no stroke reaches (models/proof/lattice.py) are left out of these rules: see `reached` there.
+
+Here the tolerance is 1e-7 (1 + U), for U as it was then; a checker that allows for 1e-9 (1 + U) of its own
+rounding and takes the final U, which is no greater, never keeps a cell that this one dropped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import QUARTER
+from .lattice import Lattice, Starts, few_unreached, reached, starts, strip
+from .products import compiled
+from .sweep import Dual
+
+TOLERANCE: Final = 1e-7
+"""What may be above U and still survives, relative to 1 + U."""
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """The cells that are left on a lattice.
+
+    cells: bool, flat like the labels: whether the cell from this label upwards is left.
+    alpha_low, alpha_high, beta_low, beta_high (n,): the box round a pixel's cells in radians, |beta| <= pi/4.
+    """
+
+    lattice: Lattice
+    cells: Bools
+    alpha_low: Floats
+    alpha_high: Floats
+    beta_low: Floats
+    beta_high: Floats
+
+
+def left(dual: Dual, bound: float, energy: float) -> Left:
+    """The cells that a level leaves below an energy; a forward pass of the dual is made for it."""
+    lattice = dual.lattice
+    dual.forward()
+    spare = energy + TOLERANCE * (1 + energy) - bound
+    survives = dual.state.theta - dual.state.least[lattice.pixel] <= spare
+    cells = np.zeros(len(survives), dtype=bool)
+    _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
+    steps = _ends(lattice, cells)
+    at = lattice.h * (steps + lattice.offset[:, None])
+    return Left(
+        lattice, cells,
+        lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
+        np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
+    )  # fmt: skip
+
+
+def finer(left: Left) -> Lattice:
+    """The lattice of half the spacing on the cells that are left."""
+    lattice = left.lattice
+    h, half = lattice.h / 2, (lattice.offset > 0).astype(np.int32)
+    lowest, highest = strip(lattice.beta, h, lattice.offset)
+    ends = 2 * _ends(lattice, left.cells)
+    ends[:, 1] += half
+    ends[:, 2], ends[:, 3] = np.maximum(ends[:, 2], lowest), np.minimum(ends[:, 3] + half, highest)
+    known = reached(lattice.instance)
+    alpha_first, alpha_last, beta_first, beta_last = ends.T
+    ranges = few_unreached(
+        known, alpha_first, alpha_last - alpha_first + 1, beta_first, beta_last - beta_first + 1
+    )
+    allowed = np.zeros(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
+    alpha_first, alpha_count, beta_first, beta_count = ranges
+    new = replace(
+        lattice, h=h, alpha_first=alpha_first, alpha_count=alpha_count, beta_first=beta_first,
+        beta_count=beta_count, allowed=allowed,
+    )  # fmt: skip
+    _allow((_rectangles(lattice), left.cells), (_rectangles(new), allowed), 3 + half)
+    allowed |= ~known[new.pixel]
+    return new
+
+
+def branches(dual: Dual, count: int) -> list[Dual]:
+    """The dual on parts of its lattice, which together hold all its cells: the alpha of one pixel is cut.
+
+    The pixel is the one of whose alpha the dual says least: the dearest alpha costs least there, at its best
+    beta. Where a vortex may be in many places, that is the pixel in their middle. Empty where nothing can be
+    cut.
+    """
+    dual.backward()
+    pixel, lattice = _least_known(dual), dual.lattice
+    begin, end = lattice.start[pixel : pixel + 2]
+    mine = lattice.allowed[begin:end].reshape(lattice.alpha_count[pixel], -1)
+    rows = np.flatnonzero(mine.any(axis=1))
+    cuts = np.unique(np.linspace(rows[0], rows[-1], count + 1).round().astype(int))
+    found = []
+    for low, high in pairwise(cuts):
+        part = np.zeros_like(mine)
+        part[low : high + 1] = mine[low : high + 1]
+        if (part[1:, 1:] & part[:-1, 1:] & part[1:, :-1] & part[:-1, :-1]).any():
+            allowed = lattice.allowed.copy()
+            allowed[begin:end] = part.ravel()
+            shares = (dual.state.shares_first.copy(), dual.state.shares_second.copy())
+            found.append(Dual(replace(lattice, allowed=allowed), dual.crew, *shares))
+    return found if len(found) > 1 else []
+
+
+def _least_known(dual: Dual) -> int:
+    """The pixel whose dearest alpha costs least, after a pass."""
+    lattice, theta = dual.lattice, dual.state.theta
+    rows = starts(lattice.alpha_count)
+    row = np.repeat(lattice.start[:-1], lattice.alpha_count)
+    row += (np.arange(rows[-1]) - np.repeat(rows[:-1], lattice.alpha_count)) * np.repeat(
+        lattice.beta_count, lattice.alpha_count
+    )
+    cheapest = np.minimum.reduceat(theta, row)
+    cheapest[cheapest == np.inf] = -np.inf  # rows that are not allowed
+    dearest = np.maximum.reduceat(cheapest, rows[:-1]) - dual.state.least
+    dearest[~reached(lattice.instance)] = np.inf
+    return int(np.argmin(dearest))
+
+
+def prolonged(dual: Dual, lattice: Lattice) -> Dual:
+    """The dual on a finer lattice with the same centres: its shares are interpolated between labels."""
+    old, grid = dual.lattice, dual.lattice.instance.grid
+    shares = []
+    for ends, values in ((grid.first, dual.state.shares_first), (grid.second, dual.state.shares_second)):
+        found = np.zeros(int(lattice.share_starts(ends)[-1]))
+        was = _rectangles(old), old.share_starts(ends), values
+        now = _rectangles(lattice), lattice.share_starts(ends), found
+        _interpolate(was, now, ends, lattice.h / old.h, (lattice.offset, lattice.allowed))
+        shares.append(found)
+    return Dual(lattice, dual.crew, *shares)
+
+
+def _ends(lattice: Lattice, cells: Bools) -> Ints:
+    """Least and greatest k, then l, of the vertices of each pixel's cells, shape (n, 4)."""
+    ends = np.zeros((len(lattice.count), 4), np.int32)
+    _bounds(_rectangles(lattice), cells, ends)
+    return ends + np.stack([lattice.alpha_first] * 2 + [lattice.beta_first] * 2, axis=1)
+
+
+class Rectangles(NamedTuple):
+    """Where the labels of each pixel begin, how many there are in alpha and beta, and the first k and l."""
+
+    start: Starts
+    rows: Ints
+    columns: Ints
+    first_row: Ints
+    first_column: Ints
+
+
+def _rectangles(lattice: Lattice) -> Rectangles:
+    return Rectangles(
+        lattice.start, lattice.alpha_count, lattice.beta_count, lattice.alpha_first, lattice.beta_first
+    )
+
+
+@compiled
+def _mark_cells(at: Rectangles, allowed: Bools, survives: Bools, cells: Bools) -> None:
+    """Mark the cells that are left."""
+    for i in range(len(at.rows)):
+        begin, columns = at.start[i], at.columns[i]
+        for k in range(at.rows[i] - 1):
+            for low in range(begin + k * columns, begin + (k + 1) * columns - 1):
+                high = low + columns
+                whole = allowed[low] and allowed[low + 1] and allowed[high] and allowed[high + 1]
+                some = survives[low] or survives[low + 1] or survives[high] or survives[high + 1]
+                cells[low] = whole and some
+
+
+@compiled
+def _bounds(at: Rectangles, cells: Bools, ends: Ints) -> None:
+    """Find the first and last vertex of the cells in alpha and in beta, counted from the first label."""
+    for i in range(len(at.rows)):
+        low_k, high_k, low_l, high_l = at.rows[i], 0, at.columns[i], 0
+        for x in range(at.start[i + 1] - at.start[i]):
+            if cells[at.start[i] + x]:
+                k, l = x // at.columns[i], x % at.columns[i]  # noqa: E741 - the letter of the equation
+                low_k, high_k = min(low_k, k), max(high_k, k + 1)
+                low_l, high_l = min(low_l, l), max(high_l, l + 1)
+        ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3] = low_k, high_k, low_l, high_l
+
+
+@compiled
+def _allow(was: tuple[Rectangles, Bools], now: tuple[Rectangles, Bools], side: Ints) -> None:
+    """Allow the labels of the finer lattice whose cells meet a cell that is left, `side` of them each way."""
+    (old, cells), (new, allowed) = was, now
+    for i in range(len(old.rows)):
+        columns = old.columns[i]
+        for x in range(old.start[i + 1] - old.start[i]):
+            if not cells[old.start[i] + x]:
+                continue
+            row = 2 * (old.first_row[i] + x // columns) - new.first_row[i]
+            column = 2 * (old.first_column[i] + x % columns) - new.first_column[i]
+            for k in range(row, row + side[i]):
+                if not 0 <= k < new.rows[i]:
+                    continue
+                begin = new.start[i] + k * new.columns[i]
+                for l in range(max(column, 0), min(column + side[i], new.columns[i])):  # noqa: E741
+                    allowed[begin + l] = True
+
+
+@compiled
+def _interpolate(
+    old: tuple[Rectangles, Starts, Floats],
+    new: tuple[Rectangles, Starts, Floats],
+    ends: Ints,
+    ratio: float,
+    offset_and_allowed: tuple[Floats, Bools],
+) -> None:
+    """Fill in new shares at the allowed labels of those ends of pairs, bilinear between the old ones."""
+    (was, was_start, values), (now, now_start, found) = old, new
+    offset, allowed = offset_and_allowed
+    for pair in range(len(ends)):
+        i = ends[pair]
+        given = values[was_start[pair] : was_start[pair + 1]].reshape((was.rows[i], was.columns[i]))
+        wanted = found[now_start[pair] : now_start[pair + 1]].reshape((now.rows[i], now.columns[i]))
+        mine = allowed[now.start[i] : now.start[i + 1]].reshape(wanted.shape)
+        for k in range(now.rows[i]):
+            row, up = _between(now.first_row[i] + k, offset[i], ratio, was.first_row[i], was.rows[i])
+            for l in range(now.columns[i]):  # noqa: E741 - the letter of the equation
+                if mine[k, l]:
+                    column, right = _between(
+                        now.first_column[i] + l, offset[i], ratio, was.first_column[i], was.columns[i]
+                    )
+                    wanted[k, l] = (1 - up) * (
+                        (1 - right) * given[row, column] + right * given[row, column + 1]
+                    ) + up * ((1 - right) * given[row + 1, column] + right * given[row + 1, column + 1])
+
+
+@compiled
+def _between(step: int, offset: float, ratio: float, first: int, count: int) -> tuple[int, float]:
+    """The old label below a new one, and how far it is from there to the next: 0 to 1."""
+    place = min(max((step + offset) * ratio - offset - first, 0.0), count - 1.0)
+    low = min(int(place), count - 2)
+    return low, place - low

@@ -1,0 +1,87 @@
+"""What a proof says: the field, the bound, and every level of it in a form that can be checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal, Self
+
+from ..field.field import CrossField, Norm
+from ..instance.grid import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from .sweep import Dual
+
+Status = Literal["optimal", "gap"]
+
+EXACT: Final = 1e-9
+"""Gap relative to 1 + energy that rounding leaves of none."""
+
+
+@dataclass(frozen=True, eq=False)
+class LevelRecord:
+    """One level of a proof: a lattice (see models/proof/lattice.py) and a dual solution on it.
+
+    h: spacing in radians. alpha, beta (n,), p (m,): the centres, the same at all levels of a proof.
+    alpha_first, alpha_count, beta_first, beta_count (n,), allowed (flat): the labels.
+    shares_first, shares_second: flat over pairs in the grid's order, alpha-major: what a pair gives to the
+    labels of its first, of its second pixel; 0 at labels that are not allowed. Whole multiples of `quantum`,
+    a power of two, below 2^31 of them (2^49 in the 1-norm).
+    bound: sum over pixels of min (D + shares) + sum over pairs of min (c - shares), over allowed labels; D
+    and c are in models/proof/costs.py. An error bound for its float64 sums is taken off.
+    energy: U when the level was pruned; what the next level lacks has more (models/proof/pruning.py).
+    """
+
+    h: float
+    alpha: Floats
+    beta: Floats
+    p: Ints
+    alpha_first: Ints
+    alpha_count: Ints
+    beta_first: Ints
+    beta_count: Ints
+    allowed: Bools
+    shares_first: Floats
+    shares_second: Floats
+    quantum: float
+    bound: float
+    energy: float
+
+    @classmethod
+    def of(cls, dual: Dual, energy: float) -> Self:
+        """The record of a dual whose shares are rounded to multiples of their quantum for it."""
+        at, quantum, state = dual.lattice, dual.quantise(), dual.state
+        return cls(
+            at.h, at.alpha, at.beta, at.p, at.alpha_first, at.alpha_count, at.beta_first, at.beta_count,
+            at.allowed, state.shares_first.copy(), state.shares_second.copy(), quantum, dual.bound(), energy,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """The best field that was found and what is proven of it.
+
+    field, energy: U, its energy in the norm. bound: no field has less energy. status: `optimal` where the
+    bound is the energy but for rounding, energy - bound <= 1e-9 (1 + energy): then the jumps are forced, and
+    the field solves the convex problem that is left; else `gap`. forced: number of pairs whose jump is that
+    of the levels' centre in every field that could be better. levels: the last chain of lattices, coarsest
+    first. seconds: of the whole work. ended: `optimal`, `gap` (the one asked for is reached), `time`,
+    `interrupted`, or `labels` where the next level would be too large. norm: 1 or 2. parents: the number of
+    the level from which each follows, -1 for the first; empty where each follows from the one before. Where
+    several follow from one, they are branches: the alpha of one pixel is cut.
+    """
+
+    field: CrossField
+    energy: float
+    bound: float
+    status: Status
+    forced: int
+    levels: tuple[LevelRecord, ...]
+    seconds: float
+    ended: str
+    norm: Norm = 2
+    parents: tuple[int, ...] = ()
+
+    @property
+    def gap(self) -> float:
+        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
+        return 0.0 if self.status == "optimal" else (self.energy - self.bound) / max(self.energy, 1e-300)

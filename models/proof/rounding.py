@@ -1,0 +1,116 @@
+"""Fields from a dual solution: pixel by pixel the label that looks cheapest, then improved.
+
+In the order of a pass the label of least D + cost to the neighbours that have theirs + shares of those that
+have not (Kolmogorov 2006, 5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from ..field.field import CrossField, relabelled
+from ..field.jumps import free_jumps
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import QUARTER
+from ..processes.deadline import Over, never
+from ..search.energy import LinearSolver
+from ..search.free_field import FreeField
+from ..search.improvement import improved, settle
+from .products import compiled, share_of, sized
+from .sweep import Dual, State
+
+_BETTER: Final = 1e-9  # relative: rounding is no improvement
+_HALF: Final = float(np.pi / 2)
+_PI: Final = float(np.pi)
+
+
+Improve = Callable[[CrossField, CrossField, Over], CrossField]
+"""From a field that was rounded and the best one so far: the better one of them, improved."""
+
+
+class Rounding:
+    """Rounds fields from a dual, each set of jumps once."""
+
+    def __init__(self, dual: Dual, improve: Improve) -> None:
+        self._dual, self._improve = dual, improve
+        self._tried: set[bytes] = set()
+
+    def lower(self, best: CrossField, over: Over = never) -> CrossField:
+        """A field of no more energy than `best`: it itself, or one that the shares suggest.
+
+        Comes after a backward pass, and leaves the dual after one.
+        """
+        best = self._rounded(best, over, forwards=True)
+        if over():
+            return best
+        self._dual.forward()
+        best = self._rounded(best, over, forwards=False)
+        self._dual.backward()
+        return best
+
+    def _rounded(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
+        instance = best.instance
+        alpha, beta = decoded(self._dual, forwards=forwards)
+        found = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
+        known = found.p.tobytes()
+        if known in self._tried:
+            return best
+        self._tried.add(known)
+        return self._improve(found, best, over)
+
+
+def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
+    """The one of lower 2-norm energy: the best field, or the one found, improved where that may pay."""
+    state = FreeField.of(found)
+    settle(state, LinearSolver(), over)
+    if state.energy >= best.energy().total * (1 - _BETTER):
+        return best
+    return min(best, improved(state.bounded(over), over), key=lambda field: field.energy().total)
+
+
+def decoded(dual: Dual, *, forwards: bool) -> tuple[Floats, Floats]:
+    """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
+    size = len(dual.state.least)
+    order = np.arange(size, dtype=np.int32)[:: 1 if forwards else -1].copy()
+    alpha, beta = np.zeros(size), np.zeros(size)
+    _decode(order, dual.state, alpha, beta, np.zeros(size, dtype=bool))
+    return alpha, np.clip(beta, -QUARTER, QUARTER)
+
+
+@compiled
+def _decode(order: Ints, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
+    """Fill in the angles, pixel by pixel in that order."""
+    for i in order:
+        cost = state.unary[state.start[i] : state.start[i + 1]].copy()
+        for column in range(4):
+            pair = state.around[i, column]
+            if pair < 0:
+                continue
+            j = state.first[pair] + state.second[pair] - i
+            if fixed[j]:
+                _add_distance(i, state, alpha[j], beta[j], cost)
+            else:
+                cost += share_of(pair, i, state)
+        x = np.argmin(cost)
+        alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
+        beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])
+        fixed[i] = True
+
+
+@compiled
+def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats) -> None:
+    """Add the cost of a pair of pixel i with a cross that is fixed."""
+    columns = state.beta_count[i]
+    for row in range(state.alpha_count[i]):
+        even = state.alpha[i] + state.h * row - alpha
+        odd = even + _HALF
+        even -= _PI * np.round(even / _PI)
+        odd -= _PI * np.round(odd / _PI)
+        for column in range(columns):
+            mine = state.beta[i] + state.h * column
+            same = sized(even, state.norm) + sized(mine - beta, state.norm)
+            other = sized(odd, state.norm) + sized(mine + beta, state.norm)
+            cost[row * columns + column] += 2 * min(same, other)

@@ -1,0 +1,261 @@
+"""Passes over all pairs of a lattice: the dual of the local polytope, by TRW-S.
+
+Kolmogorov, Convergent tree-reweighted message passing for energy minimization, IEEE TPAMI 28 (2006), written
+in shares: what a pair gives to the labels of its ends. In a forward pass every pixel i, in the grid's order,
+takes from each pair to an earlier pixel j all that the pair can give,
+
+    share_i(x) = min over y of c(x, y) - share_j(y),        theta_i = D_i + sum of the shares at i,
+
+and hands gamma (theta_i - min theta_i) back to its pairs to later pixels, with gamma = 1 / the greater number
+of pairs to earlier or to later pixels. A backward pass does the same with earlier and later exchanged. After
+a pass min (c - shares) is 0 at every pair, and the bound, the sum of min theta_i, has not become less.
+
+Passes alone are slow where news has far to go. So before each pair of passes the shares are carried on along
+their last change, by a part of it that grows as in Nesterov's method (Soviet Math. Dokl. 27, 1983) and begins
+anew where the bound falls (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). Whatever shares come of it
+prove a bound. Measured on the sample `ring` at 24 pixels, N = 32: a gap of 1.70 % after 60 pairs of passes
+alone, and of 1.68 % after 30 so.
+
+The code for one pixel and one pair is models/proof/products.py.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.grid import Floats, Grid, Ints
+from ..processes.crew import Crew
+from ..processes.deadline import Over, never
+from .costs import unary_costs
+from .lattice import Lattice, Starts
+from .products import compiled, pair_minimum, pixel_pass, share_of
+
+_ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
+_ROUNDING: Final = 32 * 2.0**-53
+"""Relative error of one term of a bound.
+
+It is the sum of at most eight numbers, an angle among them is right to four units in the last place, and a
+square doubles that.
+"""
+
+
+class State(NamedTuple):
+    """A lattice and the shares on it as arrays, which the compiled passes read and change."""
+
+    h: float
+    alpha: Floats  # of each pixel's first label
+    beta: Floats
+    alpha_count: Ints
+    beta_count: Ints
+    start: Starts
+    unary: Floats
+    first: Ints
+    second: Ints
+    odd: Ints
+    start_first: Starts
+    start_second: Starts
+    around: Ints  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
+    shares_first: Floats
+    shares_second: Floats
+    theta: Floats  # as the last pass found it at each pixel
+    least: Floats  # of each pixel's theta
+    norm: int  # 1 or 2
+
+
+class Momentum:
+    """Carries arrays on along their last change, by more of it the longer a bound has not fallen."""
+
+    def __init__(self, shares: tuple[Floats, ...], crew: Crew) -> None:
+        self._shares, self._crew = shares, crew
+        self._before: list[NDArray[np.float32]] = []  # the direction alone needs no more digits
+        self._times, self._bound = 0, -math.inf
+
+    def carry_on(self) -> None:
+        """Carry the arrays on; the first time nothing is known of a change yet."""
+        part = self._times / (self._times + 3)
+        self._times += 1
+        if not self._before:
+            self._before = [shares.astype(np.float32) for shares in self._shares]
+            return
+        for shares, before in zip(self._shares, self._before, strict=True):
+            parts = [(shares[at], before[at]) for at in self._crew.equal_parts(len(shares))]
+            self._crew.run(lambda each: _carry_on(*each, part), parts)
+
+    def judge(self, bound: float) -> None:
+        """Begin anew where the bound has fallen."""
+        if bound < self._bound:
+            self._times = 0
+        self._bound = bound
+
+
+class Dual:
+    """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass."""
+
+    def __init__(
+        self, lattice: Lattice, crew: Crew, first: Floats | None = None, second: Floats | None = None
+    ) -> None:
+        """Shares of nothing, or those given."""
+        self.lattice, self.crew = lattice, crew
+        self.state = _state(lattice, first, second)
+        self._fronts = fronts(lattice.instance.grid)
+        self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
+        self._momentum = Momentum((self.state.shares_first, self.state.shares_second), crew)
+
+    def forward(self, over: Over = never) -> float:
+        """The bound after a forward pass."""
+        return self._pass(0, over)
+
+    def backward(self, over: Over = never) -> float:
+        """The bound after a backward pass."""
+        return self._pass(2, over)
+
+    def ascend(self, times: int, over: Over = never) -> float:
+        """The bound after so many passes forwards and backwards, or fewer when the time is over:
+        then any number, for a pass may have been cut off. The shares prove a bound all the same.
+        """
+        bound = -math.inf
+        for _ in range(times):
+            self._momentum.carry_on()
+            self.forward(over)
+            bound = self.backward(over)
+            self._momentum.judge(bound)
+            if over():
+                break
+        return bound
+
+    def _pass(self, earlier: int, over: Over) -> float:
+        def work(pixels: Ints) -> None:
+            _pass_pixels(pixels, earlier, self.state)
+
+        way = 1 if earlier == 0 else -1
+        if self.lattice.start[-1] < _ALONE:
+            work(np.concatenate(self._fronts[::way]))
+        else:
+            for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
+                if not over():
+                    self.crew.run(work, [front[part] for part in parts])
+        return math.fsum(self.state.least)
+
+    def quantise(self) -> float:
+        """The quantum of the shares, which become whole multiples of it, and 0 where no label is allowed.
+
+        It is the least power of two that leaves less than 2^31 of them, which certificates can hold; in the
+        1-norm, where bounds become exact, 2^49.
+        """
+        both = (self.state.shares_first, self.state.shares_second)
+        most = max(*(_most(shares) for shares in both), 2.0**-16)
+        quantum = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
+        for shares in both:
+            np.round(shares / quantum, out=shares)
+            np.multiply(shares, quantum, out=shares)
+        return quantum
+
+    def bound(self) -> float:
+        """The bound that any shares prove:
+        sum of min (D + shares) over pixels + sum of min (c - shares) over pairs, less its rounding error.
+
+        Every minimum is right to 32 units in the last place of the largest number in it, and the sum of the
+        minima (math.fsum) is exact.
+        """
+        pixels = self._minima(_pixel_minima, self.lattice.instance.grid.size)
+        pairs = self._minima(_pair_minima, len(self.state.first))
+        error = _ROUNDING * (len(pixels) + len(pairs)) * self._largest()
+        return math.fsum([*pixels, *pairs, -error])
+
+    def _minima(self, work: Callable[[int, int, State, Floats], None], many: int) -> Floats:
+        found = np.zeros(many)
+        self.crew.run(
+            lambda part: work(part.start, part.stop, self.state, found), self.crew.equal_parts(many)
+        )
+        return found
+
+    def _largest(self) -> float:
+        """A number that no angle's square, cost or sum of shares that a bound adds up exceeds."""
+        state = self.state
+        most = max(_most(state.shares_first), _most(state.shares_second))
+        return 64 + _most(state.unary[np.isfinite(state.unary)]) + 4 * most
+
+
+@compiled
+def _carry_on(shares: Floats, before: NDArray[np.float32], part: float) -> None:
+    """Add a part of what has changed since before, and remember the shares as they were."""
+    for x in range(shares.size):
+        now = shares[x]
+        shares[x] = now + part * (now - before[x])
+        before[x] = now
+
+
+def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> State:
+    grid = lattice.instance.grid
+    unary = unary_costs(lattice)
+    start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
+    return State(
+        lattice.h,
+        lattice.alpha + lattice.h * (lattice.alpha_first + lattice.offset),
+        lattice.beta + lattice.h * (lattice.beta_first + lattice.offset),
+        lattice.alpha_count,
+        lattice.beta_count,
+        lattice.start,
+        unary,
+        grid.first,
+        grid.second,
+        lattice.p & 1,
+        start_first,
+        start_second,
+        _around(grid),
+        np.zeros(start_first[-1]) if first is None else first,
+        np.zeros(start_second[-1]) if second is None else second,
+        unary.copy(),
+        np.zeros(grid.size),
+        lattice.norm,
+    )
+
+
+def _around(grid: Grid) -> Ints:
+    """The pairs of each pixel with its upper, left, lower and right neighbour, -1 for none; shape (n, 4)."""
+    upper, right = (np.pad(table, 1, constant_values=-1) for table in grid.pair_number)
+    row, column = grid.rows + 1, grid.columns + 1
+    pairs = (upper[row, column], right[row, column - 1], upper[row + 1, column], right[row, column])
+    return np.stack(pairs, axis=1)
+
+
+def fronts(grid: Grid) -> list[Ints]:
+    """The pixels of each anti-diagonal. Those of one have no pairs among them; earlier pixels come sooner."""
+    diagonal = grid.rows + grid.columns
+    order = np.argsort(diagonal, kind="stable").astype(np.int32)
+    _, begin = np.unique(diagonal[order], return_index=True)
+    return np.split(order, begin[1:])
+
+
+def _most(values: Floats) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+@compiled
+def _pass_pixels(pixels: Ints, earlier: int, state: State) -> None:
+    """A pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
+    for i in pixels:
+        pixel_pass(i, earlier, state)
+
+
+@compiled
+def _pair_minima(begin: int, end: int, state: State, found: Floats) -> None:
+    """Fill in the least c - shares of some pairs."""
+    for pair in range(begin, end):
+        found[pair] = pair_minimum(pair, state)
+
+
+@compiled
+def _pixel_minima(begin: int, end: int, state: State, found: Floats) -> None:
+    """Fill in the least D + sum of the shares of some pixels."""
+    for i in range(begin, end):
+        theta = state.unary[state.start[i] : state.start[i + 1]].copy()
+        for pair in state.around[i]:
+            if pair >= 0:
+                theta += share_of(pair, i, state)
+        found[i] = theta.min()

@@ -1,0 +1,138 @@
+"""The best angles for given jumps in the 1-norm: a linear program, and the bound that its multipliers prove.
+
+With x = (alpha, beta), shape (2n,), the 1-norm energy at jumps p (docs/mathematics.md, 5) is sum k |Mx +
+c|: two rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for
+each pixel, beta with k = w_beta. For numbers -1 <= l <= 1 the sum is at least that of k l (Mx + c), which
+is linear: its least value in a box is a lower bound there, whoever has found the l, and at the multipliers
+of the linear program it is the least energy in the box.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from ..errors import CrossfieldError
+from ..field.field import CrossField
+from ..field.jumps import best_jumps, parity_sign
+from ..instance.grid import Floats, Ints
+from ..instance.instance import HALF, QUARTER, Instance
+from ..processes.deadline import Over, never
+
+_BETTER = 1e-9  # relative: rounding is no improvement
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The residuals Mx + c of all terms at given jumps, and their weights k, shapes (r, 2n), (r,), (r,)."""
+
+    matrix: sparse.csr_array
+    constant: Floats
+    weight: Floats
+
+    @classmethod
+    def at(cls, instance: Instance, p: Ints) -> Residuals:
+        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
+        n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
+        unit, m = sparse.eye_array(n, format="csr"), len(first)
+        nothing, at = sparse.csr_array((m, n)), unit[instance.stroke_index]
+        a = sparse.hstack([unit[first] - unit[second], nothing])
+        b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
+        r, skew = sparse.hstack([at, at]), sparse.hstack([sparse.csr_array((n, n)), unit])
+        return cls(
+            sparse.vstack([a, b, r, skew], format="csr"),
+            np.concatenate([HALF * p, np.zeros(m), -instance.target, np.zeros(n)]),
+            np.concatenate(
+                [
+                    np.full(2 * m, 2.0),
+                    instance.w_strokes * instance.w,
+                    np.full(n, instance.w_beta),
+                ]
+            ),
+        )
+
+    def bound(self, multipliers: Floats, lower: Floats, upper: Floats) -> float:
+        """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers.
+
+        They are cut to [-1, 1], and rounding is taken off.
+        """
+        force = self.weight * np.clip(multipliers, -1.0, 1.0)
+        slope = self.matrix.T @ force
+        terms = np.concatenate([force * self.constant, np.minimum(slope * lower, slope * upper)])
+        size = np.abs(force) @ (np.abs(self.matrix) @ np.maximum(np.abs(lower), np.abs(upper)))
+        return math.fsum(terms) - 2.0**-48 * float(size + np.abs(terms).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Angles of least 1-norm energy in a box at given jumps, x (2n,), and what proves it.
+
+    multipliers (r,): l of each residual in [-1, 1], see `Residuals`; where weights are 0, 0.
+    bound: no angles in the box have less energy.
+    """
+
+    x: Floats
+    multipliers: Floats
+    bound: float
+
+    @classmethod
+    def of(cls, instance: Instance, p: Ints, lower: Floats, upper: Floats) -> LinearFit:
+        """The fit at jumps p with lower <= x <= upper, shapes (2n,), by HiGHS.
+
+        Raises CrossfieldError when HiGHS ends without a solution, which a linear program of this kind has.
+        """
+        from scipy.optimize import linprog
+
+        terms = Residuals.at(instance, p)
+        rows = terms.matrix.shape[0]
+        both = sparse.eye_array(rows)
+        found = linprog(
+            np.concatenate([np.zeros(len(lower)), terms.weight, terms.weight]),
+            A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
+            b_eq=-terms.constant,
+            bounds=np.stack(
+                [np.append(lower, np.zeros(2 * rows)), np.append(upper, np.full(2 * rows, np.inf))], axis=1
+            ),
+            method="highs",
+        )
+        if found.x is None:
+            raise CrossfieldError(f"HiGHS found no angles for given jumps: {found.message}")
+        multipliers = np.clip(-found.eqlin.marginals / np.maximum(terms.weight, 1e-300), -1.0, 1.0)
+        multipliers[terms.weight == 0] = 0.0
+        x = np.clip(found.x[: len(lower)], lower, upper)
+        return cls(x, multipliers, terms.bound(multipliers, lower, upper))
+
+
+def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
+    """The field of least 1-norm energy with the jumps of `field` within its windows.
+
+    With it the multipliers of its strokes, shape (s,) in [-1, 1]: with which force each is kept, in parts of
+    its weight.
+    """
+    instance, m = field.instance, len(field.p)
+    quarter = np.full(instance.grid.size, QUARTER)
+    fit = LinearFit.of(
+        instance,
+        field.p,
+        np.concatenate([instance.alpha_lower, -quarter]),
+        np.concatenate([instance.alpha_upper, quarter]),
+    )
+    alpha, beta = np.split(fit.x, 2)
+    strokes = fit.multipliers[2 * m : 2 * m + len(instance.theta)]
+    return CrossField(instance, alpha, beta, field.p), strokes
+
+
+def settled_1norm(field: CrossField, over: Over = never) -> CrossField:
+    """A field whose 1-norm energy neither best jumps nor best angles lower: at most that of the one given."""
+    best, least = field, field.energy(1).total
+    while not over():
+        jumps = best_jumps(field.instance, best.alpha, best.beta, norm=1)
+        found, _ = fitted_1norm(CrossField(field.instance, best.alpha, best.beta, jumps))
+        energy = found.energy(1).total
+        if energy >= least * (1 - _BETTER):
+            break
+        best, least = found, energy
+    return best

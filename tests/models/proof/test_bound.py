@@ -1,0 +1,192 @@
+"""The bound of a lattice against all labellings of small ones, and what passes, threads, pruning do to it."""
+
+from itertools import product
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.field.field import relabelled
+from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.processes.crew import crew
+from crossfield.models.processes.deadline import never
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.pruning import finer, left, prolonged
+from crossfield.models.proof.sweep import Dual
+from crossfield.models.search.improvement import first_field
+from exhaustive import random_instance
+
+pytestmark = pytest.mark.numeric
+
+MASKS = ("11/11", "1111", "1", "111/010", "101/111", "10/11", "1/1/1", "11/01")
+
+
+def small(seed):
+    """An instance of at most five pixels, some in two parts or without any stroke near."""
+    rng = np.random.default_rng(seed)
+    rows = MASKS[seed % len(MASKS)].split("/")
+    mask = np.array([[c == "1" for c in row] for row in rows])
+    at = np.argwhere(mask)[np.sort(rng.permutation(mask.sum())[: rng.integers(1, 1 + mask.sum())])]
+    return Instance(
+        "small", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)),
+        w_beta=float(rng.choice([0, 1e-6, 1])), w_strokes=float(rng.choice([0.1, 1, 1000])),
+    )  # fmt: skip
+
+
+def discrete(lattice):
+    """Own costs (D of each pixel, c of each pair with its pixels) by formula, over all jumps and turns."""
+    instance, grid, h = lattice.instance, lattice.instance.grid, lattice.h
+    angles = [
+        [a[s:e] for a in lattice.angles] for s, e in zip(lattice.start, lattice.start[1:], strict=False)
+    ]
+    unary = [instance.w_beta * (beta**2 - h * h / 4) for _, beta in angles]
+    for pixel, theta, w in zip(instance.stroke_index, instance.theta, instance.w, strict=True):
+        alpha, beta = angles[pixel]
+        centre = lattice.alpha[pixel] + lattice.beta[pixel] - theta
+        steps = np.rint((alpha + beta - lattice.alpha[pixel] - lattice.beta[pixel]) / h)
+        lines = []
+        for turn in np.arange(-4, 5) * np.pi:
+            own = lattice.offset[pixel] == 0 and abs(centre + turn) < np.pi / 4
+            lost = np.where(steps == 0, 0, np.where(abs(steps) == 1, 1, 0.5)) if own else 0.5
+            lines.append((alpha + beta - theta + turn) ** 2 - lost * h * h)
+            lines.append((alpha + HALF - beta - theta + turn) ** 2 - h * h / 2)
+        unary[pixel] = unary[pixel] + instance.w_strokes * w * np.min(lines, axis=0)
+    pairs = []
+    for i, j in zip(grid.first, grid.second, strict=True):
+        (ai, bi), (aj, bj) = angles[i], angles[j]
+        cost = np.min(
+            [
+                2 * ((ai[:, None] - aj + HALF * p) ** 2 + ((-1) ** p * bi[:, None] - bj) ** 2)
+                for p in range(-8, 9)
+            ],
+            axis=0,
+        )
+        pairs.append((i, j, cost - h * h))
+    return unary, pairs
+
+
+def least_labelling(unary, pairs):
+    """The least sum over all labellings: pixels are eliminated one by one, which forgets none."""
+    tables = [((i,), cost) for i, cost in enumerate(unary)] + [((i, j), cost) for i, j, cost in pairs]
+    for pixel in range(len(unary)):
+        mine = [table for table in tables if pixel in table[0]]
+        scope = sorted({other for table in mine for other in table[0]} - {pixel})
+        axes = [pixel, *scope]
+        total = np.zeros(())
+        for names, values in mine:
+            order = np.argsort([axes.index(name) for name in names])
+            shape = [len(unary[axis]) if axis in names else 1 for axis in axes]
+            total = total + values.transpose(order).reshape(shape)
+        tables = [table for table in tables if pixel not in table[0]] + [(tuple(scope), total.min(axis=0))]
+    return sum(float(values) for _, values in tables)
+
+
+def test_no_bound_exceeds_the_least_labelling_and_trees_reach_it():
+    with crew(1) as hands:
+        for seed in range(200):
+            instance = small(seed)
+            field = first_field(instance)
+            lattice = Lattice.whole(field, 4)
+            exact = least_labelling(*discrete(lattice))
+            energy = field.energy().total
+            scale = 1e-9 * (1 + energy)
+            assert exact <= energy + scale, seed
+            dual, bounds = Dual(lattice, hands), []
+            for _ in range(6):
+                bounds += [dual.forward(), dual.backward()]
+            dual.quantise()
+            assert max(bounds) <= exact + scale
+            assert (np.diff(bounds) >= -scale).all()
+            assert dual.bound() <= exact
+            close = 1e-6 * (1 + energy + instance.w_strokes)  # the shares are as large as that
+            assert dual.bound() == pytest.approx(bounds[-1], abs=close)
+            tree = len(instance.grid.first) < instance.grid.size
+            if tree:
+                assert dual.bound() == pytest.approx(exact, abs=close), seed
+
+
+def test_any_shares_give_a_bound():
+    with crew(1) as hands:
+        for seed in range(40):
+            instance = small(seed)
+            lattice = Lattice.whole(first_field(instance), 4)
+            dual, rng = Dual(lattice, hands), np.random.default_rng(seed)
+            for shares in (dual.state.shares_first, dual.state.shares_second):
+                shares[:] = rng.normal(0, 3, len(shares))
+            assert dual.bound() <= least_labelling(*discrete(lattice))
+
+
+def test_threads_change_no_bit():
+    instance = cf.sample("bottle", 24)
+    lattice = Lattice.whole(first_field(instance), 16)
+    found = []
+    for count in (1, 2, 3):
+        with crew(count) as hands:
+            dual = Dual(lattice, hands)
+            found.append((dual.ascend(2), dual.bound(), dual.state.shares_first.tobytes()))
+    assert lattice.start[-1] > 30_000  # so that they were used
+    assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.slow
+def test_the_bound_of_mouse_is_that_of_the_prototype():
+    instance = cf.sample("mouse", 24)
+    field = cf.search(instance, rounds=8, jobs=2).field
+    assert field.energy().total == pytest.approx(5.014402, abs=1e-6)
+    with crew(2) as hands:
+        dual = Dual(Lattice.whole(field, 32), hands)
+        assert dual.ascend(60, never) == pytest.approx(4.81, abs=0.01)  # a gap of 4.0 %
+
+
+def holds(lattice, cross):
+    """Whether each pixel's cross, under one of its labels, lies in a cell of four allowed labels."""
+    inside = np.zeros(lattice.instance.grid.size, bool)
+    for turn, sign in product(range(-4, 5), (1, -1)):
+        if (turn % 2 == 0) != (sign == 1):
+            continue
+        alpha, beta = cross[0] + turn * HALF, sign * cross[1]
+        k = (alpha - lattice.alpha) / lattice.h - lattice.offset - lattice.alpha_first
+        m = (beta - lattice.beta) / lattice.h - lattice.offset - lattice.beta_first
+        for nudge in (-1e-9, 1e-9):
+            row, column = np.floor(k + nudge).astype(int), np.floor(m + nudge).astype(int)
+            on = (
+                (row >= 0)
+                & (row < lattice.alpha_count - 1)
+                & (column >= 0)
+                & (column < lattice.beta_count - 1)
+            )
+            row, column = np.where(on, row, 0), np.where(on, column, 0)
+            begin = lattice.start[:-1] + row * lattice.beta_count + column
+            corners = [begin, begin + 1, begin + lattice.beta_count, begin + lattice.beta_count + 1]
+            inside |= on & np.all(
+                [lattice.allowed[np.minimum(c, lattice.start[-1] - 1)] for c in corners], axis=0
+            )
+    return inside.all()
+
+
+def test_pruning_keeps_every_field_of_no_more_energy():
+    dropped = 0
+    with crew(1) as hands:
+        for seed in range(30):
+            instance = random_instance(seed, shape=(3, 3))
+            rng = np.random.default_rng(seed)
+            best = first_field(instance)
+            energy = best.energy().total * rng.uniform(1, 1.2) + 1e-3
+            dual = Dual(Lattice.whole(best, 8), hands)
+            for _ in range(3):
+                dual.ascend(4)
+                dual.quantise()
+                bound = dual.bound()
+                assert bound <= best.energy().total
+                lattice = finer(left(dual, bound, energy))
+                dropped += (~lattice.allowed).sum()
+                assert holds(lattice, (best.alpha, best.beta))
+                for _ in range(20):
+                    wide = 10 ** rng.uniform(-4, -0.5)
+                    alpha = best.alpha + rng.normal(0, wide, instance.grid.size)
+                    beta = np.clip(best.beta + rng.normal(0, wide, instance.grid.size), -HALF / 2, HALF / 2)
+
+                    field = relabelled(instance, alpha, beta, best.p)
+                    if field.energy().total <= energy:
+                        assert holds(lattice, (field.alpha, field.beta)), seed
+                dual = prolonged(dual, lattice)
+    assert dropped > 0

@@ -1,0 +1,38 @@
+"""What a proof does where passes are slow and the next level of lattices would be too large."""
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.processes.crew import crew
+from crossfield.models.proof import prove as proofs
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.sweep import Dual
+from crossfield.models.search.improvement import first_field
+
+pytestmark = pytest.mark.numeric
+
+
+def test_shares_that_are_carried_on_rise_faster():
+    """Half as many passes lead further than passes alone."""
+    lattice = Lattice.whole(first_field(cf.sample("ring", 24)), 16)
+    with crew(1) as hands:
+        carried, plain = Dual(lattice, hands), Dual(lattice, hands)
+        for _ in range(30):
+            plain.forward()
+            alone = plain.backward()
+        assert carried.ascend(15) > alone
+        assert carried.bound() <= first_field(lattice.instance).energy().total
+
+
+def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
+    """The level is raised once more, and its record replaced; the certificate holds all the same."""
+    instance = cf.sample("ring", 12)
+    monkeypatch.setattr(proofs, "_MOST_LABELS", 40_000)
+    proof = cf.prove(instance, jobs=1)
+    assert proof.ended == "labels"
+    assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32]
+    assert proof.energy <= cf.search(instance, rounds=5, jobs=1).field.energy().total + 1e-9
+    assert proof.levels[-1].bound == proof.bound
+    certificate = write_certificate(proof, tmp_path / "it.npz")
+    assert certificate.bound == pytest.approx(proof.bound, rel=1e-5)

@@ -1,0 +1,142 @@
+"""What the bound rests on, in exact rational numbers, and the same for the costs as they are computed."""
+
+import random
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.proof.costs import pair_deduction, unary_costs
+from crossfield.models.proof.forced import forced
+from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.pruning import Left
+from exhaustive import random_instance
+
+pytestmark = pytest.mark.numeric
+
+
+def fraction(rng, lower, upper, parts=9973):
+    return lower + (upper - lower) * Fraction(rng.randrange(parts + 1), parts)
+
+
+def up(x, threshold):
+    """The neighbour of x among the whole numbers: above if its fraction is more than the threshold."""
+    return x // 1 + (x % 1 > threshold)
+
+
+def mean(values, ends):
+    """The mean over thresholds in [0, 1] of a function that is constant between those ends."""
+    ends = sorted({Fraction(0), Fraction(1), *ends})
+    return sum((b - a) * values((a + b) / 2) for a, b in pairwise(ends))
+
+
+def test_a_pair_rounded_by_common_thresholds_costs_at_most_h_squared_more():
+    rng = random.Random(1)
+    for _ in range(400):
+        h, turn = fraction(rng, Fraction(1, 100), 1), fraction(rng, -3, 3)
+        x, y, shift, other = (fraction(rng, -4, 4) for _ in range(4))  # in steps; centres shifted at will
+
+        def rounded(sign, x=x, y=y, shift=shift, h=h, turn=turn):
+            def squared(t, x=x, y=y):
+                mine = up(x, t) if sign > 0 else up(x, 1 - t)
+                return (h * (sign * mine - up(y, t) + shift) + turn) ** 2
+
+            ends = [x % 1, 1 - x % 1, y % 1]
+            return mean(squared, ends), (h * (sign * x - y + shift) + turn) ** 2
+
+        for parity in (1, -1):
+            above_a, exact_a = rounded(1)
+            above_b, exact_b = rounded(parity, shift=other, turn=Fraction(0))
+            assert 2 * (above_a + above_b) - pair_deduction(h) <= 2 * (exact_a + exact_b)
+
+
+def test_a_stroke_rounded_in_both_angles_loses_no_more_than_is_taken_off():
+    rng = random.Random(2)
+    for _ in range(2000):
+        k, m, r = rng.randrange(-4, 4), rng.randrange(-4, 4), fraction(rng, -2, 2)
+        f, g = fraction(rng, 0, 1), fraction(rng, 0, 1)
+        corners = [(k + a + m + b, (f if a else 1 - f) * (g if b else 1 - g)) for a in (0, 1) for b in (0, 1)]
+        exact = (r + k + f + m + g) ** 2
+        for lost in (lambda _: Fraction(1, 2), lambda s: abs(s) if abs(s) <= 1 else Fraction(1, 2)):
+            assert sum(weight * ((r + s) ** 2 - lost(s)) for s, weight in corners) <= exact
+
+
+def misfit(instance, alpha, beta):
+    """The stroke and skew terms of crosses (n,), the nearer line of each."""
+    turns = np.arange(-4, 5)[:, None] * np.pi
+    at = instance.stroke_index
+    lines = np.concatenate([alpha[at] + beta[at] + turns, alpha[at] + HALF - beta[at] + turns])
+    cost = instance.w_beta * beta**2
+    cost[at] += instance.w_strokes * instance.w * np.min((lines - instance.target) ** 2, axis=0)
+    return cost
+
+
+def scattered(instance, rng):
+    """A field with random crosses."""
+    size = instance.grid.size
+    alpha = instance.alpha_lower + rng.uniform(0, HALF, size)
+    beta = rng.uniform(-QUARTER, QUARTER, size)
+    return CrossField(instance, alpha, beta, np.zeros(len(instance.grid.first), int)).with_best_jumps()
+
+
+def test_computed_costs_of_the_four_labels_round_a_cross_average_to_no_more_than_its_own():
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        instance = random_instance(seed)
+        lattice = Lattice.whole(scattered(instance, rng), int(rng.choice([4, 8, 16])))
+        cost, h = unary_costs(lattice), lattice.h
+        row = rng.uniform(0, lattice.alpha_count - 1)
+        column = rng.uniform(0, lattice.beta_count - 1)
+        at = [
+            lattice.h * (x + f + lattice.offset)
+            for x, f in ((row, lattice.alpha_first), (column, lattice.beta_first))
+        ]
+        k, m = row.astype(int), column.astype(int)
+        found = 0
+        for a in (0, 1):
+            for b in (0, 1):
+                weight = np.abs(1 - a - (row - k)) * np.abs(1 - b - (column - m))
+                found = found + weight * cost[lattice.start[:-1] + (k + a) * lattice.beta_count + m + b]
+        exact = misfit(instance, lattice.alpha + at[0], lattice.beta + at[1])
+        assert (found <= exact + 1e-12).all(), (seed, h)
+
+
+def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_over_the_boxes():
+    seen = np.zeros(2, int)
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        instance = random_instance(seed, shape=(2, 3))
+        size = instance.grid.size
+        smooth = CrossField(
+            instance,
+            instance.alpha_lower + QUARTER + rng.uniform(-0.9, 0.9),
+            np.full(size, rng.uniform(-QUARTER, QUARTER)),
+            np.zeros(len(instance.grid.first), int),
+        ).with_best_jumps()
+        lattice = Lattice.whole(smooth, 4)
+        wide = rng.uniform(0.01, 0.5)
+        ends = [rng.uniform(0, wide, size) for _ in range(4)]
+        left = Left(
+            lattice, lattice.allowed, smooth.alpha - ends[0], smooth.alpha + ends[1],
+            np.maximum(smooth.beta - ends[2], -QUARTER), np.minimum(smooth.beta + ends[3], QUARTER),
+        )  # fmt: skip
+        what = forced(left)
+        least = what.least(np.inf if seed % 2 else 0.0)[1]
+        for corner in range(20):
+            t, s = rng.uniform(0, 1, (2, size)) if corner else rng.integers(0, 2, (2, size))
+            alpha = left.alpha_low + t * (left.alpha_high - left.alpha_low)
+            beta = left.beta_low + s * (left.beta_high - left.beta_low)
+            field = CrossField(instance, alpha, beta, smooth.p)
+            mine = field.residual_a**2 + field.residual_b**2
+            best = mine.copy()
+            for step in range(-3, 4):
+                other = CrossField(instance, alpha, beta, smooth.p + step)
+                best = np.minimum(best, other.residual_a**2 + other.residual_b**2)
+            assert np.allclose(best[what.pairs], mine[what.pairs], atol=1e-12), seed
+            if what.everything:
+                energy = 2 * best.sum() + misfit(instance, alpha, beta).sum()
+                assert least <= energy + 1e-12, seed
+                seen += [1, (what.above + what.below).max() > 0]
+    assert (seen > 50).all(), seen

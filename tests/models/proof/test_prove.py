@@ -1,0 +1,144 @@
+"""Proofs from end to end: what is proven is so, whatever the weights, gauge and mask."""
+
+import crossfield as cf
+import numpy as np
+import pytest
+from children import interrupted
+from crossfield.models.errors import InputError
+from crossfield.models.instance.instance import Instance
+from exhaustive import exact, random_instance, sketch
+
+pytestmark = pytest.mark.numeric
+
+
+def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
+    """Where no window is in the way, all jumps are tried by dense least squares."""
+    for seed in range(12):
+        instance = random_instance(seed, shape=(2, 2))
+        proof = cf.prove(instance, jobs=1)
+        assert proof.status == "optimal", seed
+        assert proof.bound <= proof.energy <= proof.bound + 1e-9 * (1 + proof.energy)
+        assert proof.energy == proof.field.energy().total
+        low = exact(instance)
+        assert proof.energy >= low - 1e-9
+        if np.abs(proof.field.beta).max() < np.pi / 4 - 1e-6:
+            assert proof.energy == pytest.approx(low, abs=1e-6), seed
+
+
+def a_few_steps():
+    """Arguments that end a proof that cannot close its gap after a dozen reports."""
+    told = []
+    return {"progress": lambda *what: told.append(what), "stop": lambda: len(told) > 12}
+
+
+def weighted(seed, **weights):
+    """A random instance with a hole and a part without strokes."""
+    rng = np.random.default_rng(seed)
+    mask = np.ones((3, 5), bool)
+    mask[1, 1] = mask[:, 3] = False
+    at = np.argwhere(mask[:, :3])[np.sort(rng.permutation(8)[:4])]
+    return Instance("holes", mask, at, rng.uniform(0, np.pi, 4), 1 - rng.random(4), **weights)
+
+
+@pytest.mark.parametrize(
+    "weights",
+    [{"w_beta": w} for w in (0.0, 1e-6, 1.0)] + [{"w_strokes": w} for w in (0.1, 1000.0)],
+    ids=str,
+)
+@pytest.mark.slow
+def test_weights_holes_and_parts_without_strokes(weights):
+    instance = weighted(3, **weights)
+    proof = cf.prove(instance, jobs=1, gap=1e-4)
+    found = cf.search(instance, rounds=1, jobs=1).field.energy().total
+    assert proof.bound <= min(found, proof.energy)
+    assert proof.energy <= found + 1e-9
+    assert proof.energy - proof.bound <= 1e-4 * proof.energy
+
+
+def test_one_pixel_and_one_row():
+    for mask, theta in (([[True]], [[2.0]]), ([[True] * 5], [[0.3, np.nan, 1.2, np.nan, 2.9]])):
+        for gauge in ("strokes", "box"):
+            instance = sketch(np.array(mask), np.array(theta), gauge=gauge)
+            proof = cf.prove(instance, jobs=1, **a_few_steps())
+            assert proof.bound <= proof.energy
+            if gauge == "strokes":
+                assert proof.status == "optimal"
+
+
+def test_a_proof_of_the_gauge_box_is_no_higher_than_its_optimum():
+    instance = random_instance(5, shape=(2, 2), gauge="box")
+    proof = cf.prove(instance, jobs=1, **a_few_steps())
+    free = cf.prove(instance.with_gauge("strokes"), jobs=1)
+    assert free.status == "optimal"
+    assert proof.bound <= free.energy + 1e-9 <= proof.energy + 2e-9
+    assert proof.field.instance is instance
+
+
+def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():
+    instance = random_instance(8, shape=(4, 3))
+    proofs = [
+        cf.prove(each, jobs=1)
+        for each in (instance, instance.turned(), instance.mirrored(), instance.transposed())
+    ]
+    assert {proof.status for proof in proofs} == {"optimal"}
+    np.testing.assert_allclose([proof.energy for proof in proofs], proofs[0].energy, atol=1e-8)
+
+
+def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
+    proof = cf.prove(random_instance(4, shape=(4, 4)), jobs=1)
+    for level in proof.levels:
+        size = level.alpha_count.astype(int) * level.beta_count
+        assert len(level.allowed) == size.sum()
+        grid = proof.field.instance.grid
+        for shares, ends in ((level.shares_first, grid.first), (level.shares_second, grid.second)):
+            assert len(shares) == size[ends].sum()
+            assert (np.abs(shares) < 2**31 * level.quantum).all()
+            assert (shares == np.round(shares / level.quantum) * level.quantum).all()
+        assert level.bound <= proof.energy <= level.energy
+        np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
+        np.testing.assert_array_equal(level.p, proof.levels[0].p)
+    assert [round(a.h / b.h) for a, b in zip(proof.levels, proof.levels[1:], strict=False)] == [2] * (
+        len(proof.levels) - 1
+    )
+
+
+def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
+    instance = cf.sample("bottle", 12)
+    one, two = (cf.prove(instance, jobs=jobs, gap=0.01) for jobs in (1, 2))
+    assert one.bound == two.bound
+    assert one.field.alpha.tobytes() == two.field.alpha.tobytes()
+
+
+def test_limits_end_a_proof_with_what_it_has():
+    instance = cf.sample("bottle", 12)
+    told = []
+    some = cf.prove(instance, gap=0.5, progress=lambda *what: told.append(what))
+    assert some.ended == "gap"
+    assert 0 < some.gap <= 0.5
+    assert all(bound <= energy and labels > 0 for bound, energy, labels in told)
+    none = cf.prove(instance, stop=lambda: True)
+    assert none.ended == "interrupted"
+    assert none.bound <= some.energy
+    short = cf.prove(instance, seconds=1e-6)
+    assert short.ended == "time"
+    for wrong in ({"seconds": 0}, {"gap": -1}, {"jobs": 0}):
+        with pytest.raises(InputError):
+            cf.prove(instance, **wrong)
+
+
+def test_ctrl_c_ends_a_proof_with_what_it_has():
+    program = (
+        "import crossfield as cf\n"
+        "proof = cf.prove(cf.sample('mouse', 24), progress=lambda *what: print(what[2], flush=True))\n"
+        "print(proof.ended, proof.status, proof.bound <= proof.energy)"
+    )
+    assert interrupted(program) == ["interrupted", "gap", "True"]
+
+
+@pytest.mark.slow
+def test_a_stroke_that_either_line_may_carry_leaves_no_gap():
+    """At the end one box goes over an edge of its window, however fine the lattice."""
+    instance = weighted(3, w_strokes=0.1)
+    proof = cf.prove(instance, jobs=1)
+    assert proof.status == "optimal"
+    assert proof.forced == len(instance.grid.first)
