@@ -3,7 +3,9 @@ a second opinion on greedy fields and searches.
 """
 
 import numpy as np
+from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.search.box_qp import fitted
 
 
 def sketch(mask, theta, w_beta=1e-6, gauge="strokes", w=None):
@@ -29,6 +31,21 @@ def exact(instance):
     """The least energy over all jumps in the bounds, with the bounds of alpha and beta left out:
     a lower bound.
     """
+    return min(least_energy(instance, part).min() for part in every_jump(instance))
+
+
+def optimum(instance):
+    """The field of least energy for the best jumps of `exact`: the optimum where no window binds."""
+    best = min(
+        (part[np.argmin(least_energy(instance, part))] for part in every_jump(instance)),
+        key=lambda jumps: least_energy(instance, jumps[None])[0],
+    )
+    angles = np.zeros(instance.grid.size)
+    return fitted(CrossField(instance, angles, angles, best))
+
+
+def every_jump(instance):
+    """All jumps in the bounds, shape (k, m), those of one parity together."""
     ranges = [np.arange(low, high + 1) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
     jumps = (
         np.stack([axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij")], axis=1)
@@ -37,8 +54,7 @@ def exact(instance):
     )
     group = (jumps & 1) @ (1 << np.arange(len(ranges)))
     order = np.argsort(group, kind="stable")
-    parts = np.split(jumps[order], np.nonzero(np.diff(group[order]))[0] + 1)
-    return min(least_energy(instance, part).min() for part in parts)
+    return np.split(jumps[order], np.nonzero(np.diff(group[order]))[0] + 1)
 
 
 def least_energy(instance, jumps):

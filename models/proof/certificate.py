@@ -1,0 +1,226 @@
+"""Certificates: what a proof says, in a file that anyone can check without the code that has found it.
+
+An .npz of the same bytes for the same proof. It holds the arrays of a field file (models/field/file.py; the
+format is another), with the claim in its head: status, energy, bound and the number of levels. For each
+level, led by `level_0_`, `level_1_`, ...:
+
+    h           (1,)    spacing
+    alpha, beta (n,)    centres
+    ranges      (n, 4)  first step and number of labels of alpha, then of beta
+    allowed             a bit for each label
+    scale       (m,)    of each pair's message
+    wide        (m,)    whether its whole numbers are among steps_32 rather than steps_16
+    steps_16, steps_32  the messages one after the other: what a pair gives to the labels of its earlier
+    pixel,
+                        each number less the one before, which compresses well; sums are modulo 2^32
+
+Where levels are branches, there is an array `parents` besides: the number of the level from which each
+follows, -1 for the first. Without it each follows from the one before.
+
+What a pair gives to its later pixel need not be told: the best of it follows
+(models/proof/check_certificate.py, 3), and so half of a level's shares are enough. They are whole numbers
+times a scale, and whatever they are, the bound they give is valid.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+
+from ..array_archive import Arrays, Expected, pack_arrays, unpack_arrays
+from ..errors import InputError, InstanceError
+from ..field.field import CrossField
+from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
+from ..instance.file import arrays_of, check_version, head_of, unpacked
+from ..instance.instance import Instance
+from ..storage import read_bytes, write_bytes
+from . import check_certificate
+from .check_certificate import Verdict
+from .lattice import starts
+from .record import LevelRecord, Proof, Status
+
+_PREFIX: Final = "instance_"
+_FIELD: Final = {
+    "head": Expected(1, MAX_HEAD, "u"),
+    "alpha": Expected(1, MAX_GRID**2),
+    "beta": Expected(1, MAX_GRID**2),
+    "p": Expected(1, 2 * MAX_GRID**2),
+}
+_MOST_16: Final = 2**15 - 1
+_MOST_32: Final = 2**31 - 1
+_SPARE: Final = 1e-10
+"""What a claimed bound leaves of the one that was checked, relative to 1 + bound: other processors round
+otherwise.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A claim: no field has an energy below `bound`; with status `optimal`, that of the field is the least.
+
+    field, energy: the field and its 2-norm energy. verdict: what the checker has found.
+    """
+
+    field: CrossField
+    energy: float
+    bound: float
+    status: Status
+    verdict: Verdict
+
+
+def write_certificate(proof: Proof, path: str | Path) -> Certificate:
+    """The certificate of a proof, which now is in the file at `path`.
+
+    It claims what the checker confirms, which may be less than the proof says. Same proof, same bytes.
+    Raises InputError for a proof that the checker refuses or that is in the 1-norm, and OutputError when the
+    file cannot be written.
+    """
+    path = Path(path)
+    if proof.norm != 2:
+        raise InputError("certificates are of the 2-norm; a proof in the 1-norm has none", file=path)
+    arrays = _arrays(proof, "gap", 0.0)
+    verdict = _confirmed(arrays, path)
+    status, bound = _claim(verdict)
+    write_bytes(path, pack_arrays(_arrays(proof, status, bound)))
+    return Certificate(proof.field, verdict.energy, bound, status, verdict)
+
+
+def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
+    """The certificate in a file, checked.
+
+    on: the instance that it must be on, when one is given.
+    Raises InputError for an unreadable file, another instance and a claim that does not hold, InstanceError
+    for a damaged field or instance.
+    """
+    path = Path(path)
+    data = read_bytes(path, MAX_ARCHIVE)
+    try:
+        arrays = unpack_arrays(data, _FIELD)
+        head = head_of(arrays)
+        check_version(head, check_certificate.FORMAT, check_certificate.VERSION)
+        field = CrossField(unpacked(data, _PREFIX), arrays["alpha"], arrays["beta"], arrays["p"])
+    except InstanceError as error:
+        raise InstanceError(str(error), file=path) from error
+    if on is not None and field.instance.sha256 != on.sha256:
+        raise InputError(
+            f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
+            file=path,
+        )
+    verdict = check(path)
+    return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
+
+
+def check(path: Path) -> Verdict:
+    """What the checker finds of the certificate in a file.
+
+    Raises InputError, which says where, for a claim that does not hold and for what is no certificate.
+    """
+    try:
+        return check_certificate.checked(str(path))
+    except check_certificate.RefusedError as error:
+        raise InputError(f"is refused as a certificate: {error}", file=path) from error
+    except check_certificate.UnreadableError as error:
+        raise InputError(f"is no certificate: {error}", file=path) from error
+
+
+def _confirmed(arrays: Arrays, path: Path) -> Verdict:
+    """What the checker finds of arrays that are to be written. Raises InputError."""
+    try:
+        return check_certificate.check(arrays)
+    except check_certificate.RefusedError as error:
+        raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
+
+
+def _claim(verdict: Verdict) -> tuple[Status, float]:
+    """The status and the bound that a certificate with this verdict claims."""
+    bound = verdict.bound - _SPARE * (1 + verdict.bound)
+    return cast("Status", verdict.status), max(0.0, bound)
+
+
+def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
+    """The arrays of a proof's certificate."""
+    field = proof.field
+    head = {
+        "format": check_certificate.FORMAT,
+        "version": check_certificate.VERSION,
+        "status": status,
+        "energy": proof.energy,
+        "bound": bound,
+        "levels": len(proof.levels),
+    }
+    arrays: Arrays = {
+        "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
+        "alpha": field.alpha,
+        "beta": field.beta,
+        "p": field.p,
+    }
+    if proof.parents:
+        arrays["parents"] = np.array(proof.parents, dtype=np.int32)
+    arrays |= {_PREFIX + name: array for name, array in arrays_of(field.instance).items()}
+    for number, level in enumerate(proof.levels):
+        parts = _of_level(level, field)
+        arrays |= {f"level_{number}_{name}": array for name, array in parts.items()}
+    return arrays
+
+
+def _of_level(level: LevelRecord, field: CrossField) -> Arrays:
+    ranges = (level.alpha_first, level.alpha_count, level.beta_first, level.beta_count)
+    return {
+        "h": np.array([level.h]),
+        "alpha": level.alpha,
+        "beta": level.beta,
+        "ranges": np.stack(ranges, axis=1).astype(np.int32),
+        "allowed": np.packbits(level.allowed),
+        **_messages(level, field),
+    }
+
+
+def _messages(level: LevelRecord, field: CrossField) -> Arrays:
+    """What each pair gives to its earlier pixel, as whole numbers of its scale:
+    the level's own, unless too many of them fit into 32 bits.
+    """
+    flat, counts = _to_earlier(level, field)
+    if not len(counts):
+        return _stored(np.zeros(0, np.int64), counts, np.zeros(0))
+    begin = starts(counts)[:-1]
+    most = np.maximum.reduceat(np.abs(flat), begin)
+    scale = np.maximum(level.quantum, most / _MOST_32)
+    whole = np.round(flat / np.repeat(scale, counts)).astype(np.int64)
+    steps = np.diff(whole, prepend=0)
+    steps[begin] = whole[begin]
+    return _stored(steps, counts, scale)
+
+
+def _stored(steps: Any, counts: Any, scale: Any) -> Arrays:
+    """The arrays of messages that are given by the steps from label to label."""
+    begin = starts(counts)[:-1]
+    wide = np.maximum.reduceat(np.abs(steps), begin) > _MOST_16 if len(counts) else np.zeros(0, bool)
+    each = np.repeat(wide, counts)
+    return {
+        "scale": scale,
+        "wide": wide,
+        "steps_16": steps[~each].astype(np.int16),
+        "steps_32": steps[each].astype(np.int32),  # modulo 2^32, as they are added up
+    }
+
+
+def _to_earlier(level: LevelRecord, field: CrossField) -> tuple[Any, Any]:
+    """The shares of each pair's earlier pixel, flat, and how many they are."""
+    grid = field.instance.grid
+    count = level.alpha_count.astype(np.int64) * level.beta_count
+    early = np.minimum(grid.first, grid.second)
+    is_first = grid.first == early
+    own, shift = np.repeat(is_first, count[early]), np.arange(int(count[early].sum()))
+    shift -= np.repeat(starts(count[early])[:-1], count[early])
+    flat = np.zeros(len(own))
+    for shares, ends, mine in (
+        (level.shares_first, grid.first, own),
+        (level.shares_second, grid.second, ~own),
+    ):
+        begin = np.repeat(starts(count[ends])[:-1], count[early])
+        flat[mine] = shares[(begin + shift)[mine]]
+    return flat, count[early]

@@ -1,0 +1,931 @@
+"""Check a certificate of a cross field with no code of its prover: `python check_certificate.py FILE`.
+
+One file, Python 3.9 or newer and NumPy. All of it is recomputed from the instance in float64: the energy U of
+the field, and at every level of the lattice the costs, a bound, what it excludes, and that the next level
+covers the rest. Exit code 0: the claim is proven. 1: it is not; a line says where. 2: no certificate.
+
+"Optimal" says: no field has an energy below U by more than the number printed, which is at most OPTIMAL times
+the greater of 1 and U. "Gap" says: no field has an energy below the bound.
+
+1. The problem. Crosses lie on a strip: (alpha, beta) and (alpha + pi/2, -beta) are the same lines, and
+   |beta| <= pi/4. With the best jumps, and at every stroke its nearer line, crosses have the energy
+
+       F = sum over pairs  min over p of 2 (A^2 + B^2)  +  sum W min over lines and turns of R^2
+           + w_beta sum beta^2,     A = alpha_i - alpha_j + p pi/2,   B = (-1)^p beta_i - beta_j.
+
+   A field's energy, in any gauge, is at least F of its crosses: a lower bound of F is one of all fields.
+
+2. A level. Label (k, l) of pixel i stands at (alpha_i + h (k + o), beta_i + h (l + o)), where o is 0 on
+   black and 1/2 on white pixels. The domain of a pixel is the union of the cells whose four vertices are
+   allowed. Round all crosses of the domain to vertices by two thresholds, uniform and independent, one for
+   all alphas and one for all betas; a pair with an odd best jump takes 1 - t for its second beta. At a pair
+   each of A and B falls on one of two neighbouring values with the right mean: variance at most h^2/4. A line
+   of a stroke is a sum of two independent roundings: at most h^2/2. So the expectations of
+
+       c = min over p of 2 (A^2 + B^2) - h^2     W (min of R^2 - h^2/2)     w_beta (beta^2 - h^2/4)
+
+   are at most the terms of F. (On a black pixel the line u at the turn it has at the centre may lose 0 where
+   k + l = 0 and h^2 where |k + l| = 1 in place of h^2/2. With fractions f and g of the step the variance is
+   h^2 (f (1 - f) + g (1 - g)). From k + l = 0 on, (1 - f)(1 - g) 0 + (f + g - 2 f g) + f g/2 exceeds it, over
+   h^2, by f^2 + g^2 - 3 f g/2; from -1 on by (1 - f - g)^2; from 1 on by f^2 + g^2 + f g/2 - 3 (f + g)/2 + 1,
+   which is at least 1/10; from -2 and -3 on by symmetry; elsewhere h^2/2 is enough.) The distribution of a
+   pixel's vertex is the same at all its pairs. Hence a sum of functions of single vertices and of pairs that
+   is below the discrete costs everywhere is, in the mean, below F.
+
+   The minimum over p is one over all integers: with d = alpha_i - alpha_j, the best jump of a given parity
+   has |A| <= pi/2, so that it is among ceil(-2 d/pi - 1) .. floor(-2 d/pi + 1). For all labels of two pixels
+   at once these are the jumps from the least to the greatest of them; see `jumps`.
+
+3. A pass. M_e(x) is a number for each label of the earlier pixel of pair e, taken from the certificate; any
+   numbers will do. What the pair can give to its later pixel beside it is S_e(y) = min over x of c_e(x, y) -
+   M_e(x), so that c_e(x, y) >= M_e(x) + S_e(y). Go through the pixels in their order. At pixel i, theta_i is
+   D_i + the sum of M over its pairs to later pixels + the sum of what it has got from earlier ones, mu_i =
+   min theta_i, t_i = theta_i - mu_i >= 0. It hands gamma t_i on, gamma = 1 / max(1, earlier pairs, later
+   pairs): later pixels get
+
+       N_e(y) = min over x of (c_e(x, y) - M_e(x) + gamma t_i(x)),
+       c_e(x, y) >= M_e(x) - gamma t_i(x) + N_e(y).
+
+   For any i take the second inequality at the pairs whose later pixel is at most i, the first one at the
+   others. In the sum of all D and c, labels of j < i have at least mu_j + t_j - (number of later pairs) gamma
+   t_j >= mu_j, those of j > i at least mu*_j = min (D_j + sum of M + sum of S), and those of i have mu_i +
+   t_i(x). So
+
+       F >= sum over j <= i of mu_j  +  sum over j > i of mu*_j  +  E[t_i(x)]
+
+   for crosses in the domain. Where the right side, with t_i in the place of E[t_i], exceeds U at all four
+   vertices of a cell, no field of energy U or less has its cross in that cell. The cells that are left must
+   lie in the domain of the next level; the first domain must be all of the strip. With i the last pixel, the
+   bound is the sum of mu. Several levels may follow from one, as branches: each holds all the cells left, but
+   at one pixel, the same for all, where each cell is held by one of them. Then each field with its crosses in
+   the cells left is in the domain of one of them, and the least of their bounds is one for all.
+
+4. Optimality. The last cells span a box for each pixel. There p is a best jump everywhere if max |A| <= pi/2
+   and pi max |A| - pi^2/4 <= 4 min (-1)^p beta_i beta_j: against p +- 1, A'^2 - A^2 >= pi^2/4 - pi |A| and
+   B^2 - B'^2 = -4 (-1)^p beta_i beta_j; against others |A| <= pi/2 is enough. Let a = alpha - theta, |a| <= 3
+   pi/4. Where |a| <= pi/4 the nearest line is u at this turn. At a = pi/4 + e it is v, with 4 e (pi/4 + beta)
+   less in its square, at a = -pi/4 - e with 4 e (pi/4 - beta) less: the squares differ by (u - v)(u + v),
+   with v = a - pi/2 - beta and v = a + pi/2 - beta. With the greatest e of the box these are linear in beta;
+   or the box is cut at the edge, and v carries the stroke beyond. So F is at least a convex quadratic G on
+   each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over the y in a box is a sum of single
+   terms.
+
+5. Rounding. Messages may be anything, so errors in them do no harm; what counts is by how much an inequality
+   of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
+   times the size of the numbers that enter; the sum over all of them is taken off every bound. Sums over
+   pixels are made without rounding (math.fsum). Domains may fall short of what they should cover by SLIVER
+   radians, as sides are rounded; moving a cross by that much at every level changes F by less than `slack`,
+   which is allowed for too. pi stands for the double next to it, as in the definition of the field.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import math
+import sys
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+FORMAT, VERSION = "crossfield-certificate", 1
+HALF, QUARTER = math.pi / 2, math.pi / 4
+OPTIMAL = 1e-8
+PRECISION = 2.0**-52
+ROUNDING = 64.0
+SLIVER = 2e-14
+MOST_BYTES = 1 << 31  # of a file, and of all its arrays
+MOST_LEVELS = 64
+MOST_SIDE = 9999
+MOST_PIECES = 200  # of the boxes
+MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
+MOST_ANGLE = 16.0
+MOST_JUMP = 64
+MOST_WEIGHT = 1e6
+
+Array = Any
+Field = tuple[Array, Array, Array]
+
+
+class RefusedError(Exception):
+    """A claim that does not follow; the message says where."""
+
+
+class UnreadableError(Exception):
+    """A file that is no certificate."""
+
+
+@dataclass
+class Sketch:
+    """The instance: pixels in order, pairs (upper or right neighbours), strokes, windows.
+
+    weight, target (n,): W and theta, 0 where there is no stroke. lower (n,): least alpha of the gauge.
+    earlier, later: numbers of the pairs of each pixel to later, to earlier pixels.
+    """
+
+    black: Array
+    first: Array
+    second: Array
+    weight: Array
+    target: Array
+    lower: Array
+    w_beta: float
+    later: list[list[int]]
+    earlier: list[list[int]]
+
+
+@dataclass
+class Level:
+    """A lattice, which of its labels are allowed, and the messages of the pairs.
+
+    ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
+    the message of each pair is to its earlier pixel.
+    """
+
+    h: float
+    alpha: Array
+    beta: Array
+    ranges: Array
+    allowed: list[Array]
+    messages: list[Array]
+
+
+@dataclass
+class Passed:
+    """What a pass over a level gives.
+
+    A bound of F on its domain, the right side of 3. at each label of each pixel, and the greatest error of
+    both.
+    """
+
+    bound: float
+    least: list[Array]
+    error: float
+
+
+@dataclass
+class Verdict:
+    """What is proven.
+
+    status: `optimal` or `gap`. boxes (n, 4): alpha and beta from, to, where every better field has its
+    crosses, by labels round `centres` (n, 2). forced_pairs (m,): where its jumps are forced. levels: their
+    bounds.
+    """
+
+    status: str
+    energy: float
+    bound: float
+    boxes: Array
+    centres: Array
+    forced_pairs: Array
+    levels: list[float]
+
+    @property
+    def forced(self) -> int:
+        """The number of forced jumps."""
+        return int(self.forced_pairs.sum())
+
+
+# Reading ---------------------------------------------------------------------------------------------------
+
+
+def read(path: str) -> dict[str, Array]:
+    """The arrays of an .npz. Sizes are looked at before anything is unpacked; no pickles."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _members(archive)
+    except UnreadableError:
+        raise
+    except Exception as error:  # a damaged archive can raise anything
+        raise UnreadableError(f"is no .npz that can be read ({type(error).__name__})") from error
+
+
+def _members(archive: zipfile.ZipFile) -> dict[str, Array]:
+    members = archive.infolist()
+    if sum(member.file_size for member in members) > MOST_BYTES:
+        raise UnreadableError("holds more than 2 GiB")
+    return {member.filename[: -len(".npy")]: _array(archive, member) for member in members}
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
+    with archive.open(member) as stream:
+        head = stream.read(128)
+        start = io.BytesIO(head)
+        if np.lib.format.read_magic(start) != (1, 0):
+            raise UnreadableError(f"{member.filename} has another version")
+        shape, _, kind = np.lib.format.read_array_header_1_0(start)
+        if kind.hasobject or math.prod(shape) * kind.itemsize > member.file_size or kind.kind not in "biuf":
+            raise UnreadableError(f"{member.filename} is not what its header says")
+        return np.load(io.BytesIO(head + stream.read()), allow_pickle=False)
+
+
+def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
+    """The text in the array `head`."""
+    head = _text(arrays, "head")
+    if head.get("format") != FORMAT or head.get("version") != VERSION:
+        raise UnreadableError(f"is no {FORMAT} of version {VERSION}")
+    return head
+
+
+def _text(arrays: dict[str, Array], name: str) -> dict[str, Any]:
+    found = json.loads(_given(arrays, name, "u", None).tobytes())
+    if not isinstance(found, dict):
+        raise UnreadableError(f"{name} is not a JSON object")
+    return found
+
+
+def _given(arrays: dict[str, Array], name: str, kinds: str, *shape: int | None) -> Array:
+    """An array of one of those kinds and, where numbers are given, of that shape; finite."""
+    if name not in arrays:
+        raise UnreadableError(f"has no array {name}")
+    array = arrays[name]
+    fits = len(array.shape) == len(shape) and all(
+        size is None or size == found for size, found in zip(shape, array.shape)
+    )
+    doubles = array.dtype.kind != "f" or array.dtype.itemsize == 8
+    if array.dtype.kind not in kinds or not fits or not doubles:
+        raise UnreadableError(f"{name} has another kind or shape than the mask asks for")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise RefusedError(f"{name} holds something that is no number")
+    return array
+
+
+def _need(holds: Any, name: str, wrong: str) -> None:
+    """Nothing where all of it holds; else raises RefusedError with the first place where not."""
+    holds = np.asarray(holds)
+    if not holds.all():
+        place = f"[{int(np.argmin(holds))}]" if holds.ndim else ""
+        raise RefusedError(f"{name}{place} {wrong}")
+
+
+def _number(head: dict[str, Any], name: str, least: float, most: float) -> float:
+    value: Any = head.get(name)
+    _need(type(value) in (int, float) and least <= value <= most, name, f"is not in [{least:g}, {most:g}]")
+    return float(value)
+
+
+# The instance and the field --------------------------------------------------------------------------------
+
+
+def sketch_of(arrays: dict[str, Array]) -> Sketch:
+    """The instance that the certificate holds. Stroke directions are moved into the gauge's own range."""
+    head = _text(arrays, "instance_head")
+    mask = _given(arrays, "instance_mask", "b", None, None)
+    rows, columns = np.nonzero(mask)
+    n = len(rows)
+    _need(n > 0, "instance_mask", "has no pixel")
+    _need(max(mask.shape) <= MOST_SIDE, "instance_mask", "has too long a side")
+    number = np.full((mask.shape[0] + 1, mask.shape[1] + 1), -1)
+    number[1:, :-1][mask] = np.arange(n)
+    neighbours = np.stack([number[rows, columns], number[rows + 1, columns + 1]], axis=1)
+    first, side = np.nonzero(neighbours >= 0)
+    second = neighbours[first, side]
+    weight, target, lower = _strokes(arrays, head, number[1:, :-1], n)
+    later: list[list[int]] = [[] for _ in range(n)]
+    earlier: list[list[int]] = [[] for _ in range(n)]
+    for e, (i, j) in enumerate(zip(first.tolist(), second.tolist())):
+        later[min(i, j)].append(e)
+        earlier[max(i, j)].append(e)
+    w_beta = _number(head, "w_beta", 0.0, MOST_WEIGHT)
+    return Sketch((rows + columns) % 2 == 0, first, second, weight, target, lower, w_beta, later, earlier)
+
+
+def _strokes(
+    arrays: dict[str, Array], head: dict[str, Any], number: Array, n: int
+) -> tuple[Array, Array, Array]:
+    """W and theta of each pixel, 0 without a stroke, and the least alpha of each; shapes (n,)."""
+    theta = _given(arrays, "instance_theta", "f", None)
+    w = _given(arrays, "instance_w", "f", len(theta))
+    places = _given(arrays, "instance_stroke_pixels", "iu", len(theta), 2).astype(np.int64)
+    gauge = head.get("gauge")
+    _need(gauge in ("strokes", "box"), "gauge", "is unknown")
+    _need((theta >= 0) & (theta < np.pi), "instance_theta", "is not in [0, pi)")
+    _need((w > 0) & (w <= 1), "instance_w", "is not in (0, 1]")
+    _need(((places >= 0) & (places < number.shape)).all(axis=1), "instance_stroke_pixels", "is no pixel")
+    at = number[tuple(places.T)]
+    _need(at >= 0, "instance_stroke_pixels", "is outside the mask")
+    _need(np.diff(at) > 0, "instance_stroke_pixels", "is out of order")
+    weight, target, lower = np.zeros((3, n))
+    weight[at] = _number(head, "w_strokes", 0.0, MOST_WEIGHT) * w
+    if gauge == "strokes":
+        target[at] = theta
+        lower[at] = theta - QUARTER
+    else:
+        target[at] = np.where(theta >= 3 * QUARTER - 1e-9, np.maximum(theta - np.pi, -QUARTER), theta)
+    return weight, target, lower
+
+
+def field_of(arrays: dict[str, Array], sketch: Sketch) -> Field:
+    """The angles alpha, beta (n,) and jumps p (m,) of the field, which must lie in the windows."""
+    n, m = len(sketch.black), len(sketch.first)
+    alpha, beta = (_given(arrays, name, "f", n).astype(np.float64) for name in ("alpha", "beta"))
+    p = _given(arrays, "p", "iu", m).astype(np.int64)
+    inside = (alpha >= sketch.lower - SLIVER) & (alpha <= sketch.lower + HALF + SLIVER)
+    _need(inside, "alpha", "is outside the window of the gauge")
+    _need(np.abs(beta) <= QUARTER + SLIVER, "beta", "is beyond pi/4")
+    _need(np.abs(p) <= MOST_JUMP, "p", "is no jump")
+    return alpha, beta, p
+
+
+def sign(p: Array) -> Array:
+    """The sign (-1)^p of each jump."""
+    return 1.0 - 2.0 * (p & 1)
+
+
+def energy_of(sketch: Sketch, alpha: Array, beta: Array, p: Array) -> tuple[float, float]:
+    """The energy of a field by its definition, and the greatest error of the number."""
+    i, j = sketch.first, sketch.second
+    a = alpha[i] - alpha[j] + HALF * p
+    b = sign(p) * beta[i] - beta[j]
+    r = np.where(sketch.weight > 0, alpha + beta - sketch.target, 0.0)
+    total = math.fsum([*2 * a * a, *2 * b * b, *sketch.weight * r * r, *sketch.w_beta * beta * beta])
+    size = np.abs(alpha[i]) + np.abs(alpha[j]) + HALF * np.abs(p) + 1
+    error = np.sum(8 * size * (np.abs(a) + np.abs(b))) + np.sum(sketch.weight * 16 * np.abs(r))
+    return total, PRECISION * (float(error) + 8 * total)
+
+
+def slack_of(sketch: Sketch, levels: int) -> float:
+    """By how much F may change, at most, when every angle moves by SLIVER at each level.
+
+    At most four pairs with slopes of 4 |A| and 4 |B|, both at most pi / 2 at the best jumps, 2 W pi/2 and
+    2 w_beta pi/4.
+    """
+    slopes = 64.0 + 8.0 * sketch.weight + 4.0 * sketch.w_beta
+    return 2 * (levels + 1) * SLIVER * float(np.sum(slopes))
+
+
+# A level ---------------------------------------------------------------------------------------------------
+
+
+def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
+    """Level `number` of the certificate."""
+    n = len(sketch.black)
+    at = f"level_{number}_"
+    h = float(_given(arrays, f"{at}h", "f", 1)[0])
+    _need(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
+    alpha, beta = (_given(arrays, at + name, "f", n).astype(np.float64) for name in ("alpha", "beta"))
+    _need(np.abs(alpha) <= MOST_ANGLE, f"{at}alpha", "is too large")
+    _need(np.abs(beta) <= MOST_ANGLE, f"{at}beta", "is too large")
+    ranges = _given(arrays, f"{at}ranges", "iu", n, 4).astype(np.int64)
+    shapes = ranges[:, 1::2]
+    _need(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
+    reach = h * (np.abs(ranges[:, ::2]) + shapes)
+    _need((reach <= MOST_ANGLE).all(axis=1), f"{at}ranges", "leads too far away")
+    counts = shapes.prod(axis=1)
+    packed = _given(arrays, f"{at}allowed", "u", (int(counts.sum()) + 7) // 8)
+    allowed = _cut(np.unpackbits(packed, count=int(counts.sum())).astype(bool), shapes)
+    _need([corners(each, np.logical_and).any() for each in allowed], f"{at}allowed of pixel", "has no cell")
+    return Level(h, alpha, beta, ranges, allowed, _messages(arrays, at, sketch, shapes))
+
+
+def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) -> list[Array]:
+    """The message of each pair to its earlier pixel: whole numbers, given by their steps, times its scale."""
+    receivers = shapes[np.minimum(sketch.first, sketch.second)]
+    counts = receivers.prod(axis=1)
+    scale = _given(arrays, f"{at}scale", "f", len(counts))
+    wide = _given(arrays, f"{at}wide", "b", len(counts))
+    steps = np.zeros(int(counts.sum()), np.int64)
+    each = np.repeat(wide, counts)
+    for chosen, name in ((~each, f"{at}steps_16"), (each, f"{at}steps_32")):
+        steps[chosen] = _given(arrays, name, "i", int(chosen.sum()))
+    _need((scale >= 0) & (scale <= 1), f"{at}scale", "is not in [0, 1]")
+    total = np.cumsum(steps)
+    before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
+    whole = (total - before).astype(np.int32)  # sums are modulo 2^32
+    return _cut(whole * np.repeat(scale, counts), receivers)
+
+
+def _cut(flat: Array, shapes: Array) -> list[Array]:
+    """The blocks of those shapes that stand one after the other."""
+    ends = np.cumsum(shapes.prod(axis=1))
+    return (
+        [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), shapes)] if len(ends) else []
+    )
+
+
+def positions(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
+    """Alpha (a,) and beta (b,) of the labels of pixel i."""
+    o = 0.0 if sketch.black[i] else 0.5
+    k, a, first, b = level.ranges[i].tolist()
+    return (
+        level.alpha[i] + level.h * (np.arange(k, k + a) + o),
+        level.beta[i] + level.h * (np.arange(first, first + b) + o),
+    )
+
+
+def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
+    """The cost D of each label of pixel i, inf where it is not allowed, and the size of what enters."""
+    alpha, beta = positions(level, sketch, i)
+    h, weight = level.h, float(sketch.weight[i])
+    cost = sketch.w_beta * (beta * beta - h * h / 4)[None, :] + np.zeros((len(alpha), 1))
+    size = 2.0 + float(np.abs(alpha).max() + np.abs(beta).max())
+    if weight > 0:
+        cost = cost + weight * _misfit(level, sketch, i, alpha, beta)
+    return np.where(level.allowed[i], cost, np.inf), (weight + sketch.w_beta) * size * size
+
+
+def _misfit(level: Level, sketch: Sketch, i: int, alpha: Array, beta: Array) -> Array:
+    """The least over lines and turns of R^2 and its deduction, at each label of pixel i."""
+    theta, half = float(sketch.target[i]), level.h * level.h / 2
+    own = round((float(level.alpha[i] + level.beta[i]) - theta) / math.pi)
+    u = alpha[:, None] + beta[None, :] - theta
+    v = alpha[:, None] + HALF - beta[None, :] - theta
+    turns = np.round(u / math.pi)
+    nearest = np.abs(u - math.pi * turns)
+    other = np.where(turns == own, math.pi - nearest, nearest)
+    best = np.minimum(other, np.abs(v - math.pi * np.round(v / math.pi))) ** 2 - half
+    steps = np.abs(
+        level.ranges[i, 0] + np.arange(len(alpha))[:, None] + level.ranges[i, 2] + np.arange(len(beta))
+    )
+    lost = np.where((steps <= 1) & sketch.black[i], 2 * half * steps, half)
+    return np.minimum(best, (u - math.pi * own) ** 2 - lost)
+
+
+def jumps(alpha_i: Array, alpha_j: Array) -> range:
+    """Every jump that is the best of its parity at some labels of two pixels, with a margin for rounding."""
+    low = -2 * float(alpha_i.max() - alpha_j.min()) / math.pi - 1
+    high = -2 * float(alpha_i.min() - alpha_j.max()) / math.pi + 1
+    return range(math.ceil(low - 1e-6), math.floor(high + 1e-6) + 1)
+
+
+class Pair:
+    """The costs c of a pair, for each parity of the jump the sum of a matrix in alpha and one in beta.
+
+    c is the lesser of the two; rows are labels of the earlier pixel.
+    """
+
+    def __init__(self, level: Level, sketch: Sketch, e: int) -> None:
+        i, j = int(sketch.first[e]), int(sketch.second[e])
+        (alpha_i, beta_i), (alpha_j, beta_j) = positions(level, sketch, i), positions(level, sketch, j)
+        span = jumps(alpha_i, alpha_j)
+        apart = alpha_i[:, None] - alpha_j[None, :]
+        self.parts = []
+        for parity in (0, 1):
+            a = [2 * (apart + HALF * p) ** 2 for p in span if p % 2 == parity]
+            b = 2 * ((1 - 2 * parity) * beta_i[:, None] - beta_j[None, :]) ** 2
+            if a:
+                along = np.min(a, axis=0) - level.h * level.h
+                self.parts.append((along, b) if i < j else (along.T, b.T))
+        reach = [float(np.abs(each).max()) for each in (alpha_i, alpha_j, beta_i, beta_j)]
+        self.size = (sum(reach) + HALF * max(abs(p) for p in span)) ** 2
+        self._drop_idle()
+
+    def _drop_idle(self) -> None:
+        """Leave out a parity that is nowhere less than the other."""
+        for worse, better in ((0, 1), (1, 0)):
+            if len(self.parts) == 2:
+                least = sum(float(part.min()) for part in self.parts[worse])
+                if least >= sum(float(part.max()) for part in self.parts[better]):
+                    self.parts.pop(worse)
+
+    def to_later(self, given: Array) -> Array:
+        """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later."""
+        out: Array = np.minimum.reduce([_min_plus(along.T, _min_plus(given, b)) for along, b in self.parts])
+        return out
+
+
+def _min_plus(left: Array, right: Array) -> Array:
+    """The (min,+) product of two matrices."""
+    out = left[:, :1] + right[:1]
+    work = np.empty_like(out)
+    for k in range(1, right.shape[0]):
+        np.add(left[:, k : k + 1], right[k], out=work)
+        np.minimum(out, work, out=out)
+    return out
+
+
+# The pass --------------------------------------------------------------------------------------------------
+
+
+class Pass:
+    """The pass of 3. over a level."""
+
+    def __init__(self, level: Level, sketch: Sketch) -> None:
+        self.level, self.sketch = level, sketch
+        self.costs = [unary(level, sketch, i) for i in range(len(sketch.black))]
+        self.before: list[Array] = [None] * len(level.messages)  # S
+        self.after: list[Array] = [None] * len(level.messages)  # N
+        self.errors: list[float] = []
+
+    def run(self) -> Passed:
+        """The pass."""
+        numbers, least, waiting = [], [], []
+        for i in range(len(self.costs)):
+            waiting.append(self._theta(i, self.before)[1])
+            over, lowest = self._theta(i, self.after)
+            numbers.append(over)
+            least.append(lowest)
+            for e in self.sketch.later[i]:
+                self._send(e, over, len(self.sketch.earlier[i]), len(self.sketch.later[i]))
+        error = 2 * math.fsum(self.errors)
+        rights = [over + math.fsum([*least[: i + 1], *waiting[i + 1 :]]) for i, over in enumerate(numbers)]
+        return Passed(math.fsum(least) - error, rights, error)
+
+    def _theta(self, i: int, given: list[Array]) -> tuple[Array, float]:
+        """What theta_i exceeds its minimum by at each label, and the minimum."""
+        cost, size = self.costs[i]
+        shares = [self.level.messages[e] for e in self.sketch.later[i]]
+        shares += [given[e] for e in self.sketch.earlier[i]]
+        total: Array = np.sum([cost, *shares], axis=0)
+        self._err(size + sum(float(np.abs(share).max()) for share in shares))
+        least = float(total.min())
+        return total - least, least
+
+    def _send(self, e: int, over: Array, earlier: int, later: int) -> None:
+        """Let pair e give to its later pixel what it can, without and with what its earlier one hands on."""
+        pair, held = Pair(self.level, self.sketch, e), self.level.messages[e]
+        given = over / max(1, earlier, later) - held
+        allowed = np.isfinite(given)
+        self.before[e] = pair.to_later(np.where(allowed, -held, np.inf))
+        self.after[e] = pair.to_later(given)
+        greatest = float(np.abs(given[allowed]).max() + np.abs(held).max() + np.abs(self.after[e]).max())
+        self._err(pair.size + greatest)
+
+    def _err(self, size: float) -> None:
+        self.errors.append(ROUNDING * PRECISION * size)
+
+
+def surviving(level: Level, passed: Passed, most: float) -> list[Array]:
+    """The cells (a - 1, b - 1) of each pixel in which a field of energy up to `most` may have its cross."""
+    kept = []
+    for allowed, least in zip(level.allowed, passed.least):
+        cells = corners(allowed, np.logical_and) & corners(least <= most + passed.error, np.logical_or)
+        kept.append(cells)
+    return kept
+
+
+def corners(labels: Array, both: Any) -> Array:
+    """For each cell what `both` makes of its four vertices."""
+    return both(both(labels[:-1, :-1], labels[1:, :-1]), both(labels[:-1, 1:], labels[1:, 1:]))
+
+
+# Coverage --------------------------------------------------------------------------------------------------
+
+
+def need_whole_strip(level: Level, sketch: Sketch) -> None:
+    """Nothing where the domain of each pixel holds every cross; else raises RefusedError."""
+    for i, allowed in enumerate(level.allowed):
+        alpha, beta = positions(level, sketch, i)
+        _need(allowed.all(), f"level_0_allowed of pixel {i}", "leaves out labels")
+        _need(alpha[-1] - alpha[0] >= HALF - SLIVER, f"level_0_ranges[{i}]", "is less than pi/2 of alpha")
+        full = beta[0] <= -QUARTER + SLIVER and beta[-1] >= QUARTER - SLIVER
+        _need(full, f"level_0_ranges[{i}]", "is less than all of beta")
+
+
+def covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch) -> list[Array]:
+    """For each pixel, which cells left of a level lie in the domain of another, as far as |beta| <= pi/4."""
+    found = []
+    for i, kept in enumerate(cells):
+        at, other = positions(coarse, sketch, i), positions(fine, sketch, i)
+        a, b = np.nonzero(kept)
+        low, high = np.maximum(at[1][b], -QUARTER), np.minimum(at[1][b + 1], QUARTER)
+        there = high > low + 2 * SLIVER  # cells that stick out of the strip need no cover
+        a, low, high = a[there], low[there], high[there]
+        rows = _spanned(at[0][a], at[0][a + 1], other[0][0], fine.h)
+        columns = _spanned(low, high, other[1][0], fine.h)
+        found.append(_held(corners(fine.allowed[i], np.logical_and), rows, columns))
+    return found
+
+
+def need_all_covered(parts: list[list[Array]], number: int) -> None:
+    """Nothing where one of the levels that follow holds each field whose crosses are in the cells left.
+
+    That is so where all of them hold all cells of all pixels, but for one pixel: there it is enough that each
+    cell is in one of them. number: of the last of them. Raises RefusedError elsewhere.
+    """
+    cut = [i for i, each in enumerate(zip(*parts)) if not all(part.all() for part in each)]
+    for place, i in enumerate(cut):
+        held = [part[i] for part in parts]
+        together = np.any(held, axis=0) if place == 0 else np.all(held, axis=0)
+        _need(together, f"level {number}, pixel {i}, cell", "of the level before is not covered")
+
+
+def _spanned(low: Array, high: Array, origin: float, h: float) -> tuple[Array, Array]:
+    """The first cell that intervals meet by more than SLIVER, and the one after the last."""
+    first = np.floor((low + SLIVER - origin) / h).astype(np.int64)
+    return first, np.ceil((high - SLIVER - origin) / h).astype(np.int64)
+
+
+def _held(domain: Array, rows: tuple[Array, Array], columns: tuple[Array, Array]) -> Array:
+    """True for the rectangles of cells that the domain holds all of."""
+    total = np.zeros((domain.shape[0] + 1, domain.shape[1] + 1), np.int64)
+    total[1:, 1:] = domain.cumsum(axis=0).cumsum(axis=1)
+    (a, c), (b, d) = rows, columns
+    inside = (a >= 0) & (b >= 0) & (c <= domain.shape[0]) & (d <= domain.shape[1])
+    a, b, c, d = (np.where(inside, each, 0) for each in (a, b, c, d))
+    count = total[c, d] - total[a, d] - total[c, b] + total[a, b]
+    held: Array = inside & (count == (c - a) * (d - b))
+    return held
+
+
+def boxes_of(level: Level, cells: list[Array], sketch: Sketch, margin: float) -> Array:
+    """The least box round the cells of each pixel within |beta| <= pi/4, wider by a margin; shape (n, 4).
+
+    Columns: alpha from, to, beta from, to.
+    """
+    boxes = np.zeros((len(cells), 4))
+    for i, kept in enumerate(cells):
+        sides = []
+        for places, index in zip(positions(level, sketch, i), np.nonzero(kept)):
+            sides += [float(places[index.min()]), float(places[index.max() + 1])]
+        boxes[i] = sides
+    boxes += np.array([-margin, margin, -margin, margin])
+    boxes[:, 2:] = np.clip(boxes[:, 2:], -QUARTER, QUARTER)
+    return boxes
+
+
+# Optimality ------------------------------------------------------------------------------------------------
+
+
+def forced(sketch: Sketch, p: Array, boxes: Array) -> Array:
+    """True for the pairs at which p is a best jump everywhere in the boxes; shape (m,)."""
+    i, j = boxes[sketch.first], boxes[sketch.second]
+    a = np.maximum(np.abs(i[:, 0] - j[:, 1] + HALF * p), np.abs(i[:, 1] - j[:, 0] + HALF * p)) + 1e-12
+    least = np.min([sign(p) * i[:, x] * j[:, y] for x in (2, 3) for y in (2, 3)], axis=0)
+    found: Array = (a <= HALF) & (math.pi * a - math.pi**2 / 4 <= 4 * least - 1e-12)
+    return found
+
+
+def beyond_windows(turned: Array, boxes: Array) -> Array:
+    """How far the boxes lead beyond the windows of the strokes, above and below; shape (2, n)."""
+    found: Array = np.stack([boxes[:, 1] - turned, turned - boxes[:, 0]]) - QUARTER
+    return found
+
+
+@dataclass
+class Piece:
+    """A part of the boxes (n, 4), and the lines that carry the strokes there.
+
+    lines (n,): 0 where u carries the stroke; 1 above the window and -1 below it, where v does. bound: of the
+    piece that it was cut from.
+    """
+
+    boxes: Array
+    lines: Array
+    bound: float
+
+
+class Quadratic:
+    """The convex quadratic G of 4. on a piece, at fixed jumps."""
+
+    def __init__(self, sketch: Sketch, p: Array, turned: Array, piece: Piece) -> None:
+        self.sketch, self.p, self.piece = sketch, p, piece
+        self.goal = turned + HALF * piece.lines
+        self.sign = np.where(piece.lines == 0, 1.0, -1.0)
+        beyond = np.maximum(beyond_windows(turned, piece.boxes), 0.0) * (piece.lines == 0)
+        self.above, self.below = 4 * sketch.weight * beyond
+        self.low, self.high = piece.boxes[:, ::2].T.ravel(), piece.boxes[:, 1::2].T.ravel()
+
+    def given(self, beta: Array) -> Array:
+        """What is taken off for the edges that the piece leads over, at each pixel."""
+        found: Array = self.above * (QUARTER + beta) + self.below * (QUARTER - beta)
+        return found
+
+    def at(self, x: Array) -> tuple[float, Array]:
+        """Value and gradient at the angles x (2n,)."""
+        alpha, beta = np.split(x, 2)
+        sketch, i, j, n = self.sketch, self.sketch.first, self.sketch.second, len(alpha)
+        a, s = alpha[i] - alpha[j] + HALF * self.p, sign(self.p)
+        b, r = s * beta[i] - beta[j], alpha + self.sign * beta - self.goal
+        parts = (2 * a * a, 2 * b * b, sketch.weight * r * r, sketch.w_beta * beta * beta, -self.given(beta))
+        slope = 4 * (np.bincount(i, a, n) - np.bincount(j, a, n)) + 2 * sketch.weight * r
+        skew = 4 * (np.bincount(i, s * b, n) - np.bincount(j, b, n)) + 2 * self.sign * sketch.weight * r
+        skew += 2 * sketch.w_beta * beta + self.below - self.above
+        return math.fsum(value for part in parts for value in part), np.concatenate([slope, skew])
+
+    def bound(self, x: Array) -> float:
+        """A lower bound on the piece: the value at x, and the least that its gradient promises."""
+        value, slope = self.at(x)
+        sketch, angles = self.sketch, MOST_ANGLE + MOST_JUMP
+        error = PRECISION * ROUNDING * (1 + np.tile(sketch.weight, 2) + sketch.w_beta) * angles
+        falls = np.maximum(slope * (x - self.low), slope * (x - self.high))
+        falls += error * (np.abs(x - self.low) + np.abs(x - self.high))
+        pairs, strokes = 16.0 * len(self.p), 16.0 * float(np.sum(sketch.weight)) + sketch.w_beta * len(x)
+        return value - math.fsum(falls) - PRECISION * angles * (pairs + strokes)
+
+    def least(self, x: Array) -> Array:
+        """A point near the least of the piece, by Newton steps on the angles that no bound holds.
+
+        Whatever it is, the bound is valid.
+        """
+        x = np.clip(x, self.low, self.high)
+        for _ in range(50):
+            value, slope = self.at(x)
+            free = ~(((x <= self.low) & (slope > 0)) | ((x >= self.high) & (slope < 0)))
+            step = self._newton(np.where(free, slope, 0.0), free)
+            ends = [np.clip(x + 0.5**k * step, self.low, self.high) for k in range(30)]
+            better = next((end for end in ends if self.at(end)[0] < value), None)
+            if better is None:
+                break
+            x = better
+        return x
+
+    def _newton(self, slope: Array, free: Array) -> Array:
+        """The step on the free angles after which there is no slope, by conjugate gradients."""
+        still = self.at(np.zeros(len(slope)))[1]
+        step, rest = np.zeros(len(slope)), -slope
+        way, size = rest, float(rest @ rest)
+        enough = 1e-22 * size
+        for _ in range(len(slope)):
+            if size <= enough:
+                break
+            change = np.where(free, self.at(way)[1] - still, 0.0) + 1e-9 * way
+            length = size / float(way @ change)
+            step, rest = step + length * way, rest - length * change
+            size, before = float(rest @ rest), size
+            way = rest + size / before * way
+        return step
+
+    def cut(self, x: Array, turned: Array, bound: float) -> list[Piece]:
+        """The piece cut at the edges of the window of the pixel at which most is taken off, if any."""
+        over = self.above + self.below > 0
+        if not over.any():
+            return []
+        at = int(np.argmax(np.where(over, 1e-12 + self.given(x[len(x) // 2 :]), 0.0)))
+        ends = (-math.inf, turned[at] - QUARTER, turned[at] + QUARTER, math.inf)
+        pieces = []
+        for line in (-1, 0, 1):
+            boxes, lines = self.piece.boxes.copy(), self.piece.lines.copy()
+            boxes[at, 0], boxes[at, 1] = max(boxes[at, 0], ends[line + 1]), min(boxes[at, 1], ends[line + 2])
+            lines[at] = line
+            if boxes[at, 0] <= boxes[at, 1]:
+                pieces.append(Piece(boxes, lines, bound))
+        return pieces
+
+
+def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Array]:
+    """The field by the labels nearest to the centres, and the direction of each stroke.
+
+    A stroke has the turn that line u has there.
+    """
+    alpha, beta, p = field
+    steps = np.round((centres[:, 0] - alpha) / HALF).astype(np.int64)
+    alpha, beta = alpha + HALF * steps, sign(steps) * beta
+    turned = sketch.target + math.pi * np.round((alpha - sketch.target) / math.pi)
+    return (alpha, beta, p - steps[sketch.first] + steps[sketch.second]), turned
+
+
+def lower_bound(
+    sketch: Sketch, field: Field, level: Level, boxes: Array, enough: float
+) -> tuple[float, Array]:
+    """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
+
+    Boxes that lead over edges of windows are cut until the bound is `enough`, or there are MOST_PIECES.
+    """
+    centres = np.stack([level.alpha, level.beta], axis=1)
+    (alpha, beta, p), turned = relabelled(sketch, field, centres)
+    held = forced(sketch, p, boxes)
+    far = (beyond_windows(turned, boxes) > HALF - 1e-9) & (sketch.weight > 0)
+    if not held.all() or far.any():
+        return -math.inf, held
+    waiting = [Piece(boxes, np.zeros(len(boxes)), -math.inf)]
+    found = []
+    for _ in range(MOST_PIECES):
+        piece = waiting.pop()
+        quadratic, x = Quadratic(sketch, p, turned, piece), np.concatenate([alpha, beta])
+        bound = quadratic.bound(x)
+        if bound < enough:
+            x = quadratic.least(x)
+            bound = max(bound, quadratic.bound(x))
+        parts = quadratic.cut(x, turned, bound) if bound < enough else []
+        waiting += parts
+        if not parts:
+            found.append(bound)
+        if not waiting:
+            break
+    return min([*found, *(piece.bound for piece in waiting)]), held
+
+
+# The whole -------------------------------------------------------------------------------------------------
+
+
+def check(arrays: dict[str, Array]) -> Verdict:
+    """What the arrays of a certificate prove.
+
+    Raises RefusedError where a level does not follow from the one before, or where less is proven than
+    claimed; UnreadableError for what is no certificate.
+    """
+    try:
+        return _check(arrays)
+    except (ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, RecursionError) as error:
+        raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
+
+
+def _check(arrays: dict[str, Array]) -> Verdict:
+    head = head_of(arrays)
+    sketch = sketch_of(arrays)
+    field = field_of(arrays, sketch)
+    energy, error = energy_of(sketch, *field)
+    count = int(_number(head, "levels", 1, MOST_LEVELS))
+    slack = slack_of(sketch, count)
+    tree, boxes, level = _descend(arrays, sketch, count, energy + error + slack)
+    bounds = tree.bounds
+    bound = max(0.0, min(energy - error, tree.bound() - slack))
+    enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
+    convex, held = lower_bound(sketch, field, level, boxes, enough)
+    bound = max(bound, min(convex, energy - error))
+    status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
+    centres = np.stack([level.alpha, level.beta], axis=1)
+    verdict = Verdict(status, energy, bound, boxes, centres, held, bounds)
+    _compare(head, verdict, error)
+    return verdict
+
+
+class Tree:
+    """Which level follows from which, and the bound of each."""
+
+    def __init__(self, arrays: dict[str, Array], count: int) -> None:
+        """Each level follows from the one before where no array `parents` says otherwise."""
+        chain = np.arange(-1, count - 1)
+        self.parents = _given(arrays, "parents", "i", count) if "parents" in arrays else chain
+        _need((self.parents >= -1) & (self.parents <= chain), "parents", "is not of a level before")
+        _need((self.parents >= 0) == (chain >= 0), "parents", "is missing")
+        self.bounds: list[float] = []
+
+    def followers(self, number: int) -> list[int]:
+        """The levels that follow from a level."""
+        return [int(each) for each in np.flatnonzero(self.parents == number)]
+
+    def bound(self, number: int = 0) -> float:
+        """The bound of F on the domain of a level: its own, or the least of those that follow from it."""
+        least = [self.bound(each) for each in self.followers(number)]
+        return max(self.bounds[number], min(least, default=-math.inf))
+
+
+def _descend(arrays: dict[str, Array], sketch: Sketch, count: int, most: float) -> tuple[Tree, Array, Level]:
+    """The bounds of all levels, the boxes round what is left after the last ones, and the first level."""
+    tree = Tree(arrays, count)
+    first = level_of(arrays, 0, sketch)
+    need_whole_strip(first, sketch)
+    margin = 2 * (count + 1) * SLIVER
+    known: dict[int, tuple[Level, list[Array]]] = {}
+    boxes: list[Array] = []
+    for number in range(count):
+        level = level_of(arrays, number, sketch)
+        centred = (level.alpha == first.alpha) & (level.beta == first.beta)
+        _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
+        passed = Pass(level, sketch).run()
+        tree.bounds.append(passed.bound)
+        cells = surviving(level, passed, most)
+        if tree.followers(number):
+            known[number] = level, cells
+        elif all(kept.any() for kept in cells):
+            boxes.append(boxes_of(level, cells, sketch, margin))
+    for number, (level, cells) in known.items():
+        followers = tree.followers(number)
+        parts = [covered(level, cells, level_of(arrays, each, sketch), sketch) for each in followers]
+        need_all_covered(parts, followers[-1])
+    _need(len(boxes) > 0, "the last level", "has a pixel without a cell, not even that of the field")
+    ends = np.stack(boxes)
+    around = np.stack([f(axis=0)[:, k] for k, f in enumerate((ends.min, ends.max) * 2)], axis=1)
+    return tree, around, first
+
+
+def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:
+    """Nothing where the claim is proven; else raises RefusedError."""
+    energy = _number(head, "energy", 0.0, math.inf)
+    bound = _number(head, "bound", -math.inf, math.inf)
+    close = abs(energy - verdict.energy) <= error + 1e-12 * max(1.0, verdict.energy)
+    _need(close, "energy", f"is claimed as {energy!r}, but the field has {verdict.energy!r}")
+    _need(head.get("status") in ("optimal", "gap"), "status", "is neither 'optimal' nor 'gap'")
+    proven = f"only {verdict.bound!r} is proven, for an energy of {verdict.energy!r}"
+    _need(bound <= verdict.bound, "bound", f"is claimed as {bound!r}, but {proven}")
+    if head["status"] == "optimal":
+        _need(verdict.status == "optimal", "status", f"is claimed as optimal, but {proven}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The exit code, with the verdict printed."""
+    parser = argparse.ArgumentParser(description="Check a certificate of a cross field.")
+    parser.add_argument("file", help="a certificate (.npz)")
+    path = parser.parse_args(arguments).file
+    try:
+        verdict = checked(path)
+    except RefusedError as error:
+        print(f"refused: {error}")
+        return 1
+    except UnreadableError as error:
+        print(f"unreadable: {path} {error}")
+        return 2
+    for number, bound in enumerate(verdict.levels):
+        print(f"level {number}: bound {bound:.9f}")
+    print(f"energy {verdict.energy!r}")
+    print(f"bound  {verdict.bound!r}")
+    if verdict.status == "optimal":
+        print(f"optimal: no field has less by more than {verdict.energy - verdict.bound:.3g}")
+    else:
+        print(f"gap: {verdict.energy - verdict.bound:.6g}; {verdict.forced} jumps are forced")
+    return 0
+
+
+def checked(path: str) -> Verdict:
+    """The verdict on the certificate in a file."""
+    return check(read(path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,381 @@
+"""Certificates: what is written is checked by a program that shares no code with a prover, and nothing false
+passes it.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+import zipfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from crossfield.models.array_archive import pack_arrays
+from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.file import of_arrays
+from crossfield.models.proof import check_certificate
+from crossfield.models.proof.certificate import read_certificate, write_certificate
+from exhaustive import exact, optimum, random_instance, sketch
+from plain_prover import proof_of
+
+PROGRAM = Path(check_certificate.__file__)
+WRONG = (check_certificate.RefusedError, check_certificate.UnreadableError)
+
+
+@cache
+def proven(seed):
+    return proof_of(optimum(random_instance(seed, (2, 2), 4)), levels=4)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The file and the arrays of a certificate, by seed."""
+    folder = tmp_path_factory.mktemp("certificates")
+
+    @cache
+    def one(seed):
+        path = folder / f"{seed}.npz"
+        write_certificate(proven(seed), path)
+        return path, check_certificate.read(str(path))
+
+    return one
+
+
+def with_head(arrays, **changes):
+    head = json.loads(arrays["head"].tobytes()) | changes
+    return arrays | {"head": np.frombuffer(json.dumps(head).encode(), np.uint8)}
+
+
+def refusal(arrays):
+    with pytest.raises(WRONG) as caught:
+        check_certificate.check(arrays)
+    return str(caught.value)
+
+
+def test_what_was_written_is_read_back_and_holds(written):
+    path, _ = written(1)
+    found, proof = read_certificate(path), proven(1)
+    assert found.field.instance.sha256 == proof.field.instance.sha256
+    for name in ("alpha", "beta", "p"):
+        np.testing.assert_array_equal(getattr(found.field, name), getattr(proof.field, name))
+    assert found.status == found.verdict.status == "optimal"
+    assert found.bound <= found.verdict.bound <= found.energy
+    assert found.energy == pytest.approx(proof.energy, abs=1e-12)
+
+
+def test_the_same_proof_gives_the_same_bytes(tmp_path):
+    for name in ("one.npz", "other.npz"):
+        write_certificate(proven(1), tmp_path / name)
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+
+
+def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path):
+    """The optima are those of all jumps, each by least squares."""
+    optimal = 0
+    for seed in range(24):
+        instance = random_instance(seed, ((1, 1), (1, 4), (2, 2), (2, 3))[seed % 4], 4)
+        field, least = optimum(instance), exact(instance)
+        proof = proof_of(field, levels=4)
+        found = write_certificate(proof, tmp_path / "it.npz")
+        levels = [record.bound for record in proof.levels]
+        np.testing.assert_array_less(np.array(levels) - 1e-8 * (1 + np.abs(levels)), found.verdict.levels)
+        assert max(found.verdict.levels) <= found.verdict.energy
+        assert found.bound <= found.energy
+        if field.energy().total <= least + 1e-9:  # no window binds, so that this is the optimum
+            assert found.bound <= least + 1e-12
+            optimal += found.status == "optimal"
+    assert optimal >= 9
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"w_beta": 0.0},
+        {"w_beta": 1.0},
+        {"w_strokes": 0.1},
+        {"w_strokes": 1000.0},
+        {"gauge": "box"},
+        {"mask": np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)},
+        {"mask": np.array([[1, 0, 1], [1, 0, 1], [1, 0, 0]], bool)},
+    ],
+)
+def test_weights_gauges_holes_and_parts(change, tmp_path):
+    mask = np.array(change.get("mask", np.ones((2, 2), bool)))
+    theta = np.full(mask.shape, np.nan)
+    theta[0, 0], theta[1, 0], theta[0, -1] = 0.3, 1.1, 2.5
+    instance = sketch(mask, theta, 1e-3)
+    instance = replace(instance, **{key: value for key, value in change.items() if key != "mask"})
+    field = optimum(instance)
+    found = write_certificate(proof_of(field, levels=3, passes=8), tmp_path / "it.npz")
+    assert found.verdict.bound <= field.energy().total
+    for other in (instance.turned(), instance.mirrored()):
+        turned = write_certificate(proof_of(optimum(other), levels=3, passes=8), tmp_path / "other.npz")
+        if instance.gauge == "strokes":
+            assert found.bound <= turned.energy + 1e-9
+            assert turned.bound <= found.energy + 1e-9
+
+
+def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
+    rng = np.random.default_rng(5)
+    for seed in (1, 3, 4, 7):
+        good = optimum(random_instance(seed, (2, 2), 4))
+        for size in (1e-3, 1e-1):
+            beta = np.clip(good.beta + rng.normal(0, size, 4), -np.pi / 4, np.pi / 4)
+            worse = CrossField(good.instance, good.alpha, beta, good.p)
+            assert worse.energy().total > good.energy().total + 1e-7
+            found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+            assert found.status == "gap"
+            assert found.verdict.bound <= good.energy().total
+            arrays = check_certificate.read(str(tmp_path / "it.npz"))
+            assert "status is claimed as optimal" in refusal(with_head(arrays, status="optimal"))
+
+
+def changed(arrays, name, rng):
+    """The arrays with one entry of one of them changed, little or much."""
+    array = arrays[name].copy()
+    at = tuple(rng.integers(size) for size in array.shape)
+    if array.dtype.kind == "f":
+        array[at] += rng.choice([1e-9, 1e-3, 0.1, 1.0, 100.0]) * rng.choice([-1, 1])
+    elif array.dtype.kind == "b":
+        array[at] = ~array[at]
+    else:
+        limit = np.iinfo(array.dtype)
+        array[at] = rng.choice([array[at] ^ 1, array[at] ^ 16, limit.max, limit.min, 0])
+    return arrays | {name: array}
+
+
+def least_known(arrays, cache):
+    """The energy of a good field of the instance in a certificate."""
+    parts = {key[len("instance_") :]: arrays[key] for key in arrays if key.startswith("instance_")}
+    instance = of_arrays(parts)
+    if instance.sha256 not in cache:
+        cache[instance.sha256] = optimum(instance).energy().total
+    return cache[instance.sha256]
+
+
+def test_no_change_of_an_entry_makes_a_false_claim_pass(written):
+    """Every array of several certificates, many times: what passes is true of the instance in it."""
+    rng = np.random.default_rng(11)
+    known, passed, refused = {}, 0, 0
+    for seed in (1, 3, 4):
+        _, arrays = written(seed)
+        names = [name for name in arrays if arrays[name].size]
+        for name in names * 4:
+            other = changed(arrays, name, rng)
+            try:
+                verdict = check_certificate.check(other)
+                least = least_known(other, known)
+            except (*WRONG, InstanceError):
+                refused += 1
+                continue
+            passed += 1
+            assert verdict.bound <= least + 1e-11, name
+            assert verdict.status == "gap" or verdict.energy <= least + 2e-8, name
+            assert json.loads(other["head"].tobytes())["bound"] <= verdict.bound
+    assert passed > 20
+    assert refused > 50
+
+
+def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path):
+    rng = np.random.default_rng(3)
+    path, _ = written(3)
+    data, verdict = path.read_bytes(), check_certificate.checked(str(path))
+    other, told = tmp_path / "other.npz", 0
+    for at in rng.integers(0, len(data), 100):
+        other.write_bytes(data[:at] + bytes([data[at] ^ (1 << rng.integers(8))]) + data[at + 1 :])
+        try:
+            found = check_certificate.checked(str(other))
+        except WRONG:
+            told += 1
+            continue
+        assert (found.status, found.energy, found.bound) == (verdict.status, verdict.energy, verdict.bound)
+    assert told > 70
+
+
+def test_what_is_refused_says_where(written):
+    _, arrays = written(1)
+    last = max(name for name in arrays if name.endswith("_allowed"))
+    level = last.removesuffix("_allowed")
+    second = arrays["level_1_ranges"].copy()
+    second[2, 0] += 1
+    cases = {
+        "level 1, pixel 0": arrays | {"level_0_scale": arrays["level_0_scale"] * 0.5},
+        "is claimed as optimal": with_head(arrays, levels=1, bound=0.0),
+        "energy is claimed": with_head(arrays, energy=0.01),
+        "bound is claimed": with_head(arrays, bound=1.0),
+        "status is neither": with_head(arrays, status="best"),
+        "levels is not in": with_head(arrays, levels=0),
+        "level 1, pixel 2": arrays | {"level_1_ranges": second},
+        f"{level}_allowed of pixel[0]": arrays | {last: np.zeros_like(arrays[last])},
+        "level_0_allowed of pixel 0": arrays | {"level_0_allowed": flipped(arrays["level_0_allowed"], 0)},
+        "alpha[1] is outside": arrays | {"alpha": arrays["alpha"] + [0, 2, 0, 0]},
+        "beta[3] is beyond": arrays | {"beta": arrays["beta"] + [0, 0, 0, 1]},
+        "level_0_h holds something": arrays | {"level_0_h": np.array([np.nan])},
+        "has no array level_1_alpha": {name: arrays[name] for name in arrays if name != "level_1_alpha"},
+        "instance_w[0] is not in": arrays | {"instance_w": arrays["instance_w"] * 3},
+    }
+    for place, bad in cases.items():
+        said = refusal(bad)
+        assert place in said
+        assert "\n" not in said
+
+
+def flipped(array, at):
+    array = array.copy()
+    array[at] ^= 128
+    return array
+
+
+def test_levels_that_do_not_follow_are_not_written(tmp_path):
+    """A prover that drops what may hold a better field is found out, and the file that stood there stays."""
+    proof = proven(1)
+    path = tmp_path / "it.npz"
+    path.write_bytes(b"kept")
+    label = 2  # any that has to be there
+    allowed = proof.levels[1].allowed.copy()
+    allowed[label] = False
+    levels = (proof.levels[0], replace(proof.levels[1], allowed=allowed), *proof.levels[2:])
+    with pytest.raises(InputError, match=r"it\.npz: would hold a proof that is not valid: level 1, pixel 0"):
+        write_certificate(replace(proof, levels=levels), path)
+    assert path.read_bytes() == b"kept"
+
+
+def test_unreadable_and_unsafe_files(tmp_path, written):
+    path = tmp_path / "it.npz"
+    _, arrays = written(1)
+    pickled = tmp_path / "pickled.npz"
+    np.savez(pickled, head=np.array([{}], dtype=object))
+    with zipfile.ZipFile(tmp_path / "long.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("head.npy", b"\x93NUMPY\x01\x00" + bytes(1 << 20))
+    path.write_bytes(pack_arrays(arrays)[:-30])
+    for bad in (path, pickled, tmp_path / "long.npz", tmp_path / "absent.npz"):
+        assert check_certificate.main([str(bad)]) == 2
+    with pytest.raises(InstanceError, match=r"it\.npz: is a damaged"):
+        read_certificate(path)
+
+
+def test_the_checker_is_one_file_on_numpy_and_the_standard_library(written, tmp_path):
+    imported = set()
+    for node in ast.walk(ast.parse(PROGRAM.read_text())):
+        if isinstance(node, ast.Import):
+            imported |= {name.name.split(".")[0] for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            imported.add(str(node.module).split(".")[0])
+    assert imported - {"numpy"} <= sys.stdlib_module_names
+    alone = tmp_path / "alone.py"
+    alone.write_bytes(PROGRAM.read_bytes())
+    path, arrays = written(1)
+    # -S: no package that a .pth file leads to can be imported, so that numpy is all there is.
+    start = (
+        "import runpy, sys; sys.path.append(sys.argv.pop(1)); sys.argv.pop(0); "
+        "import importlib.util as u; assert u.find_spec('crossfield') is None; "
+        "runpy.run_path(sys.argv[0], run_name='__main__')"
+    )
+    wrong = tmp_path / "wrong.npz"
+    wrong.write_bytes(pack_arrays(with_head(arrays, bound=1.0)))
+    for file, code, line in (
+        (path, 0, "optimal: "),
+        (wrong, 1, "refused: bound"),
+        (alone, 2, "unreadable: "),
+    ):
+        site = Path(np.__file__).parents[1]
+        command = [sys.executable, "-I", "-S", "-c", start, str(site), str(alone), str(file)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (code, "")
+        assert line in done.stdout
+
+
+def free_energy(instance, alpha, beta):
+    """F: the best jump at every pair, the nearer line at every stroke."""
+    i, j = instance.grid.first, instance.grid.second
+    pairs = np.min(
+        [
+            2 * (alpha[i] - alpha[j] + np.pi / 2 * p) ** 2 + 2 * ((-1) ** p * beta[i] - beta[j]) ** 2
+            for p in range(-6, 7)
+        ],
+        axis=0,
+    )
+    at = instance.stroke_index
+    lines = np.stack([alpha + beta, alpha + np.pi / 2 - beta])[:, at] - instance.target
+    away = np.min(np.abs(lines - np.pi * np.round(lines / np.pi)), axis=0)
+    return pairs.sum() + instance.w_strokes * (instance.w @ away**2) + instance.w_beta * (beta @ beta)
+
+
+def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(written):
+    """The theorem itself, at random crosses: the mean of the numbers at the four vertices of a pixel's cell,
+    by the weights of rounding, is at most the energy.
+    """
+    rng = np.random.default_rng(2)
+    closest = np.inf
+    for seed, size, steep in (
+        (1, 0.0, 0.0),
+        (1, 0.01, 0.0),
+        (3, 0.1, 0.05),
+        (4, 0.5, 0.0),
+        (7, 0.02, -0.05),
+        (7, 0.0, 0.5),
+    ):
+        _, arrays = written(seed)
+        instance, sketch_ = proven(seed).field.instance, check_certificate.sketch_of(arrays)
+        level = check_certificate.level_of(arrays, 0, sketch_)
+        level.messages = [
+            message
+            + rng.normal(0, size, message.shape)
+            + steep * np.arange(message.size).reshape(message.shape)
+            for message in level.messages
+        ]
+        passed = check_certificate.Pass(level, sketch_).run()
+        places = [check_certificate.positions(level, sketch_, i) for i in range(instance.grid.size)]
+        for near in (1.0, 0.3, 0.05, 0.01) * 40:
+            at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in places]
+            x = [
+                np.clip(level.alpha[i] + a, alpha[0], alpha[-1]) for i, ((a, _), (alpha, _)) in enumerate(
+                    zip(at, places, strict=True))
+            ]  # fmt: skip
+            y = [np.clip(level.beta[i] + b, -np.pi / 4, np.pi / 4) for i, (_, b) in enumerate(at)]
+            energy = free_energy(instance, np.array(x), np.array(y))
+            assert passed.bound <= energy
+            for i, (alpha, beta) in enumerate(places):
+                mean = hat(x[i], alpha) @ passed.least[i] @ hat(y[i], beta)
+                closest = min(closest, energy - mean)
+                assert mean <= energy + 1e-12
+    assert closest < 0.02
+
+
+def hat(value, places):
+    """The weights with which a number is rounded to its two neighbours, so that the mean is right."""
+    return np.maximum(0, 1 - np.abs(value - places) / (places[1] - places[0]))
+
+
+def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(written):
+    """At random crosses of boxes over edges no energy is below the bound, and one is close to it."""
+    rng, cut = np.random.default_rng(4), 0
+    for seed in (1, 3, 4, 7):
+        _, arrays = written(seed)
+        sketch_, instance = check_certificate.sketch_of(arrays), proven(seed).field.instance
+        level = check_certificate.level_of(arrays, 0, sketch_)
+        for _ in range(6):
+            alpha = np.full(4, sketch_.target[0] + rng.choice([-1, 1]) * np.pi / 4) + rng.normal(0, 0.02, 4)
+            beta = rng.choice([-1, 1]) * rng.uniform(0.3, 0.75, 4)
+            sides = rng.uniform(0.01, 0.1, (2, 4))
+            high = np.minimum(beta + sides[1], np.pi / 4)
+            boxes = np.stack([alpha - sides[0], alpha + sides[0], beta - sides[1], high], axis=1)
+            level.alpha, level.beta, p = alpha, beta, np.zeros(len(sketch_.first), int)
+            given = (alpha, beta, p)
+            bound, held = check_certificate.lower_bound(sketch_, given, level, boxes, np.inf)
+            if not held.all() or bound == -np.inf:
+                continue
+            low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
+            points = low + rng.random((400, 4, 2)) ** rng.choice([0.1, 1, 10], (400, 1, 1)) * size
+            energies = [free_energy(instance, point[:, 0], point[:, 1]) for point in points]
+            assert bound <= min(energies) + 1e-9
+            assert bound > min(energies) - 0.5
+            cut += 1
+    assert cut > 10
