@@ -29,7 +29,8 @@ from ...models.errors import (
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
 from ...models.formulations.declaration import Options
-from ...models.formulations.problem import Problem, formulate, lifted
+from ...models.formulations.problem import Problem, formulate, lifted, tightened
+from ...models.formulations.windows import Windows
 from ...models.input_limits import MAX_BYTES
 from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
 from ...models.instance.grid import Ints
@@ -78,8 +79,9 @@ class Manifest:
         """The problem that the files hold. Raises InputError, InstanceError, FormulationError."""
         instance = self.instance()
         try:
-            problem = formulate(
-                instance, self.formulation, p=self._jumps(instance), **self.document["options"]
+            problem = _narrowed(
+                formulate(instance, self.formulation, p=self._jumps(instance), **self.document["options"]),
+                self._windows,
             )
         except FormulationError as error:
             raise FormulationError(str(error), file=self.path) from error
@@ -98,6 +100,10 @@ class Manifest:
         return {
             file["format"]: lifted(problem) if file["lifted"] else problem for file in self.document["files"]
         }
+
+    @property
+    def _windows(self) -> Windows | None:
+        return Windows.of_document(self.document["windows"]) if "windows" in self.document else None
 
     def _jumps(self, instance: Instance) -> Ints | None:
         if self.document["jumps"] is None:
@@ -143,7 +149,7 @@ def write_problem(
     if not is_recordable(problem):
         what = f"{problem.name} with columns fixed or products lifted"
         raise InputError(f"a manifest cannot record {what}; write it as a single file")
-    sets = _Sets(problem.instance, Path(folder), tuple(formats), start, {}, dialects or {}, compress)
+    sets = _Sets(problem.instance, Path(folder), tuple(formats), start, dialects or {}, compress)
     with sets.threads(jobs):
         return sets.begin(problem)()
 
@@ -155,6 +161,8 @@ def write_all(
     formats: Iterable[str] = DEFAULTS,
     *,
     start: CrossField | None = None,
+    jumps_of: CrossField | None = None,
+    windows: Windows | None = None,
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
@@ -163,14 +171,25 @@ def write_all(
 ) -> list[Manifest]:
     """The manifests of the files now in the folder: every formulation in every format that carries it.
 
-    start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`; without
-    one, `fixed_jumps` says which. options: facet, stroke_norm, beta_norm, relax, each used where a
-    formulation has it. dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms.
-    compress: model files as .gz. jobs: files written at once. progress: called with each name. Raises
-    InputError for an unknown format, FormulationError for an unknown formulation, InstanceError for a start
-    on another instance, and OutputError.
+    start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`. jumps_of:
+    one for these jumps alone; without either, `fixed_jumps` says which. windows: narrower ones, for all of
+    them. options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. dialects: by
+    format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as .gz. jobs:
+    files written at once. progress: called with each name. Raises InputError for an unknown format,
+    FormulationError for an unknown formulation, InstanceError for a start on another instance, and
+    OutputError.
     """
-    sets = _Sets(instance, Path(folder), tuple(formats), start, options or {}, dialects or {}, compress)
+    sets = _Sets(
+        instance,
+        Path(folder),
+        tuple(formats),
+        start,
+        dialects or {},
+        compress,
+        jumps_of or start,
+        windows,
+        options or {},
+    )
     manifests = []
     with sets.threads(jobs):
         waiting = {name: sets.begin(sets.problem(name)) for name in formulations}
@@ -188,9 +207,11 @@ class _Sets:
     folder: Path
     formats: tuple[str, ...]
     start: CrossField | None
-    options: dict[str, Any]
     dialects: dict[str, str]
     compress: bool
+    jumps_of: CrossField | None = None
+    windows: Windows | None = None
+    options: dict[str, Any] = field(default_factory=dict)
     pool: ThreadPoolExecutor = field(init=False)
 
     def __post_init__(self) -> None:
@@ -219,7 +240,8 @@ class _Sets:
         recipe = FORMULATIONS.get(name)
         unfit = set() if recipe is None else {*Options.__dataclass_fields__} - recipe.settable
         chosen = {key: value for key, value in self.options.items() if key not in unfit}
-        return formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.start), **chosen)
+        problem = formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.jumps_of), **chosen)
+        return _narrowed(problem, self.windows)
 
     def begin(self, problem: Problem) -> Callable[[], Manifest]:
         """A function that waits for the files of a problem, which the threads now write: their manifest."""
@@ -246,9 +268,9 @@ class _Sets:
 
 
 def is_recordable(problem: Problem) -> bool:
-    """Whether formulation, options and jumps say all of a problem: no column is fixed, no product lifted."""
+    """Whether formulation, options, jumps and windows say all of a problem; nothing is fixed or lifted."""
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
-    return plain.sha256 == problem.sha256
+    return _narrowed(plain, problem.windows).sha256 == problem.sha256
 
 
 def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
@@ -275,6 +297,10 @@ def _kept(document: dict[str, Any], folder: Path) -> Manifest:
     path = _path(document, folder)
     write_bytes(path, (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
+
+
+def _narrowed(problem: Problem, windows: Windows | None) -> Problem:
+    return problem if windows is None else tightened(problem, windows)
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
@@ -343,11 +369,17 @@ def _document(
             for row in problem.rows
         ],
         "jumps": _nonzero(problem),
+        **({} if problem.windows is None else _windows(problem, problem.windows)),
         "sha256": problem.sha256,
         "files": files,
         "refused": refused,
         "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
     }
+
+
+def _windows(problem: Problem, windows: Windows) -> dict[str, Any]:
+    """What was narrowed: the sentence of the files' headers, and the windows."""
+    return {"tightened": problem.tightened, "windows": windows.document()}
 
 
 def _columns(problem: Problem) -> list[dict[str, Any]]:

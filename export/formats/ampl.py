@@ -27,14 +27,14 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from ...models.formulations.problem import Block, PlacedFamily, Problem
-from ...models.formulations.symbols import VARIABLES, IndexSet, pixel_of
+from ...models.formulations.symbols import IndexSet, Variable, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.names import name_length
 from ..writing.records import Decimals, Pieces, Words, number, render, table, words
-from .indexed import Indexed, check_indexed, described
+from .indexed import Indexed, check_indexed, described, narrowed
 
 SECOND: Final = "r - north[h], c + east[h]"
 """The pixel j of the pair (r,c,h)."""
@@ -62,9 +62,11 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
         "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
         "gauge": problem.instance.gauge,
         "second": SECOND,
+        "windows": problem.windows is not None,
         "jumps": problem.jumps is not None and len(problem.jumps) > 0,
         "variables": [
-            _variable(block) | {"label": _label(problem.instance, block), "index": _INDEX[block.over]}
+            _variable(problem.variable(block.name), block)
+            | {"label": _label(problem.instance, block), "index": _INDEX[block.over]}
             for block in problem.blocks.values()
             if block.count
         ],
@@ -91,7 +93,17 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
         yield b"param p :=\n"
         yield from _listed(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
         yield b";\n"
+    yield from _windows(problem)
     yield b"end;\n"
+
+
+def _windows(problem: Problem) -> Iterator[bytes]:
+    """The windows, and the ranges of jumps that are variables, where they are narrower than the gauge's."""
+    for over, names in narrowed(problem).items():
+        yield f"param: {' '.join(names)} :=\n".encode()
+        values = (words(problem.data[name].astype(np.float64)) for name in names)
+        yield from _listed(problem.instance, over, [part for each in values for part in (b" ", each)][1:])
+        yield b";\n"
 
 
 def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
@@ -112,8 +124,8 @@ def _listed(
     yield from render([Decimals(rows), b" ", Decimals(columns), *side, b" ", *values, b"\n"], len(rows))
 
 
-def _variable(block: Block) -> dict[str, str]:
-    variable, language = VARIABLES[block.name], _Ampl(block.over)
+def _variable(variable: Variable, block: Block) -> dict[str, str]:
+    language = _Ampl(block.over)
     attributes = ["integer"] * block.integer
     attributes += [
         f"{sign} {language.bound(end)}"

@@ -23,7 +23,7 @@ import numpy as np
 import sympy as sp
 
 from ...models.formulations.problem import Block, PlacedFamily, Problem
-from ...models.formulations.symbols import VARIABLES, IndexSet
+from ...models.formulations.symbols import IndexSet, Variable
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...templates import stream
@@ -31,7 +31,7 @@ from ..writing.canonical import Canonical
 from ..writing.names import element_names
 from ..writing.records import Bytes, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
-from .indexed import Indexed, check_indexed, described
+from .indexed import Indexed, check_indexed, described, narrowed
 
 SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {"pixels": "r,c", "strokes": "r,c", "pairs": "r,c,side"}
@@ -53,6 +53,11 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         "jumps": _jumps(problem),
         "start": () if start is None else _start(problem, start),
         "results": _results(problem),
+        **{
+            name: _data(keys(instance, over), problem.data[name].astype(np.float64))
+            for over, names in narrowed(problem).items()
+            for name in names
+        },
     }
     objective = None if start is None else number(problem.objective_value(start))
     context = _data_context(problem) | _model_context(problem)
@@ -74,6 +79,7 @@ def _data_context(problem: Problem) -> dict[str, Any]:
         "w_strokes": number(instance.w_strokes),
         "w_beta": number(instance.w_beta),
         "pairs": pairs,
+        "windows": [(name, DOMAINS[over]) for over, names in narrowed(problem).items() for name in names],
         "jumps": pairs and problem.jumps is not None,
         "jump_bounds": pairs and problem.jumps is None,
         "second": SECOND,
@@ -83,7 +89,9 @@ def _data_context(problem: Problem) -> dict[str, Any]:
 def _model_context(problem: Problem) -> dict[str, Any]:
     """Variables, terms and rows as the template prints them."""
     return {
-        "variables": [_variable(block) for block in problem.blocks.values() if block.count],
+        "variables": [
+            _variable(problem.variable(block.name), block) for block in problem.blocks.values() if block.count
+        ],
         "terms": [_described(family) for family in problem.objective],
         "rows": [_described(family) | {"condition": _condition(family)} for family in problem.rows],
         "model_type": MODEL_TYPES[problem.problem_class],
@@ -142,8 +150,7 @@ def _results(problem: Problem) -> Iterator[bytes]:
             yield f"loop({SETS[block.over]}({domain}), put {name} ',' {value} /);\n".encode()
 
 
-def _variable(block: Block) -> dict[str, str]:
-    variable = VARIABLES[block.name]
+def _variable(variable: Variable, block: Block) -> dict[str, str]:
     return {
         "keyword": "Integer Variable" if block.integer else "Variable",
         "name": block.name,

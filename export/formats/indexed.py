@@ -84,6 +84,15 @@ def _text(pieces: list[Piece]) -> str:
     return b"".join(piece for piece in pieces if isinstance(piece, bytes)).decode().removeprefix(" + ")
 
 
+def narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
+    """Names of the data that are bounds where a proof has narrowed them, by index set; else nothing."""
+    if problem.windows is None:
+        return {}
+    names: dict[IndexSet, tuple[str, ...]] = {"pixels": ("alpha_lo", "alpha_up", "beta_lo", "beta_up")}
+    has_jumps = problem.jumps is None and len(problem.instance.grid.first) > 0
+    return names | ({"pairs": ("p_min", "p_max")} if has_jumps else {})
+
+
 def check_indexed(problem: Problem, layout: str, instead: str) -> None:
     """Nothing, or UnsupportedByFormatError: for columns fixed, and for a weight that solvers would drop."""
     instance = problem.instance

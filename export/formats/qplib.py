@@ -29,7 +29,6 @@ programming instances, Mathematical Programming Computation 11 (2019).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import zip_longest
 from typing import Any, Final
 
 import numpy as np
@@ -72,10 +71,11 @@ def _line(value: str, comment: str) -> bytes:
 def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
     problem = form.problem
     values = [problem.instance.name, probtype(problem) or "", "minimize", str(problem.columns)]
-    for value, comment in zip_longest(values, header[:3], fillvalue="number of variables"):
-        yield _line(value, comment)
-    if problem.rows:
-        yield _line(str(problem.row_count), header[3] if len(header) > 3 else "number of rows")
+    values += [str(problem.row_count)] * bool(problem.rows)
+    comments = [*header[:3], "number of variables", "number of rows"][: len(values)]
+    if len(header) > 3:
+        comments[-1] = "; ".join(header[3:])
+    yield from map(_line, values, comments)
 
 
 def _vector(values: Floats, comment: str) -> Iterator[bytes]:

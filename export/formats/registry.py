@@ -198,7 +198,8 @@ def header(problem: Problem) -> list[str]:
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
         f"facet {options.facet}, {norms}, integrality {kept}",
     ]
-    return lines + ([f"lifted: {formulation.lifted}"] if formulation.lifted else [])
+    changes = {"tightened": problem.tightened, "lifted": formulation.lifted}
+    return lines + [f"{how}: {text}" for how, text in changes.items() if text]
 
 
 def write(

@@ -27,7 +27,6 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
-from ...models.instance.instance import QUARTER
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
@@ -234,11 +233,11 @@ def _points(problem: Problem) -> Points:
 
 def random_field(problem: Problem, seed: int) -> CrossField:
     """A random field on the problem's instance within all bounds; jumps that are data are kept."""
-    rng, instance = np.random.default_rng(seed), problem.instance
-    alpha = rng.uniform(instance.alpha_lower, instance.alpha_upper)
-    beta = rng.uniform(-QUARTER, QUARTER, instance.grid.size)
-    jumps = rng.integers(instance.p_min, instance.p_max + 1).astype(np.int32)
-    return CrossField(instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
+    rng, data = np.random.default_rng(seed), problem.data
+    alpha = rng.uniform(data["alpha_lo"], data["alpha_up"])
+    beta = rng.uniform(data["beta_lo"], data["beta_up"])
+    jumps = rng.integers(data["p_min"], data["p_max"] + 1).astype(np.int32)
+    return CrossField(problem.instance, alpha, beta, jumps if problem.jumps is None else problem.jumps)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,13 @@ import sympy as sp
 from ..errors import FormulationError
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import Instance, whole_numbers
-from .catalogue import declare
+from ..instance.instance import QUARTER, Instance, whole_numbers
+from .catalogue import AT_JUMPS, TWO_NORM, declare
 from .declaration import FORMULATIONS, Family, Formulation
 from .lifting import lift_products
 from .monomials import beyond_noise, merged, monomials, ordered
-from .symbols import SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
+from .symbols import NARROWED, SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
+from .windows import Windows
 
 Coefficient = float | Floats
 
@@ -188,7 +189,8 @@ class Problem:
 
     jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns
     are fixed (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are
-    not fixed; the angles and jumps of all others then are.
+    not fixed; the angles and jumps of all others then are. windows: narrower ones than those of the gauge, or
+    None.
     """
 
     instance: Instance
@@ -196,6 +198,7 @@ class Problem:
     jumps: Ints | None = None
     pinned: CrossField | None = None
     free: Bools | None = None
+    windows: Windows | None = None
 
     def __post_init__(self) -> None:
         """Check that jumps are there exactly where they are data, and what is fixed fits the instance."""
@@ -218,6 +221,8 @@ class Problem:
             raise FormulationError(
                 f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
             )
+        if self.windows is not None:
+            self.windows.check(self.instance)
 
     @property
     def name(self) -> str:
@@ -232,12 +237,30 @@ class Problem:
             "w": self.instance.w,
             "alpha_lo": self.instance.alpha_lower,
             "alpha_up": self.instance.alpha_upper,
+            "beta_lo": np.full(self.instance.grid.size, -QUARTER),
+            "beta_up": np.full(self.instance.grid.size, QUARTER),
             "p_min": self.instance.p_min,
             "p_max": self.instance.p_max,
         }
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
-        return data
+        return data if self.windows is None else data | self.windows.data
+
+    def variable(self, name: str) -> Variable:
+        """The declaration of a block of columns, with bounds in `data`."""
+        return (VARIABLES if self.windows is None else NARROWED)[name]
+
+    @property
+    def tightened(self) -> str:
+        """How its windows were narrowed, one line; empty when they were not."""
+        if self.windows is None:
+            return ""
+        same = self.formulation.declaration.minimises in {TWO_NORM, AT_JUMPS}
+        return (
+            "alpha, beta and jumps narrowed to what a proof leaves of all fields with a 2-norm energy up to "
+            f"{self.windows.energy:.12g} ({self.windows.proof}); "
+            + ("the optimum stays" if same else "in another norm the optimum may rise")
+        )
 
     @cached_property
     def blocks(self) -> dict[str, Block]:
@@ -245,7 +268,7 @@ class Problem:
         blocks: dict[str, Block] = {}
         offset = 0
         for name in self.formulation.variables:
-            variable = VARIABLES[name]
+            variable = self.variable(name)
             shape = (elements(self.instance, variable.over),)
             lower, upper = (
                 np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
@@ -434,6 +457,8 @@ class Problem:
         digest = hashlib.sha256(text.encode())
         for jumps in (self.jumps, None if self.pinned is None else self.pinned.p):
             digest.update(b"" if jumps is None else jumps.astype("<i4").tobytes())
+        if self.windows is not None:
+            digest.update(self.windows.bytes)
         if self.pinned is not None and self.free is not None:
             for values in (self.pinned.alpha, self.pinned.beta):
                 digest.update(values.astype("<f8").tobytes())
@@ -517,6 +542,14 @@ def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem
     return replace(problem, pinned=field, free=free)
 
 
+def tightened(problem: Problem, windows: Windows) -> Problem:
+    """The same problem with narrower windows of alpha and beta and ranges of jumps.
+
+    Raises InstanceError for windows that are not within those of its gauge.
+    """
+    return replace(problem, windows=windows)
+
+
 def lifted(problem: Problem) -> Problem:
     """The problem with each p1 beta_i lifted to z, for formats up to quadratic: `Formulation.weakened`."""
     return replace(problem, formulation=lift_products(problem.formulation))
@@ -531,6 +564,7 @@ __all__ = [
     "Violation",
     "formulate",
     "lifted",
+    "tightened",
     "with_integers_fixed",
     "with_rest_fixed",
 ]

@@ -9,7 +9,7 @@ sketch changes the length of the index arrays, never an expression.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Final, Literal
 
@@ -31,7 +31,9 @@ alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", 
 alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
 p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
 p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
-alpha_lo, alpha_up = (_symbol(name) for name in ("alpha_lo", "alpha_up"))
+alpha_lo, alpha_up, beta_lo, beta_up = (
+    _symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
+)
 w_strokes, w_beta = (_symbol(name) for name in ("w_strokes", "w_beta"))
 pi: Final = sp.pi
 
@@ -88,8 +90,13 @@ VARIABLES: Final = {
 }  # fmt: skip
 """Every variable of every formulation, in the order of columns."""
 
+NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
+"""The same where a proof has narrowed the windows: those of beta then are data too."""
+
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
-    "pixels": {symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up)},
+    "pixels": {
+        symbol: (symbol.name, "itself") for symbol in (alpha, beta, psi, alpha_lo, alpha_up, beta_lo, beta_up)
+    },
     "strokes": {
         alpha: ("alpha", "stroke"),
         beta: ("beta", "stroke"),
@@ -170,6 +177,7 @@ __all__ = [
     "B_LIFTED",
     "HALF",
     "LATEX",
+    "NARROWED",
     "SCALARS",
     "SLOTS",
     "VARIABLES",

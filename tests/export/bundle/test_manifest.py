@@ -167,6 +167,7 @@ write_all(instance, sys.argv[2] + "/packed", compress=True, dialects={"nl": "bin
 """
 
 
+@pytest.mark.slow
 def test_the_whole_set_is_the_same_under_another_hash_seed(tmp_path):
     write_instance(make_instance("full"), tmp_path / "full.json")
     found = []

@@ -1,0 +1,90 @@
+"""Windows of alpha and beta and ranges of jumps narrower than the gauge's: what a proof leaves of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ..errors import InstanceError
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import QUARTER, Instance, whole_numbers
+
+_SLACK = 1e-9
+_ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p_max")
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Where the angles (n,) and jumps (m,) of every field with a 2-norm energy up to `energy` lie.
+
+    alpha_lower, alpha_upper, beta_lower, beta_upper: radians. p_min, p_max: whole numbers. Every end is
+    within those of the gauge. proof: what says so, one line of text. Raises InstanceError, from `check`, for
+    windows that do not fit an instance.
+    """
+
+    alpha_lower: Floats
+    alpha_upper: Floats
+    beta_lower: Floats
+    beta_upper: Floats
+    p_min: Ints
+    p_max: Ints
+    energy: float
+    proof: str
+
+    def check(self, instance: Instance) -> None:
+        """Nothing where these windows lie within those of the instance; else raises InstanceError."""
+        quarter = np.full(instance.grid.size, QUARTER)
+        for name, low, high, least, most in (
+            ("alpha", self.alpha_lower, self.alpha_upper, instance.alpha_lower, instance.alpha_upper),
+            ("beta", self.beta_lower, self.beta_upper, -quarter, quarter),
+            ("p", self.p_min, self.p_max, instance.p_min, instance.p_max),
+        ):
+            if low.shape != least.shape or high.shape != least.shape:
+                raise InstanceError(f"the windows of {name} are not of the grid of {instance.name}")
+            wrong: Bools = ~((low >= least - _SLACK) & (low <= high) & (high <= most + _SLACK))
+            if wrong.any():
+                raise InstanceError(
+                    f"the window of {name} number {int(np.argmax(wrong))} is empty or beyond the gauge's"
+                )
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The arrays by the names of symbols."""
+        return {
+            "alpha_lo": self.alpha_lower,
+            "alpha_up": self.alpha_upper,
+            "beta_lo": self.beta_lower,
+            "beta_up": self.beta_upper,
+            "p_min": self.p_min,
+            "p_max": self.p_max,
+        }
+
+    @property
+    def bytes(self) -> bytes:
+        """All of it, for a hash."""
+        angles = np.concatenate([self.alpha_lower, self.alpha_upper, self.beta_lower, self.beta_upper])
+        jumps = np.concatenate([self.p_min, self.p_max])
+        text = f"{self.energy!r} {self.proof}"
+        return angles.astype("<f8").tobytes() + jumps.astype("<i4").tobytes() + text.encode()
+
+    def document(self) -> dict[str, Any]:
+        """The windows as a manifest records them."""
+        entries = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in entries}
+
+    @classmethod
+    def of_document(cls, document: dict[str, Any]) -> Windows:
+        """The windows that `document` gave."""
+        given = {name: np.array(document[name], dtype=np.float64) for name in _ARRAYS}
+        return cls(
+            given["alpha_lower"],
+            given["alpha_upper"],
+            given["beta_lower"],
+            given["beta_upper"],
+            whole_numbers(given["p_min"], "p_min"),
+            whole_numbers(given["p_max"], "p_max"),
+            float(document["energy"]),
+            str(document["proof"]),
+        )

@@ -1,0 +1,59 @@
+"""The windows that a certificate leaves, in the labels of the instance's gauge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..field.jumps import parity_sign
+from ..formulations.windows import Windows
+from ..instance.grid import Bools, Floats, Ints
+from ..instance.instance import HALF, QUARTER
+from .certificate import Certificate
+
+_MARGIN = 1e-9
+"""Radians that windows are wider than the boxes, so that solvers may round."""
+_SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
+
+
+def windows_left(certificate: Certificate) -> Windows:
+    """Windows of the angles, and ranges of the jumps, of every field of at most the certificate's energy.
+
+    Each box of the certificate is taken to the label that its field has in the gauge. Where it leads beyond
+    the window of the gauge, crosses in it have labels at both ends: then alpha keeps its whole window, and
+    beta lies between plus and minus its greatest size. A jump that is forced between two boxes within their
+    windows is fixed; else its range follows from the windows as that of the gauge does.
+    """
+    field, verdict = certificate.field, certificate.verdict
+    instance, grid = field.instance, field.instance.grid
+    box = _relabelled(verdict.boxes, np.round((field.alpha - verdict.centres[:, 0]) / HALF).astype(np.int32))
+    box += np.array([-_MARGIN, _MARGIN, -_MARGIN, _MARGIN])
+    inside: Bools = (box[:, 0] >= instance.alpha_lower) & (box[:, 1] <= instance.alpha_upper)
+    reach = np.abs(box[:, 2:]).max(axis=1)
+    alpha_lower = np.where(inside, box[:, 0], instance.alpha_lower)
+    alpha_upper = np.where(inside, box[:, 1], instance.alpha_upper)
+    beta_lower = np.maximum(np.where(inside, box[:, 2], -reach), -QUARTER)
+    beta_upper = np.minimum(np.where(inside, box[:, 3], reach), QUARTER)
+    least, most = _jumps(alpha_lower, alpha_upper, grid.first, grid.second)
+    fixed = verdict.forced_pairs & inside[grid.first] & inside[grid.second]
+    return Windows(
+        alpha_lower,
+        alpha_upper,
+        beta_lower,
+        beta_upper,
+        np.where(fixed, field.p, np.maximum(least, instance.p_min)).astype(np.int32),
+        np.where(fixed, field.p, np.minimum(most, instance.p_max)).astype(np.int32),
+        certificate.energy,
+        f"certificate of {instance.name}, status {certificate.status}",
+    )
+
+
+def _relabelled(boxes: Floats, steps: Ints) -> Floats:
+    """The boxes (n, 4) of alpha and beta after so many steps of their labels."""
+    alpha, beta = boxes[:, :2] + HALF * steps[:, None], boxes[:, 2:] * parity_sign(steps)[:, None]
+    return np.concatenate([alpha, np.sort(beta, axis=1)], axis=1)
+
+
+def _jumps(lower: Floats, upper: Floats, first: Ints, second: Ints) -> tuple[Floats, Floats]:
+    """Least and greatest useful jump of each pair between windows of alpha, shapes (m,)."""
+    least = np.floor(-2 * (upper[first] - lower[second]) / np.pi + _SLACK)
+    return least, np.ceil(-2 * (lower[first] - upper[second]) / np.pi - _SLACK)

@@ -1,0 +1,158 @@
+"""Problems with windows narrowed by a certificate: the same optimum, in every format, and said so."""
+
+import json
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.bundle.manifest import is_recordable, read_manifest, write_all
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.verify.verify import Verdict, verify
+from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.field.file import write_field
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.problem import formulate, tightened
+from crossfield.models.instance.file import write_instance
+from crossfield.models.proof.certificate import read_certificate, write_certificate
+from crossfield.models.proof.tightening import windows_left
+from exhaustive import exact, optimum, random_instance
+from plain_prover import proof_of
+
+TWO_NORM = ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed")
+SAID = "narrowed to what a proof leaves"
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    """A certificate of the optimum of 2 x 3 pixels, and the file it is in."""
+    instance = random_instance(103, (2, 3), 9)
+    field = optimum(instance)
+    assert field.energy().total == pytest.approx(exact(instance), abs=1e-12)
+    path = tmp_path_factory.mktemp("proof") / "it.npz"
+    return write_certificate(proof_of(field, levels=4), path), path
+
+
+def problems(proof, name):
+    """A formulation with the windows of the gauge, and with those that are left."""
+    recipe, field = FORMULATIONS[name], proof.field
+    plain = formulate(field.instance, name, p=field.p if recipe.fixed else None)
+    return plain, tightened(plain, windows_left(proof))
+
+
+def test_windows_are_narrower_and_hold_the_optimum(proof):
+    certificate, _ = proof
+    assert certificate.status == "optimal"
+    for name in FORMULATIONS:
+        plain, narrow = problems(certificate, name)
+        assert (narrow.lower >= plain.lower - 1e-9).all()
+        assert (narrow.upper <= plain.upper + 1e-9).all()
+        for block in ("alpha", "beta"):
+            width = narrow.blocks[block].upper - narrow.blocks[block].lower
+            assert (width < 0.2).all()
+        assert narrow.violation(narrow.point(certificate.field)).worst < 1e-12
+        assert narrow.sha256 != plain.sha256
+        assert not is_recordable(replace(narrow, pinned=certificate.field))
+        assert is_recordable(narrow)
+        assert ("the optimum stays" in narrow.tightened) == (name in TWO_NORM)
+        assert plain.tightened == ""
+
+
+def test_the_optimum_is_that_of_the_whole_problem(proof):
+    """Bonmin, exact on a convex problem, against the least squares of all jumps."""
+    certificate, _ = proof
+    least = exact(certificate.field.instance)
+    for problem in problems(certificate, "miqp-exact"):
+        assert cf.solve(problem, "bonmin").objective == pytest.approx(least, abs=1e-6)
+    _, narrow = problems(certificate, "qp-fixed")
+    assert cf.solve(narrow, "ipopt").objective == pytest.approx(least, abs=1e-6)
+
+
+@pytest.mark.parametrize("gauge, least", [("strokes", 4), ("box", 1)])
+def test_no_better_field_is_cut_off(gauge, least, tmp_path):
+    """A certificate of a field that is not the best leaves the best one, whatever its labels and gauge."""
+    checked = 0
+    for seed in range(103, 123):
+        instance = random_instance(seed, (2, 2), 9, gauge)
+        best = optimum(instance).with_best_jumps()
+        beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
+        best, worse = sorted((best, replace(best, beta=beta)), key=lambda field: field.energy().total)
+        found = write_certificate(proof_of(worse, levels=4), tmp_path / "it.npz")
+        narrow = tightened(formulate(instance, "minlp-parity"), windows_left(found))
+        assert narrow.violation(narrow.point(best)).worst < 1e-9
+        plain = formulate(instance, "minlp-parity")
+        checked += (narrow.upper - narrow.lower).sum() < 0.9 * (plain.upper - plain.lower).sum()
+    assert checked >= least
+
+
+def exported(proof, folder, names):
+    """The folder in which `crossfield export --tightened` has written these formulations in every format."""
+    certificate, path = proof
+    instance = folder / "it.json"
+    write_instance(certificate.field.instance, instance)
+    arguments = ["export", str(instance), "-o", str(folder), "--tightened", str(path), "-q"]
+    arguments += [part for name in names for part in ("-f", name)]
+    assert invoke(arguments + [part for name in FORMATS for part in ("-F", name)]) == 0
+    return folder
+
+
+def test_headers_and_manifests_say_where_they_come_from(proof, tmp_path):
+    names = ("milp-mccormick", "miqp-exact", "qp-fixed", "minlp-parity")
+    folder = exported(proof, tmp_path, names)
+    for name in names:
+        manifest = read_manifest(folder / f"random.{name}.manifest.json")
+        _, narrow = problems(proof[0], name)
+        assert manifest.document["tightened"] == narrow.tightened
+        assert manifest.problem().sha256 == narrow.sha256
+        for file in manifest.document["files"]:
+            if file["format"] != "nl":
+                assert SAID in (folder / file["name"]).read_text()
+    assert not list(folder.glob("*.sol")) + list(folder.glob("*.mst"))  # a certificate is no start
+
+
+@pytest.mark.slow
+@pytest.mark.oracles
+def test_every_format_carries_them(proof, tmp_path):
+    """All the programs that read the files find the narrow bounds."""
+    found = verify(exported(proof, tmp_path, ("milp-mccormick", "miqp-exact", "qp-fixed"))).findings
+    bad = [finding for finding in found if finding.verdict in {Verdict.DIFFERS, Verdict.FAILED}]
+    assert not bad
+    read = {finding.file.split(".", 2)[2] for finding in found if finding.verdict is Verdict.AGREES}
+    assert read >= {"nl", "lp", "mps", "mod"}
+
+
+def test_files_without_a_certificate_say_nothing_of_it(proof, tmp_path):
+    certificate, _ = proof
+    (manifest,) = write_all(certificate.field.instance, tmp_path, ["milp-mccormick"], ["lp"])
+    assert not {"windows", "tightened"} & set(manifest.document)
+    assert SAID not in (tmp_path / "random.milp-mccormick.lp").read_text()
+
+
+def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
+    certificate, path = proof
+    other = random_instance(104, (2, 3), 9)
+    with pytest.raises(InputError, match="certificate of another instance"):
+        read_certificate(path, on=other)
+    windows = windows_left(certificate)
+    with pytest.raises(InstanceError, match="window of beta number 0 is empty or beyond"):
+        tightened(
+            formulate(certificate.field.instance, "miqp-exact"),
+            replace(windows, beta_lower=windows.beta_lower - 2),
+        )
+    with pytest.raises(InstanceError, match="not of the grid"):
+        tightened(formulate(random_instance(1, (2, 2)), "miqp-exact"), windows)
+    field = tmp_path / "field.npz"
+    write_field(certificate.field, field)
+    instance = tmp_path / "it.json"
+    write_instance(certificate.field.instance, instance)
+    assert invoke(["export", str(instance), "-o", str(tmp_path / "out"), "--tightened", str(field)]) == 1
+    assert "field.npz: " in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    manifest = write_all(
+        certificate.field.instance, tmp_path / "m", ["milp-mccormick"], ["lp"], windows=windows
+    )[0]
+    broken = manifest.document | {"windows": manifest.document["windows"] | {"p_max": [64]}}
+    manifest.path.write_text(json.dumps(broken))
+    with pytest.raises(InstanceError, match="not of the grid"):
+        read_manifest(manifest.path).problem()
