@@ -54,6 +54,7 @@ from .output import (
     show_report,
     show_samples,
 )
+from .prove_command import prove_command
 from .solve_command import solve_command, tell_solution
 from .verify_command import verify_command
 
@@ -179,6 +180,15 @@ def export_command(
     beta_norm: BetaNorm = None,
     relax: Relax = False,
     start: Start = None,
+    tightened: Annotated[
+        Path | None,
+        typer.Option(
+            "--tightened",
+            metavar="PROOF",
+            help="Certificate (.npz) on the same instance: windows of alpha and beta and ranges of jumps are"
+            " narrowed to what it leaves; qp-fixed takes its jumps. It is checked first.",
+        ),
+    ] = None,
     gams_layout: GamsLayout = None,
     nl_form: NlForm = None,
     compress: Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")] = False,
@@ -193,6 +203,8 @@ def export_command(
     """
     from ...models.field.file import read_field
     from ...models.formulations.catalogue import FORMULATIONS
+    from ...models.proof.certificate import read_certificate
+    from ...models.proof.tightening import windows_left
     from ..bundle.manifest import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
@@ -203,12 +215,18 @@ def export_command(
     with progress(quiet=quiet) as show:
         loaded = load(instance, size, mask, gauge)
         field = None if start is None else read_field(start, on=loaded)
+        proof = None
+        if tightened is not None:
+            show("checking the certificate")
+            proof = read_certificate(tightened, on=loaded)
         manifests = write_all(
             loaded,
             output,
             formulations,
             formats,
             start=field,
+            jumps_of=None if proof is None else proof.field,
+            windows=None if proof is None else windows_left(proof),
             options=options_of(facet, stroke_norm, beta_norm, relax=relax),
             dialects=_dialects(gams_layout, nl_form),
             compress=compress,
@@ -222,6 +240,7 @@ def export_command(
 
 
 command("solve")(solve_command)
+command("prove")(prove_command)
 
 
 @command("read")

@@ -104,12 +104,14 @@ def show_table(
 
 def show_report(report: Report, folder: Path) -> None:
     """Print what a run found and where it lies, and what failed."""
-    columns = ("method", "2-norm", "1-norm", "singular", "|beta|", "seconds", "status")
+    gap = ("gap",) if report.proven else ()  # the bound is the same for all
+    columns = ("method", "2-norm", *gap, "1-norm", "singular", "|beta|", "seconds", "status")
     rows = []
     for candidate in report.candidates:
-        facts = candidate.facts()
+        facts = report.facts(candidate)
         numbers = [
             f"{facts['energy_2_norm']:.4g}",
+            *([_gap(facts)] if gap else []),
             f"{facts['energy_1_norm']:.4g}",
             str(facts["singularities"]),
             f"{facts['mean_abs_beta_degrees']:.1f}°",
@@ -118,7 +120,12 @@ def show_report(report: Report, folder: Path) -> None:
         mark = "*" if candidate is report.best else ""
         rows.append([candidate.method + mark, *numbers, str(facts.get("status", ""))])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
-    say(f"* kept, the least 2-norm energy: {folder / 'field.npz'} (.json, .rawfield)")
+    best = report.facts(report.best)
+    words = ", proven optimal" if best.get("proven_optimal") else ""
+    say(f"* kept, the least 2-norm energy{words}: {folder / 'field.npz'} (.json, .rawfield)")
+    if report.proven:
+        bound = f"{best['bound_2_norm']:.10g}"
+        say(f"  no field has less 2-norm energy than {bound}; certificate: {report.proven.certificate}")
     if not report.interrupted:
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
@@ -127,6 +134,10 @@ def show_report(report: Report, folder: Path) -> None:
             complain(f"{candidate.method}: interrupted; its best field so far was kept")
     for method, reason in report.failures.items():
         complain(f"{method}: {reason}")
+
+
+def _gap(facts: dict[str, Any]) -> str:
+    return "optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.2%}"
 
 
 def show_manifests(manifests: list[Manifest], folder: Path) -> None:

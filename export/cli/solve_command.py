@@ -32,6 +32,7 @@ from .output import complain, progress, say, say_json, show_facts, show_solution
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
     from ..solving.methods import Candidate, Request
+    from ..solving.proven import Proven
 
 
 def solve_command(
@@ -99,11 +100,11 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, target = _by_method(method, request)
+            candidate, proven, target = _by_method(method, request)
         else:
             solution, target = _by_solver(str(formulation), request)
     if method is not None:
-        _tell_candidate(candidate, target, quiet=quiet, as_json=as_json)
+        _tell_candidate(candidate, proven, target, quiet=quiet, as_json=as_json)
         return
     tell_solution(solution, None if solution.doubt else target, quiet=quiet, as_json=as_json)
     if solution.point is None:
@@ -129,16 +130,18 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} {what}")
 
 
-def _by_method(name: str, request: Request) -> tuple[Candidate, Path]:
-    """The last field of a method, and the file it now is in."""
+def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, Path]:
+    """The last field of a method, what is proven of it, and the file it now is in, a certificate beside."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder
     from ..solving.methods import METHODS
+    from ..solving.proven import certified
 
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
-    return candidate, target
+    certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
+    return candidate, certified(candidate.proof, certificate), target
 
 
 def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
@@ -165,14 +168,20 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     return solution, target
 
 
-def _tell_candidate(candidate: Candidate, field: Path, *, quiet: bool, as_json: bool) -> None:
-    """Print the facts of a method's field."""
+def _tell_candidate(
+    candidate: Candidate, proven: Proven | None, field: Path, *, quiet: bool, as_json: bool
+) -> None:
+    """Print the facts of a method's field, and where it lies."""
     facts = candidate.facts()
+    if proven:
+        facts |= proven.facts(facts["energy_2_norm"])
     if as_json:
         say_json(facts)
     elif not quiet:
         show_facts(candidate.field.instance.summary, facts)
         say(f"field: {field}")
+        if proven:
+            say(f"certificate: {proven.certificate}")
     if candidate.interrupted:
         complain("interrupted; the best field so far was kept")
 

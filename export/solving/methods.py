@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,22 +15,29 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
 from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
+from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy
 from ...models.search.improvement import first_field
 from ...models.search.power_field import power_field
-from ...models.search.search import Search, search
+from ...models.search.search import Search
 from ..solutions.solution import Solution
 from .job import Limits
 from .patches import PATCH_SOLVERS, PatchSearch, search_patches
 from .two_stage import find_jumps, fit_angles, jumps_until
+
+if TYPE_CHECKING:
+    from ...models.proof.record import Proof
 
 _STARTING: Final = 0.5  # share of the seconds that the field may take from which patches start
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A field and how it was found: method, seconds, counts, and the solution where a solver gave it."""
+    """A field and how it was found: method, seconds, counts, and the solution where a solver gave it.
+
+    proof: what the method has proven of the field, if it proves anything.
+    """
 
     method: str
     field: CrossField
@@ -38,6 +45,7 @@ class Candidate:
     solution: Solution | None = None
     interrupted: bool = False
     counts: tuple[tuple[str, int], ...] = ()
+    proof: Proof | None = None
 
     def facts(self) -> dict[str, Any]:
         """What a report says of it: energies in both norms, singularities, skew, claims beside values."""
@@ -183,6 +191,27 @@ def _teller(request: Request, deadline: Deadline, method: str, things: str) -> C
     return tell
 
 
+def _prove(request: Request) -> Iterator[Candidate]:
+    from ...models.proof.prove import prove  # it loads what is compiled
+
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
+    request.progress("prove: starting fields")
+    proof = prove(
+        request.instance,
+        start=request.start,
+        seconds=request.limits.seconds,
+        gap=request.limits.gap,
+        jobs=_processes(request),
+        progress=lambda bound, energy, labels: request.progress(
+            f"prove: energy {energy:.5g}, bound {bound:.5g}, {labels} labels, "
+            f"at most {deadline.left():.0f} s more; Ctrl-C keeps them"
+        ),
+    )
+    counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
+    seconds, interrupted = time.perf_counter() - begin, proof.ended == "interrupted"
+    yield Candidate("prove", proof.field, seconds, interrupted=interrupted, counts=counts, proof=proof)
+
+
 def _two_stage(request: Request) -> Iterator[Candidate]:
     deadline = Deadline.after(request.limits.seconds)
     limits = request.limits.until(jumps_until(deadline))
@@ -226,6 +255,11 @@ METHODS: Final = {
             "two-stage",
             "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
             _two_stage,
+        ),
+        Method(
+            "prove",
+            "lower bounds on lattices of crosses, and fields from them, until one is proven optimal",
+            _prove,
         ),
     )
 }

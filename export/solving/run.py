@@ -18,9 +18,11 @@ from ..formats.registry import generator
 from ..solutions.solution import Solution
 from .job import Limits
 from .methods import METHODS, Candidate, Method, Request, finite, solution_facts
+from .proven import Proven, certified
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 REPORT: Final = "report.json"
+CERTIFICATE: Final = "certificate.npz"
 
 
 def facts_with_energies(solution: Solution) -> dict[str, Any]:
@@ -38,8 +40,9 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 class Report:
     """What a run found. candidates: every field, best (lowest 2-norm energy) first.
 
-    Manifests: the written sets. failures: reasons by method; interrupted: the method, or `drawing`, that
-    Ctrl-C ended, and the run with it; empty when none did.
+    Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate` or
+    `drawing`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of the 2-norm
+    energy of all fields, None where there is none.
     """
 
     instance: Instance
@@ -47,11 +50,17 @@ class Report:
     manifests: tuple[Manifest, ...]
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
+    proven: Proven | None = None
 
     @property
     def best(self) -> Candidate:
         """The field that is kept and drawn."""
         return self.candidates[0]
+
+    def facts(self, candidate: Candidate) -> dict[str, Any]:
+        """What the report says of a field: its own facts, and the bound and the gap where they are proven."""
+        facts = candidate.facts()
+        return facts if self.proven is None else facts | self.proven.facts(facts["energy_2_norm"])
 
     @property
     def files(self) -> int:
@@ -80,7 +89,8 @@ class Report:
                 "pixel_size": instance.pixel_size,
             },
             "best": self.best.method,
-            "methods": [candidate.facts() for candidate in self.candidates],
+            "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
+            "methods": [self.facts(candidate) for candidate in self.candidates],
             "failures": self.failures,
             "interrupted": self.interrupted or None,
             "files": self.files,
@@ -93,8 +103,8 @@ class Report:
 def plan(limits: Limits) -> str:
     """How long the searches of a run may take in all, and each."""
     timed = [method.name for method in _tried() if method.timed]
-    each = ", ".join(f"{name} {limits.seconds:g} s" for name in timed)
-    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures come on top"
+    each = ", ".join(f"{name} {limits.seconds:g}" for name in timed)
+    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures on top"
 
 
 def _tried() -> list[Method]:
@@ -117,6 +127,7 @@ def run(
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
     options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
@@ -126,7 +137,7 @@ def run(
     KeyboardInterrupt. Raises OutputError.
     """
     folder, limits = make_folder(folder), limits or Limits()
-    for stale in (REPORT, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
     progress(plan(limits))
     progress("greedy field")
@@ -145,7 +156,8 @@ def run(
     )
     # Equal but for rounding: the one that was found first.
     ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
-    report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted)
+    proven = _certified(found, folder / CERTIFICATE, progress)
+    report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
     if not report.interrupted:
@@ -180,6 +192,19 @@ def _tried_in_turn(request: Request) -> _Found:
         if found.interrupted:
             break
     return found
+
+
+def _certified(found: _Found, path: Path, progress: Progress) -> Proven | None:
+    """What is proven, with its certificate at the path; a refusal or Ctrl-C is noted."""
+    proof = next((each.proof for each in found.candidates if each.proof is not None), None)
+    progress("writing and checking the certificate")
+    try:
+        return certified(proof, path)
+    except CrossfieldError as error:
+        found.failures["certificate"] = str(error)
+    except KeyboardInterrupt:
+        found.interrupted = "certificate"
+    return None
 
 
 def _drawn(report: Report, folder: Path, progress: Progress) -> Report:

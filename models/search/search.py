@@ -11,7 +11,7 @@ lower.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -34,6 +34,9 @@ from .walk import LOWER, Explored, Task, explore
 
 RoundProgress = Callable[[int, float], object]
 """Is told how many rounds are done, and the least energy so far."""
+
+Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
+"""Gives a field of no more energy, told the field, what tells the seconds that are left, and when to end."""
 
 Explorers = Callable[[list[Task]], list[Explored]]
 """Explores patches side by side and gives what was found in the order of the tasks."""
@@ -74,10 +77,12 @@ def search(
     jobs: int = 2,
     start: CrossField | None = None,
     progress: RoundProgress = lambda *_: None,
+    suggest: Suggest = lambda field, *_: field,
 ) -> Search:
     """The field of least 2-norm energy found, never above `start`.
 
-    Nor is it above the improved greedy field, unless time cuts that off.
+    Nor is it above the improved greedy field, unless time cuts that off, nor above what `suggest` makes of
+    the best of the fields to begin at, here and on grids of lower resolution.
 
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
@@ -94,7 +99,7 @@ def search(
         start.check_instance(instance)
     with interruptible() as interrupted:
         limits = _Limits(
-            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted
+            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted, suggest
         )
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
@@ -117,11 +122,12 @@ def _closing(seconds: float | None) -> Over:
 
 @dataclass(frozen=True)
 class _Limits:
-    """When to end: a deadline, a number of rounds, and whether the user asks for it."""
+    """When to end: a deadline, rounds, and whether the user asks for it; and what suggests starts."""
 
     deadline: Deadline
     rounds: int | None
     interrupted: Callable[[], bool]
+    suggest: Suggest
 
     def met(self, rounds: int) -> str:
         """Which limit is met after so many rounds; empty when none is."""
@@ -138,7 +144,7 @@ class _Limits:
     def coarse(self) -> _Limits:
         """The limits of the search on the grid of half the resolution."""
         many = _COARSE if self.rounds is None else min(self.rounds, _COARSE)
-        return _Limits(self.deadline.share(1 - _FINE), many, self.interrupted)
+        return replace(self, deadline=self.deadline.share(1 - _FINE), rounds=many)
 
 
 def _from_coarse(
@@ -161,13 +167,16 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of greedy field, given field and, in time, power field, each improved in time."""
+    """The best of greedy field, given field and, in time, power field, each improved in time,
+    or what is suggested from it.
+    """
     fields = [first_field(instance, limits.over)]
     if given is not None:
         fields.append(improved(given, limits.over))
     if not limits.over():
         fields.append(improved(power_field(instance), limits.over))
-    return min(fields, key=_energy)
+    best = min(fields, key=_energy)
+    return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
 
 
 def _energy(field: CrossField) -> float:

@@ -19,6 +19,7 @@ NAMED = {
     "instance": ["samples", "size"],
     "export": ["samples", "size", "formulations", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "methods", "solvers"],
+    "prove": ["samples", "size"],
     "read": ["answers"],
     "draw": ["pictures"],
     "verify": ["programs"],
@@ -83,7 +84,7 @@ def test_choices_are_those_of_the_models_and_of_the_formats():
 
 def test_commands_are_listed_in_the_order_of_their_use():
     assert list(typer.main.get_command(app).commands) == [
-        "run", "instance", "export", "solve", "read", "draw", "verify", "list", "samples", "library",
+        "run", "instance", "export", "solve", "prove", "read", "draw", "verify", "list", "samples", "library",
     ]  # fmt: skip
 
 

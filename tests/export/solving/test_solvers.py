@@ -391,24 +391,26 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
     assert not list((tmp_path / "files").glob("*.start"))
 
 
-def test_highs_hands_over_its_incumbent_in_the_background_too(tmp_path, monkeypatch):
-    """Where Ctrl-C is ignored, as in the background of a shell; this HiGHS knows of no time limit."""
+def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_path, monkeypatch):
+    """Where Ctrl-C is ignored, as in a shell's background; this HiGHS goes on until it is asked to end."""
     told_to_highs(
         """
-        set_ = highspy.Highs.setOptionValue
-        highspy.Highs.setOptionValue = lambda self, *given: given[0] == "time_limit" or set_(self, *given)
+        import os, time
+        highspy.Highs.startSolve = lambda self: None
+        highspy.Highs.wait = lambda self, seconds: (bool(time.sleep(seconds)), None)
+        highspy.Highs.cancelSolve = lambda self: print("asked to end", flush=True) or os.kill(os.getpid(), 9)
         """,
         tmp_path,
         monkeypatch,
     )
-    problem = cf.formulate(cf.sample("mouse", 12), "milp-mccormick")
+    problem, files = cf.formulate(cf.sample("mouse", 8), "milp-mccormick"), tmp_path / "files"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        found = cf.solve(problem, "highs", limits=cf.Limits(2.0), start=cf.greedy(problem.instance))
+        found = cf.solve(problem, "highs", files, limits=cf.Limits(2.0), start=cf.greedy(problem.instance))
     finally:
         signal.signal(signal.SIGINT, before)
-    assert found.message == "Interrupted by user"
     assert found.status == Status.LIMIT_WITH_POINT
+    assert "asked to end" in next(files.glob("*.log")).read_text()
 
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):

@@ -104,9 +104,9 @@ def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
 
 def test_the_plan_names_each_method_that_searches_and_the_sum():
     told = plan(cf.Limits(20))
-    assert told.startswith("at most 40 s: search 20 s, two-stage 20 s;")
+    assert told.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
     timed = [method.name for method in METHODS.values() if method.timed and method.in_runs]
-    assert timed == ["search", "two-stage"]
+    assert timed == ["search", "two-stage", "prove"]
 
 
 def test_the_plan_is_the_first_thing_that_is_told(tmp_path):

@@ -1,0 +1,139 @@
+"""The command `prove`: a field with a lower bound of what any field costs, and a certificate of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .inputs import load
+from .options import GaugeName, Json, Mask, Quiet, Size, Start
+from .output import complain, progress, say, say_json, show_facts
+
+if TYPE_CHECKING:
+    from ...models.proof.certificate import Certificate
+    from ...models.proof.record import Proof
+
+
+def prove_command(
+    instance: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SKETCH|SAMPLE|INSTANCE]",
+            help="A drawing (SVG, .scap) or bitmap; a built-in sample: {samples}; or a file of `instance`.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for field, certificate and report."),
+    ] = None,
+    *,
+    size: Size = None,
+    mask: Mask = None,
+    gauge: GaugeName = None,
+    start: Start = None,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", min=0.1, metavar="SECONDS", help="Seconds in all.")
+    ] = 60.0,
+    gap: Annotated[
+        float,
+        typer.Option(
+            "--gap",
+            min=0.0,
+            help="Relative distance between energy and bound that is enough; 0 asks for a proven optimum.",
+        ),
+    ] = 0.0,
+    check: Annotated[
+        Path | None,
+        typer.Option("--check", metavar="FILE", help="Only check this certificate, and say what it proves."),
+    ] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Find a field and prove how far its 2-norm energy is from the least, at most.
+
+    The certificate in the folder can be checked by --check, or by a program of its own without crossfield.
+    Ctrl-C ends the proof with what it has.
+    """
+    if check is not None:
+        if instance is not None or output is not None:
+            raise typer.BadParameter("--check FILE goes alone: the instance is in the certificate")
+        _check(check, quiet=quiet, as_json=as_json)
+        return
+    if instance is None or output is None:
+        raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
+    from ...models.field.file import read_field
+    from ...models.proof.prove import prove
+
+    with progress(quiet=quiet) as show:
+        show("reading the sketch")
+        loaded = load(instance, size, mask, gauge)
+        proof = prove(
+            loaded,
+            start=None if start is None else read_field(start, on=loaded),
+            seconds=time_limit,
+            gap=gap,
+            progress=lambda bound, energy, labels: show(
+                f"bound {bound:.6f}, energy {energy:.6f}, {labels} labels; Ctrl-C keeps them"
+            ),
+        )
+        show("writing and checking the certificate")
+        document = _write(proof, output)
+    if as_json:
+        say_json(document)
+    elif not quiet:
+        show_facts(loaded.summary, {key: value for key, value in document.items() if key != "levels"})
+        say(f"field, certificate and report: {output}")
+    if proof.ended == "interrupted":
+        complain("interrupted; the best field and bound so far were kept")
+
+
+def _write(proof: Proof, folder: Path) -> dict[str, Any]:
+    """The facts of a proof, which are in the folder now, with its field and its certificate."""
+    from ...models.field.file import write_field
+    from ...models.proof.certificate import write_certificate
+    from ...models.storage import make_folder, write_bytes
+
+    stem = f"{proof.field.instance.name}.proof"
+    write_field(proof.field, make_folder(folder) / f"{stem}.field.npz")
+    certificate = write_certificate(proof, folder / f"{stem}.certificate.npz")
+    document = facts(certificate) | {
+        "seconds": proof.seconds,
+        "ended": proof.ended,
+        "levels": [
+            {"spacing": level.h, "labels": int(level.allowed.sum()), "bound": bound}
+            for level, bound in zip(proof.levels, certificate.verdict.levels, strict=True)
+        ],
+    }
+    write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
+    return document
+
+
+def facts(certificate: Certificate) -> dict[str, Any]:
+    """What a certificate proves, by name."""
+    energy, bound = certificate.energy, certificate.bound
+    return {
+        "instance": certificate.field.instance.name,
+        "sha256": certificate.field.instance.sha256,
+        "status": certificate.status,
+        "energy": energy,
+        "bound": bound,
+        "gap": 0.0 if certificate.status == "optimal" else (energy - bound) / energy,
+        "forced_jumps": certificate.verdict.forced,
+        "pairs": len(certificate.field.p),
+    }
+
+
+def _check(path: Path, *, quiet: bool, as_json: bool) -> None:
+    from ...models.proof.certificate import read_certificate
+
+    with progress(quiet=quiet) as show:
+        show("checking the certificate")
+        found = read_certificate(path)
+    if as_json:
+        say_json(facts(found))
+    elif not quiet:
+        show_facts(found.field.instance.summary, facts(found))
+        say("the certificate is valid")

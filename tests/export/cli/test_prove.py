@@ -1,0 +1,88 @@
+"""The command `prove`: field, certificate and report, and the check of a certificate."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.models.array_archive import pack_arrays
+from crossfield.models.field.file import read_field
+from crossfield.models.proof import check_certificate
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """What `prove` has written for a sample of some pixels, and what it has printed."""
+    folder = tmp_path_factory.mktemp("proof")
+    command = ["prove", "mouse", "--size", "8", "-o", str(folder), "--time-limit", "100", "-q"]
+    assert invoke(command) == 0
+    (report,) = folder.glob("*.proof.json")
+    return folder, json.loads(report.read_text())
+
+
+def of(folder, suffix):
+    (found,) = folder.glob(f"*.proof.{suffix}")
+    return found
+
+
+def test_field_certificate_and_report_agree(folder):
+    folder, report = folder
+    field = read_field(of(folder, "field.npz"))
+    assert report["status"] == "optimal"
+    assert report["ended"] == "optimal"
+    assert report["energy"] == pytest.approx(field.energy().total, abs=1e-12)
+    assert report["bound"] == pytest.approx(report["energy"], abs=1e-8)
+    assert report["forced_jumps"] == report["pairs"] == len(field.p)
+    assert all(level["bound"] <= report["energy"] for level in report["levels"])
+    assert sorted(path.name.split(".", 1)[1] for path in folder.iterdir()) == [
+        "proof.certificate.npz",
+        "proof.field.npz",
+        "proof.json",
+    ]
+
+
+def test_certificates_are_checked(folder, capsys, tmp_path):
+    folder, report = folder
+    certificate = of(folder, "certificate.npz")
+    assert invoke(["prove", "--check", str(certificate), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found.items() <= report.items()
+    assert invoke(["prove", "--check", str(certificate)]) == 0
+    assert "the certificate is valid" in capsys.readouterr().out
+    command = [sys.executable, "-I", check_certificate.__file__, str(certificate)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "optimal: no field has less" in done.stdout
+    arrays = check_certificate.read(str(certificate))
+    arrays["beta"] = arrays["beta"] + np.eye(1, len(arrays["beta"]), 2)[0] * 1e-3
+    wrong = tmp_path / "wrong.npz"
+    wrong.write_bytes(pack_arrays(arrays))
+    assert invoke(["prove", "--check", str(wrong)]) == 1
+    said = capsys.readouterr().err
+    assert "wrong.npz: is refused as a certificate: energy is claimed as" in said
+    assert said.count("\n") == 1
+
+
+def test_tightened_files_of_a_proof(folder, tmp_path):
+    folder, _ = folder
+    command = ["export", "mouse", "--size", "8", "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
+    assert invoke([*command, "--tightened", str(of(folder, "certificate.npz"))]) == 0
+    (manifest,) = tmp_path.glob("*.manifest.json")
+    windows = json.loads(manifest.read_text())["windows"]
+    assert windows["p_min"] == windows["p_max"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["prove", "mouse"],
+        ["prove", "-o", "somewhere"],
+        ["prove", "mouse", "--check", "it.npz"],
+        ["prove", "mouse", "-o", "somewhere", "--gap", "-1"],
+    ],
+)
+def test_wrong_usage(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert invoke(arguments) == 2
+    assert list(tmp_path.iterdir()) == []
