@@ -15,7 +15,7 @@ from typing import Any
 
 from ....models.errors import InputError, UnsupportedByFormatError
 from ....models.field.file import read_field
-from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.file import read_instance
 from ....models.instance.grid import Ints
@@ -28,6 +28,7 @@ from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, ranges, tangent_bound
+from ..ledger.certificates import METHOD
 from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
@@ -169,19 +170,22 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
     found = [_bound(record, task.name) for record in sorted(chosen.values(), key=lambda each: each.solver)]
     tangent = tangent_bound(best.problem, best.point)
     if tangent is not None:
-        found.append(_tangent(tangent))
+        found.append(_computed("tangent at the point", tangent))
+    certificate = task.about.get("certificate")
+    if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
+        found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
     return [each | {"bound": _within(each, best, task.name)} for each in found]
 
 
 def _within(told: dict[str, Any], best: Best, entry: str) -> float:
     """A bound, cut to the best point's objective. Raises InputError where the point contradicts it."""
-    bound = float(told["bound"])
+    bound, computed = float(told["bound"]), told["status"] == "computed"
     if contradicts(bound, best.objective):
         raise InputError(
             f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, "
             f"but {entry} has a feasible point of {best.objective!r}; "
-            "that bound is wrong, take its record out",
-            file=LEDGER,
+            f"that bound is wrong, {'build again without it' if computed else 'take its record out'}",
+            file=told.get("certificate", LEDGER),
         )
     return cut(bound, best.objective)
 
@@ -209,8 +213,8 @@ def _bound(record: Record, entry: str) -> dict[str, Any]:
     return {key: getattr(record, key) for key in told} | {"via": via}
 
 
-def _tangent(bound: float) -> dict[str, Any]:
-    mine = ours("tangent at the point")
+def _computed(method: str, bound: float) -> dict[str, Any]:
+    mine = ours(method)
     found = {"solver": mine.solver, "version": mine.version, "bound": bound, "status": "computed"}
     return found | {"seconds": None, "threads": None, "via": None}
 

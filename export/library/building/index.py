@@ -9,7 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
+from ....models.proof import check_certificate
 from ....models.storage import read_bytes, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
@@ -23,6 +24,7 @@ from ..plan.spec import RUNGS, Spec
 from .instance_task import about_file
 
 CHECKER: Final = "check_point.py"
+CERTIFICATES: Final = "check_certificate.py"
 SOLU: Final = "library.solu"
 SUMS: Final = "SHA256SUMS"
 TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
@@ -49,8 +51,10 @@ def general(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, bytes]:
     context = _context(spec, sidecars)
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
-    checker = read_bytes(Path(check_point.__file__))
-    return texts | drawings | {CHECKER: checker, SOLU: "".join(_solu(sidecars)).encode()}
+    checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
+    if context["certified"]:
+        checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
+    return texts | drawings | checkers | {SOLU: "".join(_solu(sidecars)).encode()}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -68,6 +72,8 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
         "kinds": {each["formulation"]: each for each in reversed(sidecars)},
         "formats": [entry for name, entry in FORMATS.items() if name in written],
         "packed": any(file["name"].endswith(".gz") for each in sidecars for file in each["files"]),
+        "certified": any("certificate" in bound for each in sidecars for bound in each["bounds"]),
+        "two_norm": [each for each in spec.formulations if FORMULATIONS[each].minimises == TWO_NORM],
         "example": sidecars[0],
     }
 

@@ -19,6 +19,7 @@ from ....models.instance.instance import Instance
 from ....models.search.box_qp import fitted
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, as_bytes
+from ..ledger.certificates import Certified, certified
 from ..ledger.points import Known, Provenance, baseline_field, least_energy, ours, searched_field
 from ..ledger.search_1norm import better_in_1norm
 from ..plan.recipe import InstanceRecipe, digest
@@ -73,7 +74,9 @@ def about_file(instance: str) -> str:
 def prepare(task: Preparation) -> Files:
     """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
-    chosen = _chosen(instance, task)
+    searched = searched_field(instance)
+    proven = certified(searched.field) if task.recipe.prove else None
+    chosen = _chosen(instance, task, [searched, *([proven.known] if proven else [])])
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(ROLES):
@@ -84,8 +87,18 @@ def prepare(task: Preparation) -> Files:
             files[name] = field_bytes(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    about = _about(instance, task, {role: fields[role] for role in ROLES}, files)
+    certificate = _certificate(proven, task, files)
+    about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
     return files | {about_file(task.name): as_bytes(about)}
+
+
+def _certificate(proven: Certified | None, task: Preparation, files: Files) -> dict[str, Any]:
+    """What is told of the certificate, which is among the files now; nothing where there is none."""
+    if proven is None:
+        return {}
+    name = f"{task.name}.certificate.npz"
+    files[name] = proven.data
+    return {"certificate": {"file": name, **proven.facts}}
 
 
 def field_bytes(field: CrossField) -> bytes:
@@ -94,15 +107,18 @@ def field_bytes(field: CrossField) -> bytes:
         return write_field(field, Path(folder) / "a.field.json").read_bytes()
 
 
-def _chosen(instance: Instance, task: Preparation) -> dict[str, Known]:
-    """The field of each role; not the ledger but the instance decides on the baseline, for `qp-fixed`."""
-    baseline, searched = baseline_field(instance), searched_field(instance)
-    found = better_in_1norm(searched.field, task.recipe.rung)
+def _chosen(instance: Instance, task: Preparation, low: list[Known]) -> dict[str, Known]:
+    """The field of each role; not the ledger but the instance decides on the baseline, for `qp-fixed`.
+
+    low: fields of low 2-norm energy, the searched one first.
+    """
+    baseline = baseline_field(instance)
+    found = better_in_1norm(low[0].field, task.recipe.rung)
     staged = [Known(fitted(each.field), ours("two stages")) for each in found]
     submitted = [each.known() for each in task.submitted]
     known = [
         baseline,
-        searched,
+        *low,
         *found,
         *staged,
         *(each for each in submitted if each.field.instance.sha256 == instance.sha256),

@@ -8,16 +8,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field
 from ....models.processes.progress import Progress, silent
+from ....models.proof import check_certificate
+from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
 from ..building.entry_task import Entry
-from ..building.index import CHECKER, SOLU, SUMS, TEXTS, general
+from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
 from ..building.instance_task import about_file
 from ..documents import check_point
@@ -142,13 +145,13 @@ class _Verification:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
-        ours = read_bytes(Path(check_point.__file__))
-        if (
-            CHECKER in self.present
-            and document["generator"] == generator()
-            and read_bytes(self.folder / CHECKER) != ours
-        ):
-            yield Finding(CHECKER, f"is not the checker of {generator()}")
+        yield from self._checker(CHECKER, check_point, library)
+
+    def _checker(self, name: str, ours: ModuleType, library: Library) -> Iterator[Finding]:
+        """A checker is that of the version which made the library."""
+        known = name in self.present and library.document["generator"] == generator()
+        if known and read_bytes(self.folder / name) != read_bytes(Path(str(ours.__file__))):
+            yield Finding(name, f"is not the checker of {generator()}")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
         """Ledger, instances, entries and library.solu."""
@@ -174,6 +177,8 @@ class _Verification:
             yield from wrong
             sound = sound and not wrong
         yield from self._instances(sidecars, inputs)
+        if CERTIFICATES in self.known:
+            yield from self._checker(CERTIFICATES, check_certificate, library)
         yield from self._solu(sidecars)
         if sound and len(sidecars) == len(names):
             yield from self._texts(library, sidecars)
@@ -206,7 +211,7 @@ class _Verification:
             made = general(library.spec, sidecars)
         except CrossfieldError:
             return  # told with the index
-        for name in sorted({*made} - {CHECKER, SOLU}):
+        for name in sorted({*made} - {CHECKER, CERTIFICATES, SOLU}):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")
 
@@ -266,6 +271,7 @@ class _Verification:
                 yield Finding(name, "is about another instance than the sidecars of its entries")
             elif not lost:
                 yield from self._fields(name, about)
+                yield from self._certificate(name, about)
                 yield from self._recipe(name, about, inputs)
 
     def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
@@ -295,6 +301,29 @@ class _Verification:
         for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
             if fields[role][energy] > min(facts[energy] for facts in fields.values()):
                 yield Finding(name, f"its field {role} is not the one of least energy")
+
+    def _certificate(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
+        """What is told of a certificate is what the checker computes from it, on this very instance."""
+        told = about.get("certificate")
+        if told is None:
+            return
+        self.known.add(CERTIFICATES)
+        if CERTIFICATES not in self.present:
+            yield Finding(CERTIFICATES, f"is missing, which checks {told['file']}", FETCH)
+        if told["file"] not in {each["name"] for each in about["files"]}:
+            yield Finding(name, f"names {told['file']} as its certificate and does not list it")
+            return
+        try:
+            found = read_certificate(self.folder / told["file"])
+        except CrossfieldError as error:
+            yield of_error(error, told["file"])
+            return
+        if found.field.instance.sha256 != about["instance"]["sha256"]:
+            yield Finding(told["file"], f"is not a certificate of {about['name']}")
+        elif (told["status"], told["bound"]) != (found.status, found.bound) or not close(
+            told["energy"], found.energy
+        ):
+            yield Finding(name, "tells another status, bound or energy of its certificate than it shows")
 
     def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
         """The field in a file that belongs to an instance, None when it does not."""

@@ -18,6 +18,7 @@ from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
 from ..building.entry_task import Entry, make_entry
 from ..building.instance_task import Files, Preparation, source_of
+from ..ledger.certificates import METHOD
 from ..ledger.points import Provenance, ours
 from .finding import Finding, close
 
@@ -119,4 +120,4 @@ def _is_of_a_build(found: Provenance) -> bool:
     return by_highs or found in map(ours, _METHODS)
 
 
-_METHODS: Final = ("greedy", "search", "two stages")
+_METHODS: Final = ("greedy", "search", "two stages", METHOD)

@@ -16,8 +16,8 @@ from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
+from ....models.proof.dual_start import search
 from ....models.search.greedy import greedy
-from ....models.search.search import search
 from ...formats.registry import generator
 
 _ROUNDS: Final = 8

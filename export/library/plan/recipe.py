@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from ....models.errors import InputError
-from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from .spec import Rung, Sketch, Spec
 
 LONGEST: Final = 32
@@ -21,7 +21,11 @@ LONGEST: Final = 32
 
 @dataclass(frozen=True)
 class InstanceRecipe:
-    """How an instance is made. sketch: with the drawing's bytes; seed: None unless the sketch is random."""
+    """How an instance is made. sketch: with the drawing's bytes; seed: None unless the sketch is random.
+
+    prove: whether its 2-norm optimum is to be proven, where the rung says so and a formulation asks for it;
+    not under the gauge `box`, where bounds are weak.
+    """
 
     name: str
     sketch: Sketch
@@ -29,6 +33,7 @@ class InstanceRecipe:
     size: int
     seed: int | None
     gauge: str
+    prove: bool = False
 
     def document(self) -> dict[str, Any]:
         """All that decides its content, as JSON."""
@@ -72,12 +77,13 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
 
     Raises InputError for a name that is too long.
     """
+    two_norm = any(FORMULATIONS[name].minimises == TWO_NORM for name in spec.formulations)
     found = tuple(
         InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
         for sketch in spec.sketches
         for rung in spec.rungs
         if rung.name in sketch.rungs
-        for recipe in _instances(sketch, rung)
+        for recipe in _instances(sketch, rung, prove=two_norm and rung.prove)
     )
     for entry in (entry for each in found for entry in each.entries):
         if len(entry.name) > LONGEST:
@@ -88,9 +94,17 @@ def plan(spec: Spec) -> tuple[InstancePlan, ...]:
     return found
 
 
-def _instances(sketch: Sketch, rung: Rung) -> list[InstanceRecipe]:
+def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecipe]:
     return [
-        InstanceRecipe(_instance_name(sketch.name, size, seed, gauge), sketch, rung.name, size, seed, gauge)
+        InstanceRecipe(
+            _instance_name(sketch.name, size, seed, gauge),
+            sketch,
+            rung.name,
+            size,
+            seed,
+            gauge,
+            prove=prove and gauge == "strokes",
+        )
         for size in sketch.sizes_on(rung)
         for seed in sketch.seeds
         for gauge in rung.gauges

@@ -13,6 +13,7 @@ Read from TOML and checked.
     sizes = [4]                        pixels on the longer side
     formats = ["nl", "mps"]            all by default
     compress = false                   .gz
+    prove = true                       certificates of 2-norm optima; by default on tiny and small
 
     [[sketches]]
     name = "bend"                      lower case and digits, part of every name
@@ -48,6 +49,8 @@ FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large")
 """The ladder: every solver in seconds; optimum proven; gap open; reading and presolve."""
+PROVEN: Final = ("tiny", "small")
+"""Rungs whose 2-norm optima are proven by default: most proofs take a second there."""
 Kind = Literal["sample", "file", "random"]
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -62,6 +65,7 @@ class Rung:
     compress: bool
     gauges: tuple[str, ...]
     facets: tuple[str, ...]
+    prove: bool
 
     def document(self) -> dict[str, Any]:
         """The rung as a table of a specification."""
@@ -71,6 +75,7 @@ class Rung:
             "compress": self.compress,
             "gauges": list(self.gauges),
             "facets": list(self.facets),
+            "prove": self.prove,
         }
 
 
@@ -274,7 +279,8 @@ def _check_known(word: str, known: Collection[str], place: str, kind: str = "") 
 def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]) -> Rung:
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
-    return Rung(name, _whole(table["sizes"]), compress=table.get("compress", False), **words)
+    compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
+    return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, **words)
 
 
 def _whole(numbers: list[float]) -> tuple[int, ...]:

@@ -816,6 +816,7 @@ def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(tmp_pat
     assert solve_library(folder, solvers=["highs"], time_limit=250.0) == []
 
 
+@pytest.mark.slow
 def test_every_format_of_the_table_can_be_asked_for(tmp_path):
     text = HEAD + 'formulations = ["miqp-exact"]\n[rungs.tiny]\nsizes = [3]\n' + GOOD_SKETCH
     library = build(read_spec(write_spec(tmp_path, text)), tmp_path / "all")

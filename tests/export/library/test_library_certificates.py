@@ -1,0 +1,136 @@
+"""Optima of a library by certificates: shipped, told of all equivalent entries, and never believed."""
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import crossfield as cf
+import pytest
+from crossfield.export.library.building.build import build
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.models.proof.certificate import read_certificate, write_certificate
+from forging import seal
+
+pytestmark = pytest.mark.usefixtures("short_searches")
+
+SPEC = """
+format = "crossfield-library-spec"
+version = 1
+title = "A test"
+formulations = ["miqp-exact", "minlp-cubic", "milp-mccormick", "qp-fixed"]
+
+[rungs.tiny]
+sizes = [3]
+formats = ["mps"]
+gauges = ["strokes", "box"]
+
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1, 2]
+"""
+STEM = "cf_rand_n003_s1"
+CERTIFICATE = f"{STEM}.certificate.npz"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A library of small instances under both gauges; not to be changed."""
+    folder = tmp_path_factory.mktemp("certified")
+    (folder / "spec.toml").write_text(SPEC)
+    return build(read_spec(folder / "spec.toml"), folder / "lib").folder
+
+
+@pytest.fixture
+def lib(built, tmp_path):
+    return shutil.copytree(built, tmp_path / "lib")
+
+
+def document(lib, name):
+    return json.loads((lib / f"{name}.json").read_text())
+
+
+def found(lib):
+    seal(lib)
+    return {finding.file: finding.what for finding in verify_library(lib)}
+
+
+def test_a_certificate_proves_all_entries_that_minimise_the_2_norm(built):
+    certificate = read_certificate(built / CERTIFICATE)
+    assert certificate.status == "optimal"
+    facts = (built / "library.solu").read_text()
+    for token in ("exact", "cubic"):
+        entry = document(built, f"{STEM}_{token}")
+        (bound,) = entry["bounds"]
+        assert (bound["bound"], bound["certificate"]) == (certificate.bound, CERTIFICATE)
+        assert entry["status"] == "optimal"
+        assert f"=opt= {STEM}_{token} " in facts
+    for other in (f"{STEM}_milp", f"{STEM}_qp", f"{STEM}_box_exact"):
+        assert not [each for each in document(built, other)["bounds"] if "certificate" in each]
+    assert verify_library(built) == []
+
+
+def test_it_lies_in_the_library_with_its_checksum_and_its_checker(built):
+    assert CERTIFICATE in (built / "SHA256SUMS").read_text()
+    assert CERTIFICATE in {each["name"] for each in document(built, f"{STEM}.about")["files"]}
+    command = [sys.executable, built / "check_certificate.py", built / CERTIFICATE]
+    assert subprocess.run(command, check=False, capture_output=True).returncode == 0
+    assert (built / CERTIFICATE).stat().st_size < 100_000
+
+
+def test_the_same_certificate_is_made_twice(built, tmp_path):
+    (tmp_path / "spec.toml").write_text(SPEC.replace("[1, 2]", "[1]"))
+    again = build(read_spec(tmp_path / "spec.toml"), tmp_path / "again").folder
+    assert (again / CERTIFICATE).read_bytes() == (built / CERTIFICATE).read_bytes()
+
+
+@pytest.mark.parametrize(
+    "key, value, words",
+    [
+        ("bound", 99.0, "tells another status, bound or energy of its certificate"),
+        ("status", "gap", "tells another status, bound or energy of its certificate"),
+        ("energy", 99.0, "tells another status, bound or energy of its certificate"),
+        ("file", "cf_rand_n003_s2.certificate.npz", "as its certificate and does not list it"),
+    ],
+)
+def test_a_forged_claim_is_found(lib, key, value, words):
+    about = document(lib, f"{STEM}.about")
+    about["certificate"][key] = value
+    (lib / f"{STEM}.about.json").write_text(json.dumps(about))
+    assert words in found(lib)[f"{STEM}.about.json"]
+
+
+def test_a_forged_certificate_is_found(lib):
+    """Of another instance, of a worse field that claims the same, and with bytes that were changed."""
+    good, name = (lib / CERTIFICATE).read_bytes(), f"{STEM}.about.json"
+    shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
+    assert found(lib)[CERTIFICATE] == f"is not a certificate of {STEM}"
+    worse = cf.greedy(cf.read_instance(lib / f"{STEM}.instance.json"))
+    proof = cf.prove(worse.instance, jobs=1)
+    weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
+    assert write_certificate(weak, lib / CERTIFICATE).status == "gap"
+    assert "tells another status, bound or energy" in found(lib)[name]
+    half = len(good) // 2
+    (lib / CERTIFICATE).write_bytes(good[:half] + bytes([good[half] ^ 1]) + good[half + 1 :])
+    assert CERTIFICATE in found(lib)
+
+
+def test_a_forged_or_missing_checker_is_found(lib):
+    (lib / "check_certificate.py").write_text("print('the certificate is valid')\n")
+    assert "is not the checker" in found(lib)["check_certificate.py"]
+    (lib / "check_certificate.py").unlink()
+    assert "is missing" in found(lib)["check_certificate.py"]
+
+
+def test_a_rung_may_do_without(tmp_path):
+    (tmp_path / "spec.toml").write_text(SPEC.replace("[3]", "[3]\nprove = false"))
+    assert not any(each.recipe.prove for each in plan(read_spec(tmp_path / "spec.toml")))
+    assert [each.recipe.name for each in plan(default_spec()) if each.recipe.prove] == [
+        each.recipe.name
+        for each in plan(default_spec())
+        if each.recipe.rung in {"tiny", "small"} and each.recipe.gauge == "strokes"
+    ]
