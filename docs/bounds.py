@@ -1,4 +1,4 @@
-"""Make docs/bounds.md, how far open solvers prove optima: `python docs/bounds.py` (some five minutes)."""
+"""Make docs/bounds.md, how far open MIP solvers prove optima: `python docs/bounds.py` (some five minutes)."""
 
 from __future__ import annotations
 
@@ -199,16 +199,20 @@ def in_short(closed: list[list[str]], means: list[list[str]]) -> str:
     )
 
 
-PAGE: Final = """# Proofs and lower bounds
+PAGE: Final = """# What MIP solvers do
 
 {said}
 
 {short}
 
+This page is a part of [proven optima](proofs.md): the bounds of `crossfield prove` close far larger
+problems, and what solvers prove of files that are [tightened by
+them](proofs.md#what-mip-solvers-prove) stands there.
+
 Random directions on two pixels in five of a full grid, {seconds:g} s each in the first table. What is proven
 with other solvers, and how the search compares, stands in [fields.md](fields.md#against-proven-optima);
-bounds of all entries of the instance library in its sidecars. Beyond these sizes the best bounds known are
-those of the relaxation, which say next to nothing.
+bounds of all entries of the instance library in its sidecars. Beyond these sizes the bounds that these
+solvers give are those of the relaxation, which say next to nothing.
 
 ## How far open solvers get
 

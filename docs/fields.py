@@ -139,26 +139,31 @@ COLUMNS: Final = (
 def solved(
     sketch: Sketch, size: int, method: str, seconds: float, folder: Path, *options: str
 ) -> dict[str, Any]:
-    """The facts of `crossfield solve --method`, and `memory`: bytes that its processes took at most.
+    """The facts of `crossfield solve --method`, as `answered` has them."""
+    command = [
+        *("solve", *sketch.arguments, "--size", str(size), "--method", method),
+        *("--time-limit", str(seconds), "--json", "-o", str(folder), *options),
+    ]
+    return answered(command, folder, sketch.name)
 
-    In the folder they stay, with the field, and are read from there the next time.
+
+def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
+    """What a command of crossfield says as JSON, and `memory`: bytes that its processes took at most.
+
+    In the folder it stays, with the files of the command, and is read from there the next time.
     """
     kept = folder / "facts.json"
     if kept.exists():
         return dict(json.loads(kept.read_text()))
-    command = [
-        *(sys.executable, "-m", "crossfield", "solve", *sketch.arguments),
-        *("--size", str(size), "--method", method, "--time-limit", str(seconds), "--json", "-o", str(folder)),
-        *options,
-    ]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    whole = [sys.executable, "-m", "crossfield", *command]
+    with subprocess.Popen(whole, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         most = 0
         while process.poll() is None:
             most = max(most, memory_of(process.pid))
             time.sleep(0.25)
         answer = process.communicate()[0]
     if process.returncode:
-        raise SystemExit(f"{sketch.name}: exit code {process.returncode}")
+        raise SystemExit(f"{name}: exit code {process.returncode}")
     facts = dict(json.loads(answer)) | {"memory": most}
     kept.write_text(json.dumps(facts, indent=1) + "\n")
     return facts
@@ -326,14 +331,16 @@ def proofs() -> str:
     )
 
 
-def optimum(instance: Instance, start: CrossField) -> tuple[Check | None, float | None]:
+def optimum(
+    instance: Instance, start: CrossField, provers: tuple[str, ...] = PROVERS
+) -> tuple[Check | None, float | None]:
     """The check of the first prover that closes `miqp-exact`, or None;
     and the best dual bound of all that were asked.
     """
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
-        write_all(instance, folder, ["miqp-exact"], ["mps"], start=start)
-        for prover in PROVERS:
+        write_all(instance, folder, ["miqp-exact"], ["mps", "nl"], start=start)
+        for prover in provers:
             for check in verify(folder, seconds=PROOF_SECONDS, programs=[prover]).checks:
                 if check.step == "solve" and check.proven:
                     return check, check.bound

@@ -1,0 +1,151 @@
+"""The pictures of docs/proofs.md: what every level of a proof leaves of the crosses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+import numpy as np
+from crossfield.models.instance.grid import Bools, Floats, Grid
+from crossfield.models.instance.instance import HALF
+from crossfield.models.proof.lattice import offsets, starts
+from crossfield.models.proof.record import LevelRecord, Proof
+from diagrams import STYLE, U, V
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+STRIP: Final = HALF**2
+"""Area of all crosses, in radians squared."""
+COLOURS: Final = "viridis"
+CELL: Final = "#2a788e"
+BACKGROUND: Final = "#f0f0f0"
+COLUMNS: Final = 4
+SHOWN: Final = 6  # levels whose cells are drawn for single pixels
+
+
+def cells(level: LevelRecord, pixel: int) -> Bools:
+    """The cells of a pixel with four allowed vertices, (alpha, beta)."""
+    begin = starts(level.alpha_count.astype(np.int64) * level.beta_count)
+    shape = (level.alpha_count[pixel], level.beta_count[pixel])
+    found: Bools = level.allowed[begin[pixel] : begin[pixel + 1]].reshape(shape)
+    return found[:-1, :-1] & found[1:, :-1] & found[:-1, 1:] & found[1:, 1:]
+
+
+def shares(level: LevelRecord) -> Floats:
+    """The part of the strip in which a better cross of each pixel may lie, shape (n,)."""
+    counts = [cells(level, pixel).sum() for pixel in range(len(level.alpha))]
+    return np.minimum(np.array(counts) * level.h**2 / STRIP, 1.0)
+
+
+def of_boxes(boxes: Floats) -> Floats:
+    """The part of the strip in the boxes (n, 4) that a certificate leaves."""
+    return (boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]) / STRIP
+
+
+def maps(proof: Proof, boxes: Floats, path: Path) -> None:
+    """For every level, and after the last, how much is left at every pixel; one colour scale."""
+    levels = proof.levels
+    values = [*map(shares, levels), of_boxes(boxes)]
+    titles = [
+        f"level {number}, {np.degrees(level.h):.2g}° apart\n"
+        f"{np.count_nonzero(level.allowed):,} labels, bound {level.bound:.4f}"
+        for number, level in enumerate(levels, start=1)
+    ]
+    titles.append(f"after the last level\nbound {proof.bound:.4f} = energy")
+    rows = -(-len(values) // COLUMNS)
+    norm = LogNorm(10.0 ** np.floor(np.log10(values[-1].min())), 1.0)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(11.5, 2.75 * rows + 0.2), layout="constrained")
+        axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for place, (each, title) in zip(axes, zip(values, titles, strict=True), strict=False):
+            shown = _map(place, proof.field.instance.grid, each, norm)
+            place.set_title(title, fontsize=10)
+        for place in axes[len(values) :]:
+            place.set_axis_off()
+        if len(values) < len(axes):
+            _gaps(axes[len(values)], proof)
+        _strokes(axes[0], proof)
+        bar = figure.colorbar(shown, ax=axes, aspect=35, pad=0.02)
+        bar.set_label("part of the strip of crosses that is left")
+        figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def _gaps(place: Any, proof: Proof) -> None:
+    """How far the bound of every level is from the energy."""
+    gaps = [100 * (proof.energy - level.bound) / proof.energy for level in proof.levels]
+    numbers = range(1, len(gaps) + 1)
+    place.set_axis_on()
+    place.semilogy(numbers, gaps, "o-", color=CELL, markersize=4)
+    for number, gap in zip(numbers, gaps, strict=True):
+        place.annotate(f"{gap:.2g} %", (number, gap), (4, 4), textcoords="offset points", fontsize=8)
+    place.set_title("energy less bound of each level", fontsize=10)
+    place.set_xlabel("level", fontsize=9)
+    place.set(xticks=list(numbers), xlim=(0.6, len(gaps) + 1.1), yticks=[])
+    place.minorticks_off()
+    place.spines[["top", "right", "left"]].set_visible(False)
+
+
+def _map(place: Any, grid: Grid, values: Floats, norm: LogNorm) -> Any:
+    picture = np.full((grid.height, grid.width), np.nan)
+    picture[grid.rows, grid.columns] = values
+    place.set_axis_off()
+    return place.imshow(picture, norm=norm, cmap=COLOURS, interpolation="nearest")
+
+
+def _strokes(place: Any, proof: Proof) -> None:
+    """Mark the pixels with strokes."""
+    instance = proof.field.instance
+    at = instance.stroke_index
+    place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=V, markersize=1.8)
+
+
+def strips(proof: Proof, path: Path) -> list[int]:
+    """Draw the cells that are left, level by level, of a pixel with a stroke and of the last one to hold out;
+    these pixels.
+    """
+    levels, instance = proof.levels[:SHOWN], proof.field.instance
+    late = shares(levels[2])
+    drawn = instance.stroke_index
+    pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))
+    names = ("on a stroke", "the one that\nholds out longest")
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.0 * len(levels) + 0.7, 4.5), layout="constrained")
+        axes = figure.subplots(2, len(levels), squeeze=False)
+        for row, (pixel, name) in enumerate(zip(pixels, names, strict=True)):
+            for place, level in zip(axes[row], levels, strict=True):
+                _strip(place, level, pixel, proof)
+            where = f"pixel {instance.grid.rows[pixel]}, {instance.grid.columns[pixel]}"
+            axes[row, 0].set_ylabel(f"{where}, {name}\n\nbeta, degrees", fontsize=10)
+        for place, (number, level) in zip(axes[0], enumerate(levels, start=1), strict=True):
+            place.set_title(f"level {number}: {np.degrees(level.h):.2g}° apart", fontsize=10)
+        for place in axes[1]:
+            place.set_xlabel("alpha, degrees", fontsize=9)
+        figure.savefig(path, dpi=110, metadata={"Software": None})
+    return list(pixels)
+
+
+def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
+    """One pixel's strip, the cells that are left of it, and the cross of the field."""
+    offset = offsets(proof.field.instance.grid)[pixel]
+    alpha, beta = (
+        np.degrees(centre[pixel] + level.h * (first[pixel] + np.arange(count[pixel]) + offset))
+        for centre, first, count in (
+            (level.alpha, level.alpha_first, level.alpha_count),
+            (level.beta, level.beta_first, level.beta_count),
+        )
+    )
+    centre = np.degrees(level.alpha[pixel])
+    place.set_facecolor(BACKGROUND)
+    found = np.where(cells(level, pixel), 1.0, np.nan).T
+    place.pcolormesh(alpha, beta, found, cmap=mpl.colors.ListedColormap([CELL]))
+    place.axvline(centre, color=U, linewidth=0.6)
+    place.axhline(np.degrees(level.beta[pixel]), color=U, linewidth=0.6)
+    left = centre - 45 + np.degrees(proof.levels[0].h) * offset
+    place.set(xlim=(left, left + 90), ylim=(-45, 45), aspect="equal")
+    place.set_yticks([-45, 0, 45])
+    place.tick_params(labelsize=8)
+    share = min(1.0, cells(level, pixel).sum() * level.h**2 / STRIP)
+    words = f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+    place.text(0.05, 0.05, words, transform=place.transAxes, fontsize=9, bbox=box)

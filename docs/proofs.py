@@ -1,0 +1,446 @@
+"""Make docs/proofs.md, the fields that are proven optimal, from docs/proofs.json: `python docs/proofs.py`.
+
+    python docs/proofs.py [--measure PART ...] [--names NAME ...] [--seconds S] [--sketches FOLDER]
+                          [--work FOLDER]
+
+With --measure, parts are measured first, and their rows in docs/proofs.json replaced: `samples` (size 24),
+`fine` (size 48), `sketches` (drawings of a folder, size 24), `optima` (small instances beside other solvers),
+`solvers` (MIP solvers, cold and tightened), `settings` (of MIP solvers) and `pictures`. --names takes some of
+a part, --seconds replaces its time limit. With --work, fields and certificates stay in that folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import crossfield as cf
+import proof_pictures
+import proof_solvers
+from crossfield.export.solvers_table import SOLVERS
+from crossfield.models.proof import check_certificate
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.prove import prove
+from crossfield.models.sketch.samples import SAMPLES
+from fields import PROVERS, Sketch, answered, optimum, sketches, tiny
+from make import markdown, said
+from proof_text import PROOF
+
+DOCS: Final = Path(__file__).resolve().parent
+KEPT: Final = DOCS / "proofs.json"
+SIZE: Final = 24
+FINE: Final = 48
+AGREE: Final = 1e-6
+"""Difference of equal optima, relative to 1 or the optimum if that is more."""
+WITHIN: Final = 1e-5
+"""By how much a solver may be off for its tolerances."""
+PICTURED: Final = "mouse"
+MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
+TRIED: Final = 4  # random instances for settings
+SECONDS: Final = {
+    "samples": 120.0, "fine": 600.0, "sketches": 120.0, "optima": 60.0, "solvers": 60.0, "settings": 30.0,
+    "pictures": 120.0,
+}  # fmt: skip
+Facts = dict[str, Any]
+Kept = dict[str, dict[str, Facts]]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line asks for: which of a part, how long, and where files go."""
+
+    names: tuple[str, ...]
+    seconds: float
+    sketches: Path | None
+    work: Path
+
+    def wants(self, name: str) -> bool:
+        """Whether that one is to be measured."""
+        return not self.names or name in self.names
+
+
+def proven(sketch: Sketch, size: int, asked: Asked) -> Facts:
+    """What `crossfield prove` says of a sketch, the size of its certificate, and the seconds of its check."""
+    folder = asked.work / f"{sketch.name}_{size}_proof"
+    command = [
+        *("prove", *sketch.arguments, "--size", str(size), "--time-limit", str(asked.seconds)),
+        *("--json", "-o", str(folder)),
+    ]
+    facts = answered(command, folder, sketch.name)
+    (certificate,) = folder.glob("*.certificate.npz")
+    begin = time.perf_counter()
+    check = [sys.executable, str(check_certificate.__file__), str(certificate)]
+    subprocess.run(check, check=True, stdout=subprocess.DEVNULL)
+    taken = ("energy", "bound", "gap", "status", "seconds", "ended", "memory", "forced_jumps", "pairs")
+    return {name: facts[name] for name in taken} | {
+        "pixels": sketch.instance(size).grid.size,
+        "labels": max(level["labels"] for level in facts["levels"]),
+        "levels": len(facts["levels"]),
+        "bytes": certificate.stat().st_size,
+        "check": time.perf_counter() - begin,
+        "limit": asked.seconds,
+    }
+
+
+def samples(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """The samples at size 24."""
+    return ((name, proven(Sketch(name, name), SIZE, asked)) for name in SAMPLES if asked.wants(name))
+
+
+def fine(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """The samples at size 48."""
+    return ((name, proven(Sketch(name, name), FINE, asked)) for name in SAMPLES if asked.wants(name))
+
+
+def drawings(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """The drawings of a folder at size 24."""
+    for sketch in sketches(asked.sketches):
+        if sketch.name not in SAMPLES and asked.wants(sketch.name):
+            yield sketch.name, proven(sketch, SIZE, asked)
+
+
+def optima(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """Small instances beside the optimum that another solver proves."""
+    for instance in tiny():
+        if not asked.wants(instance.name):
+            continue
+        proof = prove(instance, seconds=asked.seconds)
+        best, _ = optimum(instance, proof.field, (*PROVERS, "casadi"))
+        yield instance.name, {
+            "grid": f"{instance.grid.width} x {instance.grid.height}",
+            "energy": proof.energy, "bound": proof.bound, "status": proof.status, "seconds": proof.seconds,
+            "other": best.objective if best else None, "by": best.program if best else None,
+            "other_seconds": best.seconds if best else None,
+        }  # fmt: skip
+
+
+def solvers(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """What MIP solvers prove of some samples, from files as they are and tightened."""
+    for name in MIP_SAMPLES:
+        if asked.wants(name):
+            for row in proof_solvers.both(name, SIZE, asked.seconds, SECONDS["samples"]):
+                yield f"{name} {row['solver']}", row
+
+
+def settings(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """How other settings of MIP solvers fare than the default."""
+    chosen = [instance for instance in tiny() if instance.name.startswith("random")][:TRIED]
+    return proof_solvers.settings(chosen, asked.seconds)
+
+
+def pictures(asked: Asked) -> Iterator[tuple[str, Facts]]:
+    """The pictures of what every level leaves of the crosses."""
+    proof = prove(cf.sample(PICTURED, SIZE), seconds=asked.seconds)
+    certificate = write_certificate(proof, asked.work / f"{PICTURED}.certificate.npz")
+    proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
+    pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")
+    yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
+
+
+PARTS: Final[dict[str, Callable[[Asked], Iterator[tuple[str, Facts]]]]] = {
+    "samples": samples,
+    "fine": fine,
+    "sketches": drawings,
+    "optima": optima,
+    "solvers": solvers,
+    "settings": settings,
+    "pictures": pictures,
+}
+
+
+def machine() -> Facts:
+    """Where something was measured: processor, cores and load."""
+    info = Path("/proc/cpuinfo")
+    model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
+    return {
+        "processor": model[1] if model else platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "load": os.getloadavg()[0],
+    }
+
+
+def measure(part: str, asked: Asked) -> None:
+    """Put the rows of a part into docs/proofs.json as they come."""
+    for name, facts in PARTS[part](asked):
+        kept = read()
+        kept.setdefault(part, {})[name] = facts | {"machine": machine()}
+        print(part, name, facts, file=sys.stderr, flush=True)
+        KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n")
+
+
+def read() -> Kept:
+    """What was measured."""
+    return dict(json.loads(KEPT.read_text())) if KEPT.exists() else {}
+
+
+PROOF_COLUMNS: Final = (
+    "sketch", "pixels", "energy", "bound", "gap", "", "forced jumps", "levels", "labels at most", "s",
+    "certificate, MB", "check, s", "GB",
+)  # fmt: skip
+
+
+ENDS: Final = {
+    "time": "open: out of time",
+    "labels": "open: too many labels",
+    "interrupted": "open: interrupted",
+    "gap": "open: gap asked for",
+}
+"""Why a proof has ended, when it is not with an optimum."""
+
+
+def proof_table(rows: dict[str, Facts]) -> str:
+    """Energy, bound and effort of proofs, in the order of the samples."""
+    order = sorted(rows, key=lambda name: (list(SAMPLES).index(name) if name in SAMPLES else 99, name))
+    cells = []
+    for name in order:
+        row = rows[name]
+        cells.append(
+            [
+                name,
+                str(row["pixels"]),
+                f"{row['energy']:.6f}",
+                f"{row['bound']:.6f}",
+                percent(row["gap"]) if row["status"] == "gap" else "0",
+                "**optimal**" if row["status"] == "optimal" else ENDS[row["ended"]],
+                f"{row['forced_jumps']} of {row['pairs']}",
+                str(row["levels"]),
+                f"{row['labels']:,}",
+                f"{row['seconds']:.1f}",
+                f"{row['bytes'] / 1e6:.1f}",
+                f"{row['check']:.1f}",
+                f"{row['memory'] / 1e9:.2f}",
+            ]
+        )
+    return markdown(PROOF_COLUMNS, cells)
+
+
+def percent(share: float) -> str:
+    """A share in percent, two digits."""
+    return f"{100 * share:.2g} %"
+
+
+def optima_table(rows: dict[str, Facts]) -> str:
+    """Proven optima here and elsewhere."""
+    cells = [
+        [
+            name,
+            row["grid"],
+            f"{row['energy']:.9f}",
+            f"{row['bound']:.9f}",
+            row["status"],
+            f"{row['seconds']:.1f}",
+            f"{row['other']:.9f}" if row["other"] is not None else "none in the time",
+            f"{titled(row['by'])}, {row['other_seconds']:.1f} s" if row["by"] else "",
+            f"{difference(row):.0e}" if row["other"] is not None else "",
+        ]
+        for name, row in rows.items()
+    ]
+    columns = ("instance", "grid", "energy", "bound", "", "s", "optimum of another solver", "by", "apart")
+    return markdown(columns, sorted(cells, key=lambda row: (row[0].startswith("random"), row[0])))
+
+
+def titled(solver: str) -> str:
+    """The title of a solver."""
+    return SOLVERS[solver].title
+
+
+def difference(row: Facts) -> float:
+    """How far both optima are apart, relative to 1 or the optimum if that is more."""
+    return float(abs(row["energy"] - row["other"]) / max(1.0, row["other"]))
+
+
+def solvers_table(rows: dict[str, Facts]) -> str:
+    """What MIP solvers prove."""
+    cells = [
+        [
+            titled(row["solver"]),
+            f"`{row['formulation']}`",
+            row["name"],
+            f"{row['width']} x {row['height']}",
+            f"{row['free_jumps']} of {row['pairs']}",
+            *told(row, "cold"),
+            *told(row, "tightened"),
+            f"{row['energy']:.5f}" if row["formulation"] == "miqp-exact" else "",
+        ]
+        for row in sorted(rows.values(), key=lambda row: (row["formulation"], row["solver"], row["name"]))
+    ]
+    columns = (
+        "solver", "formulation", "sample", "grid", "jumps left", "cold: best", "bound", "s",
+        "tightened: best", "bound", "s", "proven here",
+    )  # fmt: skip
+    return markdown(columns, cells)
+
+
+def told(row: Facts, what: str) -> list[str]:
+    """The best point, the bound and the seconds of a solver."""
+    answer = row[what]
+    best, bound = (
+        "none" if answer[name] is None else f"{round(answer[name], 5) + 0.0:.5f}"
+        for name in ("objective", "bound")
+    )
+    return [best, f"**{bound}**" if answer["proven"] else bound, f"{answer['seconds']:.1f}"]
+
+
+def settings_table(rows: dict[str, Facts]) -> str:
+    """Proofs and mean seconds of every setting."""
+    cells = [
+        [
+            titled(row["solver"]),
+            f"`{row['formulation']}`",
+            row["setting"],
+            f"{row['proven']} of {row['instances']}",
+            f"{row['mean']:.1f}",
+        ]
+        for row in rows.values()
+    ]
+    return markdown(("solver", "formulation", "settings", "proven", "s, mean"), cells)
+
+
+def in_short(kept: Kept) -> str:
+    """What the proofs reach, whether other solvers agree, and what those reach by themselves."""
+    rows, small, mip = kept["samples"], kept["optima"], kept["solvers"]
+    closed = [row for row in rows.values() if row["status"] == "optimal"]
+    open_gaps = ", ".join(
+        f"{name}, with a gap of {percent(row['gap'])}"
+        for name, row in rows.items()
+        if row["status"] != "optimal"
+    )
+    rest = f"; open is {open_gaps}" if open_gaps else ""
+    known = [row for row in small.values() if row["other"] is not None]
+    same = sum(difference(row) <= AGREE and row["status"] == "optimal" for row in known)
+    exact = [row for row in mip.values() if row["formulation"] == "miqp-exact"]
+    large = [row for row in mip.values() if row["solver"] in {"highs", "scip"}]
+    cold = sum(row["cold"]["proven"] for row in large)
+    narrow = sum(row["tightened"]["proven"] for row in large)
+    seconds = max(row["seconds"] for row in exact)
+    return (
+        f"Of the fields of {len(rows)} samples at {SIZE} pixels {len(closed)} are proven to be of least "
+        f"energy, each within {max(row['seconds'] for row in closed):.0f} s{rest}. "
+        f"In {same} of the {len(known)} small instances whose optimum another solver proves, both optima "
+        f"are the same to {AGREE:g}. "
+        f"From the files as they are, HiGHS and SCIP close {cold} of {len(large)} at this size in "
+        f"{seconds:g} s, and {narrow} of {len(large)} with the windows that proofs leave."
+    )
+
+
+def where(rows: dict[str, Facts]) -> str:
+    """On what rows were measured."""
+    machines = [row["machine"] for row in rows.values()]
+    first, loads = machines[0], [each["load"] for each in machines]
+    return (
+        f"{first['processor']}, {first['cores']} cores, Python {first['python']}, 2 threads; load average "
+        f"while measuring {min(loads):.1f} to {max(loads):.1f}: where it is above the number of cores, other "
+        "programs had a part of them, and the seconds are too many."
+    )
+
+
+def page(kept: Kept) -> str:
+    """The text of docs/proofs.md."""
+    parts = ["# Proven optima", said("python docs/proofs.py"), in_short(kept), OPENING, PROOF, PICTURES]
+    parts += ["## Samples at 24", SAMPLES_TEXT, where(kept["samples"]), proof_table(kept["samples"])]
+    parts += ["## Beside other solvers", OPTIMA_TEXT, optima_table(kept["optima"])]
+    if "sketches" in kept:
+        parts += ["## Drawings", DRAWINGS_TEXT, where(kept["sketches"]), proof_table(kept["sketches"])]
+    if "fine" in kept:
+        limit = max(row["limit"] for row in kept["fine"].values())
+        parts += ["## Samples at 48", f"At most {limit:g} s each. {where(kept['fine'])}"]
+        parts += [proof_table(kept["fine"])]
+    mip = kept["solvers"]
+    parts += ["## What MIP solvers prove", SOLVERS_TEXT, where(mip), solvers_table(mip)]
+    if "settings" in kept:
+        parts += ["### Settings", SETTINGS_TEXT, settings_table(kept["settings"])]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+OPENING: Final = """
+`crossfield prove` finds a field, a lower bound of the 2-norm energy of all fields, and leaves a
+[certificate](files.md#certificates), which a checker of one file confirms without any code of the prover.
+All rows below come from it. Rows are kept in `proofs.json` beside this page; `python docs/proofs.py --measure
+samples` measures those of a part again, `python docs/proofs.py --help` lists the parts.
+[What MIP solvers do without it](bounds.md) has a page of its own.
+"""
+
+PICTURES: Final = """
+## How the crosses that are left become fewer
+
+`mouse`, size 24. At every pixel the part of all crosses among which that of a better field may still be, on
+one logarithmic scale for all levels. Dots are pixels with strokes. The gaps of the levels have a logarithmic
+scale as well.
+
+![The part of the strip that is left at every pixel, level by level](pictures/proof_levels.png)
+
+The strips of two pixels: the cells that are left (filled), and the cross of the best field (where the red
+lines meet). The left and the right side of a strip are the same crosses, upside down. A level halves the
+distance of labels and drops the cells that cannot be part of a better field.
+
+![The cells that are left of two pixels, level by level](pictures/proof_strips.png)
+"""
+
+SAMPLES_TEXT: Final = """
+`crossfield prove NAME --size 24 -o DIR`, the search for the field included. *Labels at most*: of the largest
+level, over all pixels. *Forced jumps*: pairs at which every better field would have the jumps of this one.
+*Check*: `python check_certificate.py FILE`, its start included. GB: memory of all processes together.
+*Too many labels*: the next level would have more than five million.
+"""
+
+OPTIMA_TEXT: Final = """
+The smallest instances of the samples, and random directions on half of 5 x 5 pixels (seeds 0 to 7). The other
+solver proves the optimum of `miqp-exact` from its written file: the free edition of Gurobi, else that of
+CPLEX, else Bonmin, 60 s each. *Apart* is relative to 1, or to the optimum if that is more.
+"""
+
+DRAWINGS_TEXT: Final = """
+Line drawings by others, size 24, as in [how good the fields are](fields.md): `NAME.png` with its mask where
+`NAME_mask.png` lies beside it. `--sketches FOLDER` names the folder in which they are.
+"""
+
+SOLVERS_TEXT: Final = f"""
+{SECONDS["solvers"]:g} s each, one after the other, without a starting point. *Cold* is the file of
+`crossfield export`, *tightened* that of `crossfield export --tightened CERTIFICATE`: the same problem with
+the windows of alpha and beta and the ranges of the jumps that the certificate leaves to fields of its energy
+or less. *Jumps left* have more than one value in them. A bold bound is a proof. Gurobi and CPLEX are free
+editions (200 columns where a term is quadratic; 1000 columns and rows), so that they get the largest size
+below 24 that these take.
+
+`miqp-exact` is the problem of this page; its optimum lies in the windows, so that a bound of the tightened
+file is one of all fields. `milp-mccormick` minimises the 1-norm: its optimum need not lie in windows that
+hold all fields of low 2-norm energy, and the tightened file asks for the best 1-norm in them. Where all jumps
+are forced, what is left of the MILP is an LP, and that of the MIQP a convex QP.
+"""
+
+SETTINGS_TEXT: Final = f"""
+{SECONDS["settings"]:g} s each, on small instances with random directions: where other settings than the
+default help. Means are geometric, shifted by 1 s, runs that met the limit counted as they stand.
+"""
+
+
+def main() -> None:
+    """Measure what is asked for, and write the page."""
+    parser = argparse.ArgumentParser(description="Measure proofs and write docs/proofs.md.")
+    parser.add_argument("--measure", nargs="*", choices=PARTS, default=[], help="Parts to measure first.")
+    parser.add_argument("--names", nargs="*", default=[], help="Only these of a part.")
+    parser.add_argument("--seconds", type=float, help="Time limit of each proof or solve.")
+    parser.add_argument("--sketches", type=Path, help="Folder with drawings: .svg, .png, .scap.")
+    parser.add_argument("--work", type=Path, help="Folder for what is done; to go on there later.")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        for part in given.measure:
+            seconds = given.seconds or SECONDS[part]
+            measure(part, Asked(tuple(given.names), seconds, given.sketches, given.work or Path(name)))
+    (DOCS / "proofs.md").write_text(page(read()))
+
+
+if __name__ == "__main__":
+    main()

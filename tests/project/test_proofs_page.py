@@ -1,0 +1,40 @@
+"""The page of proofs is what its command makes of the rows that were measured, and these agree with it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+DOCS = next(path for path in Path(__file__).resolve().parents if (path / "pyproject.toml").exists()) / "docs"
+
+
+@pytest.fixture(scope="module")
+def proofs():
+    """The program that makes the page."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        return import_module("proofs")
+
+
+def test_the_page_is_made_from_the_rows_beside_it(proofs):
+    assert (DOCS / "proofs.md").read_text() == proofs.page(proofs.read())
+
+
+def test_no_bound_is_above_an_energy_and_every_optimum_is_that_of_other_solvers(proofs):
+    kept = proofs.read()
+    for part in ("samples", "fine", "sketches", "optima"):
+        for name, row in kept.get(part, {}).items():
+            assert row["bound"] <= row["energy"] * (1 + 1e-12), (part, name)
+    known = {name: row for name, row in kept["optima"].items() if row["other"] is not None}
+    assert len(known) >= 8
+    assert {name for name, row in known.items() if proofs.difference(row) > proofs.AGREE} == set()
+
+
+def test_no_solver_contradicts_what_is_proven(proofs):
+    for name, row in proofs.read()["solvers"].items():
+        for what in ("cold", "tightened") if row["formulation"] == "miqp-exact" else ():
+            found, bound = row[what]["objective"], row[what]["bound"]
+            assert found is None or found >= row["proof"] - proofs.WITHIN, (name, what)
+            assert bound is None or bound <= row["energy"] + proofs.WITHIN, (name, what)
