@@ -614,6 +614,7 @@ def test_damaged_files_are_refused_or_read(path, damages):
     [b"\n", b" ", b"1 ", b"a\n", b"*** ", b'"', b"[", b"<a>", b"<a ", b",", b"c\n", b"# \n", b"\0", b"-"],
 )
 @for_each("head", HEADS)
+@pytest.mark.slow
 def test_long_repetitions_take_linear_time(head, part):
     """Milliseconds; looking back from every character would not end within the time of a test."""
     attempt(head + part * (LONG // len(part)))

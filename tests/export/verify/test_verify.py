@@ -113,6 +113,7 @@ def test_optima_agree(verified: Callable[[str], Verification], solver: str, inst
         assert all(same(check.objective, other.objective) for other in others)
 
 
+@pytest.mark.slow
 def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
     write_all(on_grid(1, 2), tmp_path, PROVEN, start=make_field(on_grid(1, 2)))
@@ -146,6 +147,7 @@ def test_options_and_packed_files(tmp_path: Path):
     assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_lonely_columns(tmp_path: Path):
     """A pixel without stroke and neighbour: its alpha stands in no term."""
@@ -204,6 +206,7 @@ def forge(manifest: Path, path: Path, data: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", WRONG)
+@pytest.mark.slow
 def test_a_wrong_file_is_noticed_by_every_program(spoiled: Verification, name: str):
     formulation, kind, *_ = WRONG[name]
     found = {f.program: f for f in spoiled.checks if f.problem == f"{name} {formulation}"}

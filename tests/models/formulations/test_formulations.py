@@ -219,6 +219,7 @@ def optimum(instance, name="milp-mccormick", **options):
 
 
 @pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.slow
 def test_optimum_does_not_depend_on_the_axes(seed):
     instance = sketch(seed=seed)
     best = optimum(instance)

@@ -169,6 +169,7 @@ def test_a_start_on_another_instance_is_refused():
             cf.search(other, rounds=0, jobs=1, start=start)
 
 
+@pytest.mark.slow
 def test_search_gets_below_the_greedy_field():
     instance = cf.sample("mouse", 24)
     found = cf.search(instance, rounds=4)
@@ -196,6 +197,7 @@ def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     assert [rounds for rounds, _ in seen] == [1, 2]
 
 
+@pytest.mark.slow
 def test_search_ends_by_itself_when_nothing_is_found():
     found = cf.search(cf.sample("skew", 5))
     assert found.ended == "patience"
