@@ -35,7 +35,13 @@ def prove_command(
     gauge: GaugeName = None,
     start: Start = None,
     time_limit: Annotated[
-        float, typer.Option("--time-limit", min=0.1, metavar="SECONDS", help="Seconds in all.")
+        float,
+        typer.Option(
+            "--time-limit",
+            min=0.1,
+            metavar="SECONDS",
+            help="Seconds for the proof; its certificate is written and checked after them.",
+        ),
     ] = 60.0,
     gap: Annotated[
         float,

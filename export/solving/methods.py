@@ -29,6 +29,7 @@ from .two_stage import find_jumps, fit_angles, jumps_until
 if TYPE_CHECKING:
     from ...models.proof.record import Proof
 
+_PROVING: Final = 0.6  # share of the seconds for a proof; in the rest its certificate is written and checked
 _STARTING: Final = 0.5  # share of the seconds that the field may take from which patches start
 
 
@@ -192,14 +193,14 @@ def _teller(request: Request, deadline: Deadline, method: str, things: str) -> C
 
 
 def _prove(request: Request) -> Iterator[Candidate]:
+    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds).share(_PROVING)
     from ...models.proof.prove import prove  # it loads what is compiled
 
-    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
     request.progress("prove: starting fields")
     proof = prove(
         request.instance,
         start=request.start,
-        seconds=request.limits.seconds,
+        seconds=request.limits.until(deadline).seconds,
         gap=request.limits.gap,
         jobs=_processes(request),
         progress=lambda bound, energy, labels: request.progress(

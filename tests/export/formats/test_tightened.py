@@ -115,10 +115,10 @@ def test_headers_and_manifests_say_where_they_come_from(proof, tmp_path):
 @pytest.mark.oracles
 def test_every_format_carries_them(proof, tmp_path):
     """All the programs that read the files find the narrow bounds."""
-    found = verify(exported(proof, tmp_path, ("milp-mccormick", "miqp-exact", "qp-fixed"))).findings
-    bad = [finding for finding in found if finding.verdict in {Verdict.DIFFERS, Verdict.FAILED}]
+    found = verify(exported(proof, tmp_path, ("milp-mccormick", "miqp-exact", "qp-fixed"))).checks
+    bad = [each for each in found if each.verdict in {Verdict.DIFFERS, Verdict.FAILED}]
     assert not bad
-    read = {finding.file.split(".", 2)[2] for finding in found if finding.verdict is Verdict.AGREES}
+    read = {each.file.split(".", 2)[2] for each in found if each.verdict is Verdict.AGREES}
     assert read >= {"nl", "lp", "mps", "mod"}
 
 
