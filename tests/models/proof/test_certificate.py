@@ -272,7 +272,7 @@ def test_the_checker_is_one_file_on_numpy_and_the_standard_library(written, tmp_
     alone = tmp_path / "alone.py"
     alone.write_bytes(PROGRAM.read_bytes())
     path, arrays = written(1)
-    # -S: no package that a .pth file leads to can be imported; and crossfield cannot where it lies beside numpy.
+    # -S: nothing that a .pth file leads to can be imported; nor crossfield where it lies beside numpy.
     start = (
         "import runpy, sys; sys.path.append(sys.argv.pop(1)); sys.argv.pop(0); "
         "sys.modules['crossfield'] = None; "
