@@ -73,7 +73,7 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
 def test_no_better_field_is_cut_off(gauge, least, tmp_path):
     """A certificate of a field that is not the best leaves the best one, whatever its labels and gauge."""
     checked = 0
-    for seed in range(103, 123):
+    for seed in (*range(103, 123), 151):
         instance = random_instance(seed, (2, 2), 9, gauge)
         best = optimum(instance).with_best_jumps()
         beta = np.clip(best.beta + np.random.default_rng(seed).normal(0, 0.02, 4), -np.pi / 4, np.pi / 4)
@@ -82,7 +82,7 @@ def test_no_better_field_is_cut_off(gauge, least, tmp_path):
         narrow = tightened(formulate(instance, "minlp-parity"), windows_left(found))
         assert narrow.violation(narrow.point(best)).worst < 1e-9
         plain = formulate(instance, "minlp-parity")
-        checked += (narrow.upper - narrow.lower).sum() < 0.98 * (plain.upper - plain.lower).sum()
+        checked += (narrow.upper - narrow.lower).sum() < 0.9 * (plain.upper - plain.lower).sum()
     assert checked >= least
 
 
