@@ -79,7 +79,7 @@ class UnsupportedByFormatError(CrossfieldError):
 
 
 class SolverError(CrossfieldError):
-    """A solver that failed on a file."""
+    """A solver that failed on a file, or that had too little time."""
 
 
 class MissingSolverError(SolverError):

@@ -4,6 +4,7 @@ says which tests were left out, and why.
 
 import os
 import signal
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -31,6 +32,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
 """Fixtures, and the program that those who use them need."""
+
+
+def pytest_sessionstart(session):
+    """Compile what proofs need once, and not in every process that runs tests."""
+    if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
+        subprocess.run([sys.executable, "-m", "crossfield.export.solving.compiling"], check=True)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -61,7 +61,7 @@ def prove_command(
     """Find a field and prove how far its 2-norm energy is from the least, at most.
 
     The certificate in the folder can be checked by --check, or by a program of its own without crossfield.
-    Ctrl-C ends the proof with what it has.
+    Ctrl-C ends the proof with what it has, and the certificate with what is checked.
     """
     if check is not None:
         if instance is not None or output is not None:
@@ -99,18 +99,20 @@ def prove_command(
 def _write(proof: Proof, folder: Path) -> dict[str, Any]:
     """The facts of a proof, which are in the folder now, with its field and its certificate."""
     from ...models.field.file import write_field
+    from ...models.processes.interruption import interruptible
     from ...models.proof.certificate import write_certificate
     from ...models.storage import make_folder, write_bytes
 
     stem = f"{proof.field.instance.name}.proof"
     write_field(proof.field, make_folder(folder) / f"{stem}.field.npz")
-    certificate = write_certificate(proof, folder / f"{stem}.certificate.npz")
+    with interruptible() as interrupted:
+        certificate = write_certificate(proof, folder / f"{stem}.certificate.npz", interrupted)
     document = facts(certificate) | {
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
             {"spacing": level.h, "labels": int(level.allowed.sum()), "bound": bound}
-            for level, bound in zip(proof.levels, certificate.verdict.levels, strict=True)
+            for level, bound in zip(proof.levels, certificate.verdict.levels, strict=False)  # Ctrl-C: fewer
         ],
     }
     write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())

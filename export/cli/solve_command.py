@@ -100,7 +100,7 @@ def solve_command(
         )
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, proven, target = _by_method(method, request)
+            candidate, proven, target = _by_method(method, request, deadline)
         else:
             solution, target = _by_solver(str(formulation), request)
     if method is not None:
@@ -130,7 +130,7 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} {what}")
 
 
-def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, Path]:
+def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candidate, Proven | None, Path]:
     """The last field of a method, what is proven of it, and the file it now is in, a certificate beside."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder
@@ -141,7 +141,7 @@ def _by_method(name: str, request: Request) -> tuple[Candidate, Proven | None, P
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    return candidate, certified(candidate.proof, certificate), target
+    return candidate, certified(candidate.proof, certificate, deadline), target
 
 
 def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:

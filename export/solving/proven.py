@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from ...models.errors import SolverError
+from ...models.processes.deadline import Deadline
 from ...models.proof.record import EXACT, Proof
+
+_CHECKING: Final = 0.8  # share of the time for a certificate; in the rest it is packed
 
 
 @dataclass(frozen=True)
@@ -29,14 +33,18 @@ class Proven:
         return {"status": status, **facts, "certificate": self.certificate.name}
 
 
-def certified(proof: Proof | None, path: Path) -> Proven | None:
+def certified(proof: Proof | None, path: Path, deadline: Deadline) -> Proven | None:
     """What a proof's certificate says, which is at `path` now; None, and no file, where nothing is proven.
 
-    Raises InputError for a proof that the checker refuses and OutputError when the file cannot be written.
+    With little time the certificate says less, or nothing. Raises InputError for a proof that the checker
+    refuses, and OutputError when the file cannot be written.
     """
     path.unlink(missing_ok=True)
     if proof is None or proof.bound <= 0 < proof.energy:
         return None
     from ...models.proof.certificate import write_certificate
 
-    return Proven(write_certificate(proof, path).bound, path)
+    try:
+        return Proven(write_certificate(proof, path, deadline.share(_CHECKING).passed).bound, path)
+    except SolverError:
+        return None

@@ -10,6 +10,7 @@ from typing import Any, Final
 from ...models.errors import CrossfieldError
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
+from ...models.processes.deadline import Deadline
 from ...models.processes.progress import Progress, silent
 from ...models.search.improvement import first_field
 from ...models.storage import make_folder, write_bytes
@@ -156,7 +157,7 @@ def run(
     )
     # Equal but for rounding: the one that was found first.
     ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
-    proven = _certified(found, folder / CERTIFICATE, progress)
+    proven = _certified(found, folder / CERTIFICATE, limits, progress)
     report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
@@ -194,12 +195,17 @@ def _tried_in_turn(request: Request) -> _Found:
     return found
 
 
-def _certified(found: _Found, path: Path, progress: Progress) -> Proven | None:
-    """What is proven, with its certificate at the path; a refusal or Ctrl-C is noted."""
-    proof = next((each.proof for each in found.candidates if each.proof is not None), None)
+def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) -> Proven | None:
+    """What is proven, with its certificate at the path; a refusal or Ctrl-C is noted.
+
+    It has the time that its method has left of its own.
+    """
+    by = next((each for each in found.candidates if each.proof is not None), None)
+    if by is None:
+        return None
     progress("writing and checking the certificate")
     try:
-        return certified(proof, path)
+        return certified(by.proof, path, Deadline.after(limits.seconds - by.seconds))
     except CrossfieldError as error:
         found.failures["certificate"] = str(error)
     except KeyboardInterrupt:

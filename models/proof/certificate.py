@@ -25,18 +25,19 @@ times a scale, and whatever they are, the bound they give is valid.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
 
 from ..array_archive import Arrays, Expected, pack_arrays, unpack_arrays
-from ..errors import InputError, InstanceError
+from ..errors import InputError, InstanceError, SolverError
 from ..field.field import CrossField
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.file import arrays_of, check_version, head_of, unpacked
 from ..instance.instance import Instance
+from ..processes.deadline import Over, never
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
@@ -72,20 +73,23 @@ class Certificate:
     verdict: Verdict
 
 
-def write_certificate(proof: Proof, path: str | Path) -> Certificate:
+def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Certificate:
     """The certificate of a proof, which now is in the file at `path`.
 
     It claims what the checker confirms, which may be less than the proof says. Same proof, same bytes.
-    Raises InputError for a proof that the checker refuses or that is in the 1-norm, and OutputError when the
-    file cannot be written.
+    over: says whether to end; then the certificate has the levels only that were checked by then.
+    Raises InputError for a proof that the checker refuses or that is in the 1-norm, SolverError when it is
+    over before the coarsest level is checked, and OutputError when the file cannot be written.
     """
     path = Path(path)
     if proof.norm != 2:
         raise InputError("certificates are of the 2-norm; a proof in the 1-norm has none", file=path)
     arrays = _arrays(proof, "gap", 0.0)
-    verdict = _confirmed(arrays, path)
+    verdict = _confirmed(arrays, path, over)
     status, bound = _claim(verdict)
-    write_bytes(path, pack_arrays(_arrays(proof, status, bound)))
+    kept = len(verdict.levels)
+    confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])
+    write_bytes(path, pack_arrays(_arrays(confirmed, status, bound)))
     return Certificate(proof.field, verdict.energy, bound, status, verdict)
 
 
@@ -127,10 +131,13 @@ def check(path: Path) -> Verdict:
         raise InputError(f"is no certificate: {error}", file=path) from error
 
 
-def _confirmed(arrays: Arrays, path: Path) -> Verdict:
-    """What the checker finds of arrays that are to be written. Raises InputError."""
+def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:
+    """What the checker finds of arrays that are to be written. Raises InputError, SolverError."""
     try:
-        return check_certificate.check(arrays)
+        return check_certificate.check(arrays, over)
+    except check_certificate.StoppedError as error:
+        reason = "is not written: the time was over before the coarsest level of the proof was checked"
+        raise SolverError(reason, file=path) from error
     except check_certificate.RefusedError as error:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
 

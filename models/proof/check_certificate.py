@@ -86,7 +86,7 @@ import json
 import math
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,6 +109,7 @@ MOST_WEIGHT = 1e6
 
 Array = Any
 Field = tuple[Array, Array, Array]
+Over = Callable[[], bool]
 
 
 class RefusedError(Exception):
@@ -117,6 +118,10 @@ class RefusedError(Exception):
 
 class UnreadableError(Exception):
     """A file that is no certificate."""
+
+
+class StoppedError(Exception):
+    """It was over before anything was proven."""
 
 
 @dataclass
@@ -482,10 +487,15 @@ class Pair:
                 if least >= sum(float(part.max()) for part in self.parts[better]):
                     self.parts.pop(worse)
 
-    def to_later(self, given: Array) -> Array:
-        """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later."""
-        out: Array = np.minimum.reduce([_min_plus(along.T, _min_plus(given, b)) for along, b in self.parts])
-        return out
+    def to_later(self, *given: Array) -> list[Array]:
+        """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later one.
+
+        One such array for each of the given.
+        """
+        stacked = np.concatenate(given)
+        found = [np.split(_min_plus(stacked, b), len(given)) for _, b in self.parts]
+        ends = [_min_plus(along.T, np.hstack(half)) for (along, _), half in zip(self.parts, found)]
+        return np.split(np.minimum.reduce(ends), len(given), axis=1)
 
 
 def _min_plus(left: Array, right: Array) -> Array:
@@ -511,10 +521,12 @@ class Pass:
         self.after: list[Array] = [None] * len(level.messages)  # N
         self.errors: list[float] = []
 
-    def run(self) -> Passed:
-        """The pass."""
+    def run(self, stop: Over) -> Passed:
+        """The pass. Raises StoppedError where it has to end before the last pixel."""
         numbers, least, waiting = [], [], []
         for i in range(len(self.costs)):
+            if stop():
+                raise StoppedError
             waiting.append(self._theta(i, self.before)[1])
             over, lowest = self._theta(i, self.after)
             numbers.append(over)
@@ -540,8 +552,7 @@ class Pass:
         pair, held = Pair(self.level, self.sketch, e), self.level.messages[e]
         given = over / max(1, earlier, later) - held
         allowed = np.isfinite(given)
-        self.before[e] = pair.to_later(np.where(allowed, -held, np.inf))
-        self.after[e] = pair.to_later(given)
+        self.before[e], self.after[e] = pair.to_later(np.where(allowed, -held, np.inf), given)
         greatest = float(np.abs(given[allowed]).max() + np.abs(held).max() + np.abs(self.after[e]).max())
         self._err(pair.size + greatest)
 
@@ -685,21 +696,31 @@ class Quadratic:
         found: Array = self.above * (QUARTER + beta) + self.below * (QUARTER - beta)
         return found
 
-    def at(self, x: Array) -> tuple[float, Array]:
-        """Value and gradient at the angles x (2n,)."""
+    def _residuals(self, x: Array) -> tuple[Array, Array, Array]:
+        """A, B (m,) and R (n,) at the angles x (2n,)."""
         alpha, beta = np.split(x, 2)
-        sketch, i, j, n = self.sketch, self.sketch.first, self.sketch.second, len(alpha)
-        a, s = alpha[i] - alpha[j] + HALF * self.p, sign(self.p)
-        b, r = s * beta[i] - beta[j], alpha + self.sign * beta - self.goal
+        i, j = self.sketch.first, self.sketch.second
+        a = alpha[i] - alpha[j] + HALF * self.p
+        return a, sign(self.p) * beta[i] - beta[j], alpha + self.sign * beta - self.goal
+
+    def value(self, x: Array) -> float:
+        """The value at the angles x."""
+        sketch, (a, b, r), beta = self.sketch, self._residuals(x), x[len(x) // 2 :]
         parts = (2 * a * a, 2 * b * b, sketch.weight * r * r, sketch.w_beta * beta * beta, -self.given(beta))
+        return math.fsum(np.concatenate(parts).tolist())
+
+    def slope(self, x: Array) -> Array:
+        """The gradient at the angles x."""
+        sketch, (a, b, r), beta = self.sketch, self._residuals(x), x[len(x) // 2 :]
+        i, j, n, s = sketch.first, sketch.second, len(beta), sign(self.p)
         slope = 4 * (np.bincount(i, a, n) - np.bincount(j, a, n)) + 2 * sketch.weight * r
         skew = 4 * (np.bincount(i, s * b, n) - np.bincount(j, b, n)) + 2 * self.sign * sketch.weight * r
         skew += 2 * sketch.w_beta * beta + self.below - self.above
-        return math.fsum(value for part in parts for value in part), np.concatenate([slope, skew])
+        return np.concatenate([slope, skew])
 
     def bound(self, x: Array) -> float:
         """A lower bound on the piece: the value at x, and the least that its gradient promises."""
-        value, slope = self.at(x)
+        value, slope = self.value(x), self.slope(x)
         sketch, angles = self.sketch, MOST_ANGLE + MOST_JUMP
         error = PRECISION * ROUNDING * (1 + np.tile(sketch.weight, 2) + sketch.w_beta) * angles
         falls = np.maximum(slope * (x - self.low), slope * (x - self.high))
@@ -714,11 +735,11 @@ class Quadratic:
         """
         x = np.clip(x, self.low, self.high)
         for _ in range(50):
-            value, slope = self.at(x)
+            value, slope = self.value(x), self.slope(x)
             free = ~(((x <= self.low) & (slope > 0)) | ((x >= self.high) & (slope < 0)))
             step = self._newton(np.where(free, slope, 0.0), free)
             ends = [np.clip(x + 0.5**k * step, self.low, self.high) for k in range(30)]
-            better = next((end for end in ends if self.at(end)[0] < value), None)
+            better = next((end for end in ends if self.value(end) < value), None)
             if better is None:
                 break
             x = better
@@ -726,14 +747,14 @@ class Quadratic:
 
     def _newton(self, slope: Array, free: Array) -> Array:
         """The step on the free angles after which there is no slope, by conjugate gradients."""
-        still = self.at(np.zeros(len(slope)))[1]
+        still = self.slope(np.zeros(len(slope)))
         step, rest = np.zeros(len(slope)), -slope
         way, size = rest, float(rest @ rest)
         enough = 1e-22 * size
         for _ in range(len(slope)):
             if size <= enough:
                 break
-            change = np.where(free, self.at(way)[1] - still, 0.0) + 1e-9 * way
+            change = np.where(free, self.slope(way) - still, 0.0) + 1e-9 * way
             length = size / float(way @ change)
             step, rest = step + length * way, rest - length * change
             size, before = float(rest @ rest), size
@@ -770,11 +791,12 @@ def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Arr
 
 
 def lower_bound(
-    sketch: Sketch, field: Field, level: Level, boxes: Array, enough: float
+    sketch: Sketch, field: Field, level: Level, boxes: Array, enough: float, *, over: Over
 ) -> tuple[float, Array]:
     """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
 
-    Boxes that lead over edges of windows are cut until the bound is `enough`, or there are MOST_PIECES.
+    Boxes that lead over edges of windows are cut until the bound is `enough`, or there are MOST_PIECES, or it
+    is over.
     """
     centres = np.stack([level.alpha, level.beta], axis=1)
     (alpha, beta, p), turned = relabelled(sketch, field, centres)
@@ -785,6 +807,8 @@ def lower_bound(
     waiting = [Piece(boxes, np.zeros(len(boxes)), -math.inf)]
     found = []
     for _ in range(MOST_PIECES):
+        if over():
+            break
         piece = waiting.pop()
         quadratic, x = Quadratic(sketch, p, turned, piece), np.concatenate([alpha, beta])
         bound = quadratic.bound(x)
@@ -803,34 +827,35 @@ def lower_bound(
 # The whole -------------------------------------------------------------------------------------------------
 
 
-def check(arrays: dict[str, Array]) -> Verdict:
+def check(arrays: dict[str, Array], over: Over = lambda: False) -> Verdict:
     """What the arrays of a certificate prove.
 
+    over: is asked again and again whether to end; then only the levels count that were passed by then.
     Raises RefusedError where a level does not follow from the one before, or where less is proven than
-    claimed; UnreadableError for what is no certificate.
+    claimed; UnreadableError for what is no certificate; StoppedError where it is over before the first level
+    was passed.
     """
     try:
-        return _check(arrays)
+        return _check(arrays, over)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, RecursionError) as error:
         raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
 
 
-def _check(arrays: dict[str, Array]) -> Verdict:
+def _check(arrays: dict[str, Array], over: Over) -> Verdict:
     head = head_of(arrays)
     sketch = sketch_of(arrays)
     field = field_of(arrays, sketch)
     energy, error = energy_of(sketch, *field)
     count = int(_number(head, "levels", 1, MOST_LEVELS))
     slack = slack_of(sketch, count)
-    tree, boxes, level = _descend(arrays, sketch, count, energy + error + slack)
-    bounds = tree.bounds
+    tree, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
     bound = max(0.0, min(energy - error, tree.bound() - slack))
     enough = energy - error - OPTIMAL / 2 * max(1.0, energy)
-    convex, held = lower_bound(sketch, field, level, boxes, enough)
+    convex, held = lower_bound(sketch, field, level, boxes, enough, over=over)
     bound = max(bound, min(convex, energy - error))
     status = "optimal" if energy - bound <= OPTIMAL * max(1.0, energy) else "gap"
     centres = np.stack([level.alpha, level.beta], axis=1)
-    verdict = Verdict(status, energy, bound, boxes, centres, held, bounds)
+    verdict = Verdict(status, energy, bound, boxes, centres, held, tree.bounds)
     _compare(head, verdict, error)
     return verdict
 
@@ -846,6 +871,11 @@ class Tree:
         _need((self.parents >= 0) == (chain >= 0), "parents", "is missing")
         self.bounds: list[float] = []
 
+    def cut(self, number: int) -> None:
+        """Leave out a level and those after it, and those before that follow from the same one."""
+        first = int(np.flatnonzero(self.parents == self.parents[number])[0])
+        self.parents, self.bounds = self.parents[:first], self.bounds[:first]
+
     def followers(self, number: int) -> list[int]:
         """The levels that follow from a level."""
         return [int(each) for each in np.flatnonzero(self.parents == number)]
@@ -856,29 +886,37 @@ class Tree:
         return max(self.bounds[number], min(least, default=-math.inf))
 
 
-def _descend(arrays: dict[str, Array], sketch: Sketch, count: int, most: float) -> tuple[Tree, Array, Level]:
+def _descend(
+    arrays: dict[str, Array], sketch: Sketch, count: int, most: float, over: Over
+) -> tuple[Tree, Array, Level]:
     """The bounds of all levels, the boxes round what is left after the last ones, and the first level."""
     tree = Tree(arrays, count)
     first = level_of(arrays, 0, sketch)
     need_whole_strip(first, sketch)
+    passed: list[tuple[Level, list[Array]]] = []
+    try:
+        for number in range(count):
+            level = level_of(arrays, number, sketch)
+            centred = (level.alpha == first.alpha) & (level.beta == first.beta)
+            _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
+            found = Pass(level, sketch).run(over)
+            tree.bounds.append(found.bound)
+            level.messages.clear()
+            passed.append((level, surviving(level, found, most)))
+    except StoppedError:
+        tree.cut(number)
+        if not tree.bounds:
+            raise
     margin = 2 * (count + 1) * SLIVER
-    known: dict[int, tuple[Level, list[Array]]] = {}
     boxes: list[Array] = []
-    for number in range(count):
-        level = level_of(arrays, number, sketch)
-        centred = (level.alpha == first.alpha) & (level.beta == first.beta)
-        _need(centred, f"level_{number}_alpha or beta", "is not that of the first level")
-        passed = Pass(level, sketch).run()
-        tree.bounds.append(passed.bound)
-        cells = surviving(level, passed, most)
-        if tree.followers(number):
-            known[number] = level, cells
+    for number in range(len(tree.bounds)):
+        level, cells = passed[number]
+        followers = tree.followers(number)
+        if followers:
+            parts = [covered(level, cells, passed[each][0], sketch) for each in followers]
+            need_all_covered(parts, followers[-1])
         elif all(kept.any() for kept in cells):
             boxes.append(boxes_of(level, cells, sketch, margin))
-    for number, (level, cells) in known.items():
-        followers = tree.followers(number)
-        parts = [covered(level, cells, level_of(arrays, each, sketch), sketch) for each in followers]
-        need_all_covered(parts, followers[-1])
     _need(len(boxes) > 0, "the last level", "has a pixel without a cell, not even that of the field")
     ends = np.stack(boxes)
     around = np.stack([f(axis=0)[:, k] for k, f in enumerate((ends.min, ends.max) * 2)], axis=1)

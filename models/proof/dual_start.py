@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 from ..field.field import CrossField, relabelled
@@ -72,12 +71,13 @@ def suggested(field: CrossField, left: Callable[[], float], over: Over = never, 
     if not _FEWEST < field.instance.grid.size <= _MOST or left() < _LEAST_SECONDS:
         return field
     # What Numba compiles is loaded only here: it takes a second.
+    from ..processes.compiled import all_compiled
     from ..processes.crew import crew
     from .lattice import Lattice
     from .rounding import Rounding, improve
     from .sweep import Dual
 
-    if left() < _COMPILING and not _is_compiled():
+    if left() < _COMPILING and not all_compiled():
         return field
     with crew(jobs) as hands:
         instance, (jumps, _) = field.instance, free_jumps(field.instance.grid, field.alpha, field.beta)
@@ -90,10 +90,3 @@ def suggested(field: CrossField, left: Callable[[], float], over: Over = never, 
             dual.ascend(_PASSES, over)
             field = rounding.lower(field, over)
     return field
-
-
-def _is_compiled() -> bool:
-    """Whether compiled code of an earlier use is kept on disk."""
-    from .products import pixel_pass
-
-    return any(Path(pixel_pass.stats.cache_path).glob("*.nbi"))  # type: ignore[attr-defined]

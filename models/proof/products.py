@@ -4,7 +4,7 @@ For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha an
 product is one over beta and then one over alpha: O(N^3) for N^2 labels. A^2 is the least over all jumps of
 that parity: A is taken modulo pi.
 
-Compiled by Numba, which pip installs without a compiler. Measured on the sample `mouse` at 24 pixels, 34 x 33
+Compiled by Numba (models/processes/compiled.py). Measured on the sample `mouse` at 24 pixels, 34 x 33
 labels each, one thread: 24 ms a pass, and 108 ms for its products alone in NumPy over anti-diagonals, with
 all labels of all pairs (in NumPy nothing that cannot be the least is left out, and levels whose pixels have
 different numbers of labels would have to be padded). With two threads 12.5 ms. The first call compiles for
@@ -14,33 +14,18 @@ of what is kept: with another name, old files cannot be read.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Final
 
-import numba
 import numpy as np
 
 from ..instance.grid import Floats
+from ..processes.compiled import compiled
 
 if TYPE_CHECKING:
     from .sweep import State
 
-_Work = TypeVar("_Work", bound=Callable[..., Any])
 _HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)
-
-
-def compiled(work: _Work) -> _Work:
-    """The function compiled on its first call, and kept on disk where there is a place for it.
-
-    It runs without Python's lock.
-    """
-    made: Any
-    try:
-        made = numba.njit(cache=True, error_model="numpy", nogil=True)(work)
-    except RuntimeError:  # no folder may be written to
-        made = numba.njit(error_model="numpy", nogil=True)(work)
-    return cast("_Work", made)
 
 
 @compiled
@@ -50,8 +35,9 @@ def pixel_pass(i: int, earlier: int, state: State) -> None:
     earlier: column of `around` at which the two pairs to earlier pixels stand; the later ones are beyond.
     """
     begin, end = state.start[i], state.start[i + 1]
-    mine = state.theta[begin:end]
-    mine[:] = state.unary[begin:end]
+    mine, unary = state.theta[begin:end], state.unary[begin:end]
+    for x in range(mine.size):
+        mine[x] = unary[x]
     taken, given = 0, 0
     for column in range(4):
         pair = state.around[i, column]
@@ -65,7 +51,7 @@ def pixel_pass(i: int, earlier: int, state: State) -> None:
                 share[x] = share[x] if mine[x] < np.inf else 0.0
         else:
             given += 1
-        mine += share
+        add(mine, share)
     least = mine.min()
     state.least[i] = least
     for column in range(2 - earlier, 4 - earlier):
@@ -80,6 +66,13 @@ def _hand_on(share: Floats, theta: Floats, least: float, part: float) -> None:
     for x in range(share.size):
         if theta[x] < np.inf:
             share[x] -= part * (theta[x] - least)
+
+
+@compiled
+def add(target: Floats, values: Floats) -> None:
+    """Add the values to the target; `+=` would compile texts of errors too, for seconds."""
+    for x in range(target.size):
+        target[x] += values[x]
 
 
 @compiled
@@ -173,11 +166,13 @@ def _beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: F
 def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
     """Fill in the least over y of given[row, y] + cost[y, x], those y left out that cannot be it."""
     half[:] = np.inf
-    least = np.empty(cost.shape[0])
+    least, sums = np.empty(cost.shape[0]), np.empty(cost.shape[0])
     for y in range(cost.shape[0]):
         least[y] = cost[y].min()
     for row in range(given.shape[0]):
-        best = np.argmin(given[row] + least)
+        for y in range(cost.shape[0]):
+            sums[y] = given[row, y] + least[y]
+        best = np.argmin(sums)
         if given[row, best] == np.inf:
             continue
         _lower(half[row], cost[best], given[row, best])
@@ -190,11 +185,13 @@ def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
 @compiled
 def _over_alpha(half: Floats, cost: Floats, found: Floats) -> None:
     """Lower found[row] to the least over y of half[y] + cost[row, y], rows that cannot lower it left out."""
-    least = np.empty(half.shape[0])
+    least, sums = np.empty(half.shape[0]), np.empty(half.shape[0])
     for y in range(half.shape[0]):
         least[y] = half[y].min()
     for row in range(found.shape[0]):
-        best = np.argmin(least + cost[row])
+        for y in range(half.shape[0]):
+            sums[y] = least[y] + cost[row, y]
+        best = np.argmin(sums)
         _lower(found[row], half[best], cost[row, best])
         reached = found[row].max()
         for y in range(half.shape[0]):

@@ -55,6 +55,8 @@ _SLOW_BRANCH: Final = 0.05  # as _SLOW, on branches
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
 _MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
 _MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
+_RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
+_WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which a gap that is left may be that of the field
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
@@ -78,13 +80,13 @@ def prove(
     """The field of least energy that was found, and a lower bound of the energy of all fields.
 
     norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; of its proofs there are no
-    certificates. seconds: when to end; one step goes beyond them (a pass over the finest lattice, and its
-    bound). gap: the relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a
-    field to begin with where, improved, it is better than the improved greedy one. seed: of the search that
-    follows where the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every
-    good place whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give
-    the same proof, for any number of threads. The bound holds for both gauges; under `box` it is that of
-    `strokes`, and seldom tight.
+    certificates. seconds: when to end; levels that could not be recorded by then are not begun. gap: the
+    relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field to begin
+    with where, improved, it is better than the improved greedy one. seed: of the search that follows where
+    the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every good place
+    whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
+    proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
+    and seldom tight.
     Raises InputError for a limit that is not positive, a gap below 0, and too many jobs.
     """
     if (seconds is not None and not seconds > 0) or not gap >= 0 or jobs < 1:
@@ -114,9 +116,9 @@ class _Limits:
             return "interrupted"
         return "time" if self.deadline.passed() else ""
 
-    def over(self) -> bool:
-        """Whether work has to end now."""
-        return bool(self.met())
+    def over(self, ahead: float = 0.0) -> bool:
+        """Whether work has to end now, or within so many seconds."""
+        return bool(self.met()) or self.deadline.left() <= ahead
 
 
 def _of_norm(norm: Norm) -> type[Work]:
@@ -226,7 +228,7 @@ class Work:
             if (ended := self._ended()) or what is None:
                 return ended or "labels"
             lattice = finer(what.left)
-            small = not _too_large(lattice)
+            small = not _too_large(lattice) and self._in_time(dual, lattice)
             stalls = not patient and self._stalls()
             if not self.searched and (stalls or self._costly(lattice)):
                 self.searched = True
@@ -240,6 +242,14 @@ class Work:
             patient = not small
             if small:
                 coarser, dual = dual, prolonged(dual, lattice)
+
+    def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
+        """Whether there is time for some passes over the lattice that follows."""
+        return not self.limits.over(_WORTH * dual.seconds_on(lattice))
+
+    def _closing(self, dual: Dual) -> Over:
+        """Says whether the time that is left is what it takes to record the level."""
+        return lambda: self.limits.over(_RECORDING * dual.seconds)
 
     def _stalls(self) -> bool:
         """Whether half the spacing has left more than half of the gap, and the best field has a vortex.
@@ -262,11 +272,10 @@ class Work:
             full = _labels(waiting) + more > _MOST_BRANCHED
             if not parts or full or len(levels) + len(parts) > MOST_LEVELS:
                 return "labels"
-            found = [self._raised(part, branch) for part in parts]
-            if self.limits.over():
-                break
-            for each in found:
-                heappush(waiting, each)
+            for part in parts:
+                if self.limits.over(_WORTH * part.seconds):
+                    return self.limits.met() or "time"
+                heappush(waiting, self._raised(part, branch))
             self.chain.bound = min(waiting[0].bound, self.energy(self.best))
             if self.chain.bound > self.proven.bound:
                 self.proven = replace(self.chain, levels=levels[:], parents=self.chain.parents[:])
@@ -283,9 +292,10 @@ class Work:
     def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
         """The branch of a dual, which is raised as long as it pays, and recorded."""
         reached, energy = -np.inf, self.energy(self.best)
+        closing = self._closing(dual)
         for _ in range(_MOST_ROUNDS):
-            bound = dual.ascend(_PASSES, self.limits.over)
-            if self.limits.over() or bound > energy or bound - reached <= _SLOW_BRANCH * (energy - bound):
+            bound = dual.ascend(_PASSES, closing)
+            if closing() or bound > energy or bound - reached <= _SLOW_BRANCH * (energy - bound):
                 break
             reached = bound
         level, levels = LevelRecord.of(dual, energy), self.chain.levels
@@ -328,13 +338,13 @@ class Work:
 
     def _ascend(self, dual: Dual, slow: float) -> None:
         """Raise the dual of a level, and round fields from it, until the bound's rise is slow."""
-        reached, rounding = -np.inf, Rounding(dual, self.improve)
+        reached, rounding, closing = -np.inf, Rounding(dual, self.improve), self._closing(dual)
         for _ in range(_MOST_ROUNDS):
-            bound = dual.ascend(_PASSES, self.limits.over)
-            self.best = rounding.lower(self.best, self.limits.over)
+            bound = dual.ascend(_PASSES, closing)
+            self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
             self.progress(max(self.proven.bound, min(bound, energy)), energy, int(dual.lattice.allowed.sum()))
-            if self.limits.over() or self._exact(bound) or bound - reached <= slow * (energy - bound):
+            if closing() or self._exact(bound) or bound - reached <= slow * (energy - bound):
                 return
             reached = bound
 

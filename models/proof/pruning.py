@@ -30,8 +30,8 @@ import numpy as np
 
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER
+from ..processes.compiled import compiled
 from .lattice import Lattice, Starts, few_unreached, reached, starts, strip
-from .products import compiled
 from .sweep import Dual
 
 TOLERANCE: Final = 1e-7
@@ -115,8 +115,8 @@ def branches(dual: Dual, count: int) -> list[Dual]:
         if (part[1:, 1:] & part[:-1, 1:] & part[1:, :-1] & part[:-1, :-1]).any():
             allowed = lattice.allowed.copy()
             allowed[begin:end] = part.ravel()
-            shares = (dual.state.shares_first.copy(), dual.state.shares_second.copy())
-            found.append(Dual(replace(lattice, allowed=allowed), dual.crew, *shares))
+            shares = [dual.state.shares_first.copy(), dual.state.shares_second.copy()]
+            found.append(_on(replace(lattice, allowed=allowed), shares, dual))
     return found if len(found) > 1 else []
 
 
@@ -145,7 +145,14 @@ def prolonged(dual: Dual, lattice: Lattice) -> Dual:
         now = _rectangles(lattice), lattice.share_starts(ends), found
         _interpolate(was, now, ends, lattice.h / old.h, (lattice.offset, lattice.allowed))
         shares.append(found)
-    return Dual(lattice, dual.crew, *shares)
+    return _on(lattice, shares, dual)
+
+
+def _on(lattice: Lattice, shares: list[Floats], before: Dual) -> Dual:
+    """The dual with those shares on a lattice that follows, and the seconds that a pass may take."""
+    dual = Dual(lattice, before.crew, *shares)
+    dual.seconds = before.seconds_on(lattice)
+    return dual
 
 
 def _ends(lattice: Lattice, cells: Bools) -> Ints:

@@ -13,14 +13,15 @@ import numpy as np
 
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
-from ..instance.grid import Bools, Floats, Ints
+from ..instance.grid import Bools, Floats
 from ..instance.instance import QUARTER
+from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
 from ..search.energy import LinearSolver
 from ..search.free_field import FreeField
 from ..search.improvement import improved, settle
-from .products import compiled, share_of, sized
-from .sweep import Dual, State
+from .products import add, share_of, sized
+from .sweep import Dual, Indices, State
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _HALF: Final = float(np.pi / 2)
@@ -74,14 +75,14 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
 def decoded(dual: Dual, *, forwards: bool) -> tuple[Floats, Floats]:
     """Alpha and beta (n,) of the crosses that the shares suggest; forwards after a backward pass."""
     size = len(dual.state.least)
-    order = np.arange(size, dtype=np.int32)[:: 1 if forwards else -1].copy()
+    order = np.arange(size)[:: 1 if forwards else -1].copy()
     alpha, beta = np.zeros(size), np.zeros(size)
     _decode(order, dual.state, alpha, beta, np.zeros(size, dtype=bool))
     return alpha, np.clip(beta, -QUARTER, QUARTER)
 
 
 @compiled
-def _decode(order: Ints, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
+def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bools) -> None:
     """Fill in the angles, pixel by pixel in that order."""
     for i in order:
         cost = state.unary[state.start[i] : state.start[i + 1]].copy()
@@ -93,7 +94,7 @@ def _decode(order: Ints, state: State, alpha: Floats, beta: Floats, fixed: Bools
             if fixed[j]:
                 _add_distance(i, state, alpha[j], beta[j], cost)
             else:
-                cost += share_of(pair, i, state)
+                add(cost, share_of(pair, i, state))
         x = np.argmin(cost)
         alpha[i] = state.alpha[i] + state.h * (x // state.beta_count[i])
         beta[i] = state.beta[i] + state.h * (x % state.beta_count[i])

@@ -22,6 +22,7 @@ The code for one pixel and one pair is models/proof/products.py.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
@@ -29,11 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid, Ints
+from ..processes.compiled import compiled
 from ..processes.crew import Crew
 from ..processes.deadline import Over, never
 from .costs import unary_costs
 from .lattice import Lattice, Starts
-from .products import compiled, pair_minimum, pixel_pass, share_of
+from .products import add, pair_minimum, pixel_pass, share_of
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 _ROUNDING: Final = 32 * 2.0**-53
@@ -42,6 +44,10 @@ _ROUNDING: Final = 32 * 2.0**-53
 It is the sum of at most eight numbers, an angle among them is right to four units in the last place, and a
 square doubles that.
 """
+
+
+Indices = NDArray[np.int64]
+"""Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
 
 
 class State(NamedTuple):
@@ -54,12 +60,12 @@ class State(NamedTuple):
     beta_count: Ints
     start: Starts
     unary: Floats
-    first: Ints
-    second: Ints
+    first: Indices
+    second: Indices
     odd: Ints
     start_first: Starts
     start_second: Starts
-    around: Ints  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
+    around: Indices  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
     shares_first: Floats
     shares_second: Floats
     theta: Floats  # as the last pass found it at each pixel
@@ -105,6 +111,7 @@ class Dual:
         self._fronts = fronts(lattice.instance.grid)
         self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
         self._momentum = Momentum((self.state.shares_first, self.state.shares_second), crew)
+        self.seconds = 0.0  # of the last pass that was not cut off
 
     def forward(self, over: Over = never) -> float:
         """The bound after a forward pass."""
@@ -115,8 +122,8 @@ class Dual:
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never) -> float:
-        """The bound after so many passes forwards and backwards, or fewer when the time is over:
-        then any number, for a pass may have been cut off. The shares prove a bound all the same.
+        """The bound after so many passes forwards and backwards, or fewer when it is over:
+        then -inf where a pass was cut off. The shares prove a bound all the same.
         """
         bound = -math.inf
         for _ in range(times):
@@ -129,17 +136,23 @@ class Dual:
         return bound
 
     def _pass(self, earlier: int, over: Over) -> float:
-        def work(pixels: Ints) -> None:
+        def work(pixels: Indices) -> None:
             _pass_pixels(pixels, earlier, self.state)
 
-        way = 1 if earlier == 0 else -1
+        began, way = time.monotonic(), 1 if earlier == 0 else -1
         if self.lattice.start[-1] < _ALONE:
             work(np.concatenate(self._fronts[::way]))
         else:
             for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
-                if not over():
-                    self.crew.run(work, [front[part] for part in parts])
+                if over():
+                    return -math.inf
+                self.crew.run(work, [front[part] for part in parts])
+        self.seconds = time.monotonic() - began
         return math.fsum(self.state.least)
+
+    def seconds_on(self, lattice: Lattice) -> float:
+        """What a pass over another lattice may take, after one over this one."""
+        return self.seconds * lattice.work / max(self.lattice.work, 1.0)
 
     def quantise(self) -> float:
         """The quantum of the shares, which become whole multiples of it, and 0 where no label is allowed.
@@ -202,8 +215,8 @@ def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> Sta
         lattice.beta_count,
         lattice.start,
         unary,
-        grid.first,
-        grid.second,
+        grid.first.astype(np.int64),
+        grid.second.astype(np.int64),
         lattice.p & 1,
         start_first,
         start_second,
@@ -216,18 +229,18 @@ def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> Sta
     )
 
 
-def _around(grid: Grid) -> Ints:
+def _around(grid: Grid) -> Indices:
     """The pairs of each pixel with its upper, left, lower and right neighbour, -1 for none; shape (n, 4)."""
     upper, right = (np.pad(table, 1, constant_values=-1) for table in grid.pair_number)
     row, column = grid.rows + 1, grid.columns + 1
     pairs = (upper[row, column], right[row, column - 1], upper[row + 1, column], right[row, column])
-    return np.stack(pairs, axis=1)
+    return np.stack(pairs, axis=1).astype(np.int64)
 
 
-def fronts(grid: Grid) -> list[Ints]:
+def fronts(grid: Grid) -> list[Indices]:
     """The pixels of each anti-diagonal. Those of one have no pairs among them; earlier pixels come sooner."""
     diagonal = grid.rows + grid.columns
-    order = np.argsort(diagonal, kind="stable").astype(np.int32)
+    order = np.argsort(diagonal, kind="stable")
     _, begin = np.unique(diagonal[order], return_index=True)
     return np.split(order, begin[1:])
 
@@ -237,7 +250,7 @@ def _most(values: Floats) -> float:
 
 
 @compiled
-def _pass_pixels(pixels: Ints, earlier: int, state: State) -> None:
+def _pass_pixels(pixels: Indices, earlier: int, state: State) -> None:
     """A pass over some pixels, one after the other; earlier: 0 forwards, 2 backwards."""
     for i in pixels:
         pixel_pass(i, earlier, state)
@@ -257,5 +270,5 @@ def _pixel_minima(begin: int, end: int, state: State, found: Floats) -> None:
         theta = state.unary[state.start[i] : state.start[i + 1]].copy()
         for pair in state.around[i]:
             if pair >= 0:
-                theta += share_of(pair, i, state)
+                add(theta, share_of(pair, i, state))
         found[i] = theta.min()

@@ -1,17 +1,22 @@
 """A run tells of every field how far from the least 2-norm energy it is at most, with a certificate of it."""
 
 import json
+import os
+import subprocess
+import sys
 
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.methods import METHODS
+from crossfield.export.cli.solve_command import _by_method
+from crossfield.export.solving.methods import METHODS, Request
 from crossfield.export.solving.proven import Proven, certified
+from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.certificate import read_certificate
 
 
 def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
-    given = ["run", "skew", "--size", "6", "--time-limit", "5", "--threads", "1"]
+    given = ["run", "skew", "--size", "6", "--time-limit", "60", "--threads", "1"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     report = json.loads((tmp_path / "report.json").read_text())
@@ -38,12 +43,12 @@ def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
 def test_without_a_proof_there_is_neither_a_number_nor_the_certificate_of_yesterday(tmp_path):
     path = tmp_path / "certificate.npz"
     path.write_bytes(b"of yesterday")
-    assert certified(None, path) is None
+    assert certified(None, path, Deadline()) is None
     assert not path.exists()
 
 
 def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
-    given = ["solve", "skew", "--size", "6", "-m", "prove", "--time-limit", "5", "--json"]
+    given = ["solve", "skew", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     facts = json.loads(capsys.readouterr().out)
     field = cf.read_field(tmp_path / "skew.prove.field.npz")
@@ -51,3 +56,31 @@ def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
     assert facts["energy_2_norm"] == pytest.approx(field.energy().total, rel=1e-12)
     assert (facts["proven_optimal"], facts["bound_2_norm"]) == (True, certificate.bound)
     assert METHODS["prove"].timed
+
+
+def test_a_field_stands_where_no_time_is_left_for_its_certificate(tmp_path):
+    request = Request(cf.sample("skew", 4), tmp_path)
+    candidate, proven, path = _by_method("prove", request, Deadline(at=0.0))
+    assert proven is None
+    assert cf.read_field(path).energy().total == candidate.field.energy().total
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.slow
+def test_what_proofs_compile_is_compiled_once_within_the_limit(tmp_path):
+    def solve(seconds):
+        command = [sys.executable, "-m", "crossfield", "solve", "skew", "--size", "4", "-m", "prove"]
+        command += ["--time-limit", seconds, "-o", str(tmp_path / "out"), "--quiet"]
+        settings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        return subprocess.run(command, env=settings, capture_output=True, text=True, check=False)
+
+    first = solve("1")
+    assert first.returncode == 1
+    assert "once on a machine" in first.stderr
+    assert solve("250").returncode == 0
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+    assert kept
+    (tmp_path / "out" / "compiling.log").unlink()
+    assert solve("100").returncode == 0
+    assert kept == {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+    assert not (tmp_path / "out" / "compiling.log").exists()

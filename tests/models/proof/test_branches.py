@@ -51,6 +51,17 @@ def test_branches_cut_one_pixel_and_hold_all_cells_together(cut):
     assert min(part.bound for part in parts) >= whole.bound - 1e-9
 
 
+def test_a_certificate_that_is_cut_off_has_all_branches_of_a_level_or_none(cut, tmp_path):
+    parts = len(cut.parents) - 1
+    whole = write_certificate(cut, tmp_path / "whole.npz")
+    for checked in range(1, parts + 2):
+        asked = iter(range(checked * len(cut.field.alpha)))
+        found = write_certificate(cut, tmp_path / "it.npz", lambda asked=asked: next(asked, None) is None)
+        kept = len(found.verdict.levels)
+        assert kept == (1 if checked < 5 else checked)
+        assert read_certificate(tmp_path / "it.npz").bound == found.bound <= whole.bound
+
+
 def test_no_cut_lifts_the_least_bound_above_the_optimum():
     """Against optima over all jumps; each branch is cut again, and raised."""
     for seed in range(8):

@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.errors import InputError, InstanceError
+from crossfield.models.errors import InputError, InstanceError, SolverError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.file import of_arrays
+from crossfield.models.processes.deadline import never
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from exhaustive import exact, optimum, random_instance, sketch
@@ -73,6 +74,31 @@ def test_the_same_proof_gives_the_same_bytes(tmp_path):
     for name in ("one.npz", "other.npz"):
         write_certificate(proven(1), tmp_path / name)
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+
+
+def test_a_certificate_that_is_cut_off_holds_with_the_levels_that_were_checked(written, tmp_path):
+    """It is over after so many questions, whenever that is."""
+    _, whole = written(3)
+    bound, path, kept = check_certificate.check(whole).bound, tmp_path / "it.npz", []
+    pixels = len(whole["alpha"])
+    for questions in range(pixels, 5 * pixels, 3):
+        found = write_certificate(proven(3), path, after(questions))
+        assert read_certificate(path).bound == found.bound <= bound
+        kept.append(len(found.verdict.levels))
+    assert kept == sorted(kept)
+    assert set(kept) == {1, 2, 3, 4}
+
+
+def test_no_certificate_is_written_where_it_is_over_before_a_level_is_checked(tmp_path):
+    with pytest.raises(SolverError, match="before the coarsest level"):
+        write_certificate(proven(3), tmp_path / "it.npz", after(2))
+    assert not list(tmp_path.iterdir())
+
+
+def after(questions):
+    """Says that it is over when it has been asked so often."""
+    asked = iter(range(questions))
+    return lambda: next(asked, None) is None
 
 
 def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path):
@@ -331,7 +357,7 @@ def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(writ
             + steep * np.arange(message.size).reshape(message.shape)
             for message in level.messages
         ]
-        passed = check_certificate.Pass(level, sketch_).run()
+        passed = check_certificate.Pass(level, sketch_).run(never)
         places = [check_certificate.positions(level, sketch_, i) for i in range(instance.grid.size)]
         for near in (1.0, 0.3, 0.05, 0.01) * 40:
             at = [near * rng.uniform(-1, 1, 2) * np.pi / 4 for _ in places]
@@ -369,7 +395,7 @@ def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(written):
             boxes = np.stack([alpha - sides[0], alpha + sides[0], beta - sides[1], high], axis=1)
             level.alpha, level.beta, p = alpha, beta, np.zeros(len(sketch_.first), int)
             given = (alpha, beta, p)
-            bound, held = check_certificate.lower_bound(sketch_, given, level, boxes, np.inf)
+            bound, held = check_certificate.lower_bound(sketch_, given, level, boxes, np.inf, over=never)
             if not held.all() or bound == -np.inf:
                 continue
             low, size = boxes[:, ::2], boxes[:, 1::2] - boxes[:, ::2]
