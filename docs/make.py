@@ -216,7 +216,7 @@ def errata() -> None:
                     str(seed),
                     gauge,
                     *(f"{found.objective:.6f}" for found in both),
-                    " / ".join(found.message.split(": ")[1] for found in both),
+                    " / ".join(found.message.split(": ")[1].split()[0] for found in both),
                 ]
             )
     single = Instance(
