@@ -61,6 +61,7 @@ def test_casadi_sees_the_problem(label: str, tmp_path: Path):
         np.testing.assert_allclose(rows, expected[1], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.needs("asl")
 @for_each("label", CASES)
 def test_the_solver_library_sees_the_problem(label: str, tmp_path: Path):

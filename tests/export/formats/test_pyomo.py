@@ -98,6 +98,7 @@ def test_components_read_like_the_paper():
     assert model.name == "tiny miqcp-bilinear"
 
 
+@pytest.mark.slow
 @for_each("label", CASES)
 def test_values_of_pyomos_nl_are_ours(label: str, tmp_path: Path):
     problem = problem_of(label)
@@ -125,6 +126,7 @@ def _wide(name: str, width: int) -> str:
     return "_".join(part.zfill(width) if part.isdigit() else part for part in name.split("_"))
 
 
+@pytest.mark.slow
 @for_each("label", [label for label in LOW_DEGREE if "far" not in label and "pixel" not in label])
 def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
     """As LP holds them, with products lifted; SCIP reads the bilinear rows, HiGHS the rest."""

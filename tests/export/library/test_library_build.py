@@ -612,6 +612,7 @@ def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, 
     assert content(copy) == content(built.folder)
 
 
+@pytest.mark.slow
 def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_own_n004.about.json").unlink()
@@ -792,6 +793,7 @@ def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothi
     assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json"}
 
 
+@pytest.mark.slow
 def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(tmp_path):
     text = (
         HEAD

@@ -495,6 +495,7 @@ def test_what_was_changed_is_found(what, built, tmp_path):
     told(lib, file, words)
 
 
+@pytest.mark.slow
 @for_each("what", SEALED)
 def test_what_was_changed_is_found_when_all_checksums_fit_too(what, built, tmp_path):
     spoil, file, words = SEALED[what]

@@ -55,6 +55,7 @@ def place(found, picture):
     return x.mean() / (right - left), y.mean() / (bottom - top)
 
 
+@pytest.mark.slow
 @for_each("kind, suffix", [("field", ".png"), ("field", ".svg"), ("energy", ".pdf")])
 def test_every_suffix_is_written_the_same_twice(tmp_path, kind, suffix):
     check_the_same_twice(tmp_path, kind, suffix)

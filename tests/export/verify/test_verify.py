@@ -82,6 +82,7 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Verifi
     return verification
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instance", LARGER)
 @each_of(PROGRAMS)
 def test_every_file_means_the_problem(verified: Callable[[str], Verification], program: str, instance: str):

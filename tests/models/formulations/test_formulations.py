@@ -248,6 +248,7 @@ def test_printed_facet_is_a_relaxation(gauge, seed):
     assert optimum(instance, facet="printed") <= optimum(instance) + 1e-7
 
 
+@pytest.mark.slow
 def test_printed_facet_loses_something():
     gaps = [optimum(sketch(seed=seed)) - optimum(sketch(seed=seed), facet="printed") for seed in range(4, 8)]
     assert max(gaps) > 1e-3

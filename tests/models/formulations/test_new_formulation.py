@@ -38,6 +38,7 @@ def toy():
     del declaration._TABLE["toy"]
 
 
+@pytest.mark.slow
 def test_a_toy_formulation_is_one_function(toy, tmp_path):
     instance = cf.sample("skew", 4)
     field = cf.greedy(instance)

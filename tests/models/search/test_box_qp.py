@@ -137,7 +137,14 @@ def residuals(instance, x, p):
     return np.concatenate(parts)
 
 
-@pytest.mark.parametrize("name, size", [*((known.name, 24) for known in samples()), ("ring", 48)])
+@pytest.mark.parametrize(
+    "name, size",
+    [
+        *(pytest.param(known.name, 24, marks=pytest.mark.slow) for known in samples()[3:]),
+        *((known.name, 24) for known in samples()[:3]),
+        pytest.param("ring", 48, marks=pytest.mark.slow),
+    ],
+)
 def test_same_optimum_as_ipopt_on_the_file(name, size):
     instance = sample(name, size, "box")
     centre = CrossField(
