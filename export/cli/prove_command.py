@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -13,6 +13,7 @@ from .options import GaugeName, Json, Mask, Quiet, Size, Start
 from .output import complain, progress, say, say_json, show_facts
 
 if TYPE_CHECKING:
+    from ...models.field.field import Norm
     from ...models.proof.certificate import Certificate
     from ...models.proof.record import Proof
 
@@ -30,6 +31,15 @@ def prove_command(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for field, certificate and report."),
     ] = None,
     *,
+    norm: Annotated[
+        int,
+        typer.Option(
+            "--norm",
+            min=1,
+            max=2,
+            help="Of the energy; proofs in the 1-norm, which milp-mccormick minimises, have no certificate.",
+        ),
+    ] = 2,
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
@@ -58,7 +68,7 @@ def prove_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Find a field and prove how far its 2-norm energy is from the least, at most.
+    """Find a field and prove how far its energy is from the least, at most.
 
     The certificate in the folder can be checked by --check, or by a program of its own without crossfield.
     Ctrl-C ends the proof with what it has, and the certificate with what is checked.
@@ -78,6 +88,7 @@ def prove_command(
         loaded = load(instance, size, mask, gauge)
         proof = prove(
             loaded,
+            norm=cast("Norm", norm),
             start=None if start is None else read_field(start, on=loaded),
             seconds=time_limit,
             gap=gap,
@@ -91,13 +102,13 @@ def prove_command(
         say_json(document)
     elif not quiet:
         show_facts(loaded.summary, {key: value for key, value in document.items() if key != "levels"})
-        say(f"field, certificate and report: {output}")
+        say(f"field, {'certificate and ' if norm == 2 else ''}report: {output}")
     if proof.ended == "interrupted":
         complain("interrupted; the best field and bound so far were kept")
 
 
 def _write(proof: Proof, folder: Path) -> dict[str, Any]:
-    """The facts of a proof, which are in the folder now, with its field and its certificate."""
+    """The facts of a proof, now in the folder with its field and, in the 2-norm, its certificate."""
     from ...models.field.file import write_field
     from ...models.processes.interruption import interruptible
     from ...models.proof.certificate import write_certificate
@@ -105,32 +116,35 @@ def _write(proof: Proof, folder: Path) -> dict[str, Any]:
 
     stem = f"{proof.field.instance.name}.proof"
     write_field(proof.field, make_folder(folder) / f"{stem}.field.npz")
-    with interruptible() as interrupted:
-        certificate = write_certificate(proof, folder / f"{stem}.certificate.npz", interrupted)
-    document = facts(certificate) | {
+    said, bounds = facts(proof), [level.bound for level in proof.levels]
+    if proof.norm == 2:
+        with interruptible() as interrupted:
+            certificate = write_certificate(proof, folder / f"{stem}.certificate.npz", interrupted)
+        said, bounds = facts(certificate), certificate.verdict.levels  # what the checker confirms
+    document = said | {
+        "norm": proof.norm,
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
             {"spacing": level.h, "labels": int(level.allowed.sum()), "bound": bound}
-            for level, bound in zip(proof.levels, certificate.verdict.levels, strict=False)  # Ctrl-C: fewer
+            for level, bound in zip(proof.levels, bounds, strict=False)  # fewer are checked after Ctrl-C
         ],
     }
     write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
     return document
 
 
-def facts(certificate: Certificate) -> dict[str, Any]:
-    """What a certificate proves, by name."""
-    energy, bound = certificate.energy, certificate.bound
+def facts(said: Proof | Certificate) -> dict[str, Any]:
+    """What a proof or a certificate says, by name."""
     return {
-        "instance": certificate.field.instance.name,
-        "sha256": certificate.field.instance.sha256,
-        "status": certificate.status,
-        "energy": energy,
-        "bound": bound,
-        "gap": 0.0 if certificate.status == "optimal" else (energy - bound) / energy,
-        "forced_jumps": certificate.verdict.forced,
-        "pairs": len(certificate.field.p),
+        "instance": said.field.instance.name,
+        "sha256": said.field.instance.sha256,
+        "status": said.status,
+        "energy": said.energy,
+        "bound": said.bound,
+        "gap": said.gap,
+        "forced_jumps": said.forced,
+        "pairs": len(said.field.p),
     }
 
 

@@ -42,7 +42,7 @@ from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
 from .lattice import starts
-from .record import LevelRecord, Proof, Status
+from .record import LevelRecord, Proof, Status, relative_gap
 
 _PREFIX: Final = "instance_"
 _FIELD: Final = {
@@ -71,6 +71,16 @@ class Certificate:
     bound: float
     status: Status
     verdict: Verdict
+
+    @property
+    def gap(self) -> float:
+        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
+        return relative_gap(self)
+
+    @property
+    def forced(self) -> int:
+        """The number of pairs whose jump is that of the centre in every field that could be better."""
+        return self.verdict.forced
 
 
 def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Certificate:

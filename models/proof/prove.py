@@ -53,7 +53,7 @@ _STALLED: Final = 0.5  # share of the gap that half the spacing leaves where bra
 _PARTS: Final = 8  # branches of a level
 _SLOW_BRANCH: Final = 0.05  # as _SLOW, on branches
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
-_MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
+MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
 _MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
 _RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
 _WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
@@ -87,10 +87,12 @@ def prove(
     whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
     proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
     and seldom tight.
-    Raises InputError for a limit that is not positive, a gap below 0, and too many jobs.
+    Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs.
     """
     if (seconds is not None and not seconds > 0) or not gap >= 0 or jobs < 1:
         raise InputError("a proof needs a positive number of seconds and of jobs, and a gap of 0 or more")
+    if norm not in (1, 2):
+        raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
     began = time.monotonic()
     with interruptible() as interrupted, crew(jobs) as hands:
         deadline = Deadline() if seconds is None else Deadline.after(seconds)
@@ -386,7 +388,7 @@ def _labels(waiting: list[_Branch]) -> int:
 def _too_large(lattice: Lattice) -> bool:
     """Whether a level is beyond what memory, time or the digits of an angle allow."""
     fine = lattice.h < np.pi / 2 / _FINEST
-    return fine or bool(lattice.start[-1] > _MOST_LABELS) or lattice.work > _MOST_WORK
+    return fine or bool(lattice.start[-1] > MOST_LABELS) or lattice.work > _MOST_WORK
 
 
 def _centre(field: CrossField) -> CrossField:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, Self
+from typing import TYPE_CHECKING, Final, Literal, Protocol, Self
 
 from ..field.field import CrossField, Norm
 from ..instance.grid import Bools, Floats, Ints
@@ -84,4 +84,20 @@ class Proof:
     @property
     def gap(self) -> float:
         """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return 0.0 if self.status == "optimal" else (self.energy - self.bound) / max(self.energy, 1e-300)
+        return relative_gap(self)
+
+
+class _Said(Protocol):
+    """What a proof and a certificate both say."""
+
+    @property
+    def status(self) -> Status: ...
+    @property
+    def energy(self) -> float: ...
+    @property
+    def bound(self) -> float: ...
+
+
+def relative_gap(said: _Said) -> float:
+    """The gap relative to the energy, (energy - bound) / energy; 0 where the field is proven optimal."""
+    return 0.0 if said.status == "optimal" else (said.energy - said.bound) / max(said.energy, 1e-300)

@@ -43,6 +43,21 @@ def test_field_certificate_and_report_agree(folder):
     ]
 
 
+def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
+    given = ["prove", "mouse", "--size", "4", "--norm", "1", "--time-limit", "100", "--json"]
+    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mouse.proof.field.npz", "mouse.proof.json"]
+    field = read_field(of(tmp_path, "field.npz"))
+    assert (report["norm"], report["status"]) == (1, "optimal")
+    assert report["energy"] == pytest.approx(field.energy(1).total, abs=1e-12)
+    solved = ["solve", "mouse", "--size", "4", "-f", "milp-mccormick", "--time-limit", "100", "--json"]
+    assert invoke([*solved, "-o", str(tmp_path / "milp")]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["status"] == "optimal-global"
+    assert answer["objective_recomputed"] == pytest.approx(report["energy"], rel=1e-6)
+
+
 def test_certificates_are_checked(folder, capsys, tmp_path):
     folder, report = folder
     certificate = of(folder, "certificate.npz")
@@ -80,6 +95,7 @@ def test_tightened_files_of_a_proof(folder, tmp_path):
         ["prove", "-o", "somewhere"],
         ["prove", "mouse", "--check", "it.npz"],
         ["prove", "mouse", "-o", "somewhere", "--gap", "-1"],
+        ["prove", "mouse", "-o", "somewhere", "--norm", "3"],
     ],
 )
 def test_wrong_usage(arguments, tmp_path, monkeypatch):

@@ -28,7 +28,7 @@ def test_shares_that_are_carried_on_rise_faster():
 def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
     """The level is raised once more, and its record replaced; the certificate holds all the same."""
     instance = cf.sample("ring", 12)
-    monkeypatch.setattr(proofs, "_MOST_LABELS", 40_000)
+    monkeypatch.setattr(proofs, "MOST_LABELS", 40_000)
     proof = cf.prove(instance, jobs=1)
     assert proof.ended == "labels"
     assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32]
