@@ -22,7 +22,7 @@ from ...models.search.improvement import first_field
 from ...models.search.power_field import power_field
 from ...models.search.search import Search
 from ..solutions.solution import Solution
-from .compiling import compile_proofs
+from .compiling import compile_proofs, is_compiled
 from .job import Limits
 from .patches import PATCH_SOLVERS, PatchSearch, search_patches
 from .two_stage import find_jumps, fit_angles, jumps_until
@@ -195,10 +195,9 @@ def _teller(request: Request, deadline: Deadline, method: str, things: str) -> C
 
 def _prove(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
-    from ...models.processes.compiled import all_compiled
     from ...models.proof.prove import prove  # it loads what is compiled
 
-    if not all_compiled():
+    if not is_compiled():
         request.progress("prove: compiling what proofs need, once on this machine")
         compile_proofs(request.folder, deadline)
     deadline = deadline.share(_PROVING)

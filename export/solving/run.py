@@ -17,6 +17,7 @@ from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..solutions.solution import Solution
+from .compiling import compiling
 from .job import Limits
 from .methods import METHODS, Candidate, Method, Request, finite, solution_facts
 from .proven import Proven, certified
@@ -143,18 +144,18 @@ def run(
     progress(plan(limits))
     progress("greedy field")
     start = first_field(instance)
-    manifests = write_all(
-        instance,
-        folder / "models",
-        start=start,
-        options=options,
-        dialects=dialects,
-        jobs=jobs,
-        progress=lambda name: progress(f"writing {name}"),
-    )
-    found = _tried_in_turn(
-        Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
-    )
+    with compiling():
+        manifests = write_all(
+            instance,
+            folder / "models",
+            start=start,
+            options=options,
+            dialects=dialects,
+            jobs=jobs,
+            progress=lambda name: progress(f"writing {name}"),
+        )
+        request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
+        found = _tried_in_turn(request)
     # Equal but for rounding: the one that was found first.
     ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
     proven = _certified(found, folder / CERTIFICATE, limits, progress)

@@ -31,6 +31,11 @@ def all_compiled() -> bool:
     return all(map(_is_kept, _MADE))
 
 
+def place() -> Path:
+    """The folder in which the first of these functions is kept. Raises IndexError where there is none."""
+    return Path(_MADE[0].stats.cache_path)
+
+
 def _is_kept(made: Any) -> bool:
     """Whether there is an index of compiled code for the function (`*.nbi`, named after its first line)."""
     code, folder = made.py_func.__code__, made.stats.cache_path
