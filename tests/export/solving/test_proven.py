@@ -16,7 +16,7 @@ from crossfield.models.proof.certificate import read_certificate
 
 
 def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
-    given = ["run", "skew", "--size", "4", "--time-limit", "60", "--threads", "1"]
+    given = ["run", "skew", "--size", "4", "--time-limit", "20", "--threads", "1"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     report = json.loads((tmp_path / "report.json").read_text())
