@@ -6,16 +6,20 @@ import io
 import json
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
 from ...models.errors import CrossfieldError, printable
+from ...models.processes.progress import Progress, silent
+from .telling import telling
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..bundle.manifest import Manifest
     from ..solutions.solution import Solution
     from ..solving.run import Report
@@ -32,23 +36,41 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
+def progress(*, quiet: bool) -> Iterator[Progress]:
+    """A function that shows what is being done, on standard error, unless it shall be quiet.
 
-    Raises InterruptedRunError for a Ctrl-C that nobody caught.
+    On a terminal beside a spinner and the time, elsewhere in a line every few seconds. Raises
+    InterruptedRunError for a Ctrl-C that nobody caught.
     """
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    shown = console.is_terminal and not quiet
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    if quiet:
+        shown: AbstractContextManager[Progress] = nullcontext(silent)
+    elif console.is_terminal:
+        shown = _spinning(console)
+    else:
+        shown = telling(lambda line: typer.echo(printable(line), err=True))
     try:
-        with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
-            task = bar.add_task("starting")
-            yield lambda text: bar.update(task, description=text)
+        with shown as show:
+            yield show
     except KeyboardInterrupt as stop:
         raise InterruptedRunError(INTERRUPTED) from stop
+
+
+@contextmanager
+def _spinning(console: Console) -> Iterator[Progress]:
+    """A function that shows what is being done beside a spinner and the time."""
+    from rich import progress as rich
+
+    columns = (
+        rich.SpinnerColumn(),
+        rich.TextColumn("{task.description}", markup=False),
+        rich.TimeElapsedColumn(),
+    )
+    with rich.Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting")
+        yield lambda text: bar.update(task, description=text)
 
 
 def degrade() -> None:
