@@ -37,8 +37,10 @@ from .options import (
     Relax,
     SecondsEach,
     Size,
+    SkewWeight,
     Start,
     StrokeNorm,
+    StrokeWeight,
     Threads,
     What,
 )
@@ -101,6 +103,8 @@ def run_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     facet: Facet = None,
     time_limit: SecondsEach = 60.0,
     gap: Gap = 1e-6,
@@ -122,7 +126,7 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge)
+        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -151,6 +155,8 @@ def instance_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels."""
@@ -159,7 +165,7 @@ def instance_command(
     _require_suffix(output, (".json", ".npz"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge)
+        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
         write_instance(instance, output)
     if not quiet:
         say(f"{output}: {instance.summary}")
@@ -175,6 +181,8 @@ def export_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
     beta_norm: BetaNorm = None,
@@ -213,7 +221,8 @@ def export_command(
         known(file_format or list(DEFAULTS), FORMATS, "format"),
     )
     with progress(quiet=quiet) as show:
-        loaded = load(instance, size, mask, gauge)
+        show("reading the sketch")
+        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

@@ -12,13 +12,24 @@ if TYPE_CHECKING:
     from ...models.instance.instance import Gauge, Instance
 
 
-def load(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
-    """The instance, of a size that can be written. Raises InputError."""
+def load(
+    what: str,
+    size: int | None,
+    mask: Path | None,
+    gauge: Gauge | None,
+    *,
+    w_strokes: float | None = None,
+    w_beta: float | None = None,
+) -> Instance:
+    """The instance, of a size that can be written, under the weights that are given, a file's too.
+
+    Raises InputError, and InstanceError for a weight that cannot be.
+    """
     import numpy as np
 
     from ...models.sketch.read import available_memory, check_memory
 
-    instance = _found(what, size, mask, gauge)
+    instance = _found(what, size, mask, gauge).with_weights(w_strokes, w_beta)
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())
     return instance
 

@@ -58,6 +58,24 @@ GaugeName = Annotated[
         " exact), or 0 to 90 as the paper prints it (box).",
     ),
 ]
+StrokeWeight = Annotated[
+    float | None,
+    typer.Option(
+        "--w-strokes",
+        metavar="X",
+        help="Weight of the distance from the strokes in the energy, 0 to {most weight}; by default {stroke"
+        " weight}, or that of the instance file.",
+    ),
+]
+SkewWeight = Annotated[
+    float | None,
+    typer.Option(
+        "--w-beta",
+        metavar="X",
+        help="Weight of the skew beta in the energy, 0 to {most weight}; by default {skew weight}, or that of"
+        " the instance file.",
+    ),
+]
 Facet = Annotated[
     Literal["hull", "printed"] | None,
     typer.Option("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),

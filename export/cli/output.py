@@ -5,16 +5,21 @@ from __future__ import annotations
 import io
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
 from ...models.errors import CrossfieldError, printable
+from ...models.processes.progress import Progress, silent
+from .telling import telling
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..bundle.manifest import Manifest
     from ..solutions.solution import Solution
     from ..solving.run import Report
@@ -31,23 +36,41 @@ class InterruptedRunError(CrossfieldError):
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A function that shows what is being done: on a terminal beside a spinner and the time, else nowhere.
+def progress(*, quiet: bool) -> Iterator[Progress]:
+    """A function that shows what is being done, on standard error, unless it shall be quiet.
 
-    Raises InterruptedRunError for a Ctrl-C that nobody caught.
+    On a terminal beside a spinner and the time, elsewhere in a line every few seconds. Raises
+    InterruptedRunError for a Ctrl-C that nobody caught.
     """
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    shown = console.is_terminal and not quiet
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    if quiet:
+        shown: AbstractContextManager[Progress] = nullcontext(silent)
+    elif console.is_terminal:
+        shown = _spinning(console)
+    else:
+        shown = telling(lambda line: typer.echo(printable(line), err=True))
     try:
-        with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
-            task = bar.add_task("starting")
-            yield lambda text: bar.update(task, description=text)
+        with shown as show:
+            yield show
     except KeyboardInterrupt as stop:
         raise InterruptedRunError(INTERRUPTED) from stop
+
+
+@contextmanager
+def _spinning(console: Console) -> Iterator[Progress]:
+    """A function that shows what is being done beside a spinner and the time."""
+    from rich import progress as rich
+
+    columns = (
+        rich.SpinnerColumn(),
+        rich.TextColumn("{task.description}", markup=False),
+        rich.TimeElapsedColumn(),
+    )
+    with rich.Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting")
+        yield lambda text: bar.update(task, description=text)
 
 
 def degrade() -> None:
@@ -102,10 +125,15 @@ def show_table(
     console.print(table)
 
 
+_LEGEND: Final = """\
+  off: mean angle from a stroke to the nearer line; <45°: pixels whose lines are
+  less than 45 degrees apart; sing.: singularities; s: seconds"""
+
+
 def show_report(report: Report, folder: Path) -> None:
     """Print what a run found and where it lies, and what failed."""
     gap = ("gap",) if report.proven else ()  # the bound is the same for all
-    columns = ("method", "2-norm", *gap, "1-norm", "singular", "|beta|", "seconds", "status")
+    columns = ("method", "2-norm", *gap, "1-norm", "off", "<45°", "sing.", "s", "status")
     rows = []
     for candidate in report.candidates:
         facts = report.facts(candidate)
@@ -113,22 +141,34 @@ def show_report(report: Report, folder: Path) -> None:
             f"{facts['energy_2_norm']:.4g}",
             *([_gap(facts)] if gap else []),
             f"{facts['energy_1_norm']:.4g}",
+            f"{facts['stroke_deviation_mean_degrees']:.1f}°",
+            f"{facts['lines_under_45_degrees']:.0%}",
             str(facts["singularities"]),
-            f"{facts['mean_abs_beta_degrees']:.1f}°",
             f"{facts['seconds']:.1f}",
         ]
         mark = "*" if candidate is report.best else ""
-        rows.append([candidate.method + mark, *numbers, str(facts.get("status", ""))])
+        rows.append([candidate.method + mark, *numbers, _status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
+    say(_LEGEND)
+    for candidate in report.candidates:
+        if candidate.solution and (told := _bound(report.facts(candidate))):
+            say(f"  {candidate.method} {told}")
     best = report.facts(report.best)
     words = ", proven optimal" if best.get("proven_optimal") else ""
     say(f"* kept, the least 2-norm energy{words}: {folder / 'field.npz'} (.json, .rawfield)")
+    quantile = f"{best['stroke_deviation_90_percent_degrees']:.1f}°"
+    far = f"{best['strokes_beyond_10_degrees']:.0%}"
+    say(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
     if report.proven:
         bound = f"{best['bound_2_norm']:.10g}"
         say(f"  no field has less 2-norm energy than {bound}; certificate: {report.proven.certificate}")
     if not report.interrupted:
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
+    stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
+    say(
+        textwrap.fill(f"{report.seconds:.1f} s: {stages}", WIDTH, initial_indent="  ", subsequent_indent="  ")
+    )
     for candidate in report.candidates:
         if candidate.interrupted:
             complain(f"{candidate.method}: interrupted; its best field so far was kept")
@@ -138,6 +178,27 @@ def show_report(report: Report, folder: Path) -> None:
 
 def _gap(facts: dict[str, Any]) -> str:
     return "optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.2%}"
+
+
+def _status(facts: dict[str, Any]) -> str:
+    """What a solver says of its answer, or that it gave back its start without a proof that this is best."""
+    status = str(facts.get("status", ""))
+    return "start returned" if _gave_back(facts) else status
+
+
+def _gave_back(facts: dict[str, Any]) -> bool:
+    return bool(facts.get("start_returned")) and not str(facts["status"]).startswith("optimal")
+
+
+def _bound(facts: dict[str, Any]) -> str:
+    """How far a solver's answer is from its bound; empty where that is nothing, or there is none to miss."""
+    if str(facts["status"]).startswith("optimal"):
+        return ""
+    how = "gave back its start" if _gave_back(facts) else ""
+    if facts["gap"] is None:
+        return how and f"{how}, without a bound"
+    words = f"objective {facts['objective_recomputed']:.4g}, bound {facts['dual_bound']:.4g}"
+    return f"{how or 'did not close its gap'}: {words}, gap {facts['gap']:.0%}"
 
 
 def show_manifests(manifests: list[Manifest], folder: Path) -> None:
@@ -171,6 +232,8 @@ _ONLY_IF_ANY: Final = (
     "contradictions",
     "interrupted",
     "dual_bound",
+    "gap",
+    "start_returned",
     "worst_family",
     "message",
 )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from .inputs import load
-from .options import GaugeName, Json, Mask, Quiet, Size, Start
+from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, Start, StrokeWeight
 from .output import complain, progress, say, say_json, show_facts
 
 if TYPE_CHECKING:
@@ -43,6 +43,8 @@ def prove_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     start: Start = None,
     time_limit: Annotated[
         float,
@@ -85,7 +87,7 @@ def prove_command(
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(instance, size, mask, gauge)
+        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

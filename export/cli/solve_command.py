@@ -22,8 +22,10 @@ from .options import (
     Relax,
     SecondsInAll,
     Size,
+    SkewWeight,
     Start,
     StrokeNorm,
+    StrokeWeight,
     Threads,
     What,
 )
@@ -63,6 +65,8 @@ def solve_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
     beta_norm: BetaNorm = None,
@@ -88,7 +92,8 @@ def solve_command(
     if (formulation is None) == (method is None):
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=quiet) as show:
-        loaded = load(instance, size, mask, gauge)
+        show("reading the sketch")
+        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
         request = Request(
             loaded,
             output,

@@ -40,7 +40,8 @@ class Solution:
     claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual
     bound, where one is known. status is what remains of the claim. rounded: the furthest that rounding moved
     an integer column. tolerance: how far the point may be off before it contradicts the claim, in units of a
-    column. interrupted: whether the user ended the search.
+    column. interrupted: whether the user ended the search. start_returned: whether the point is the start
+    that the solver was given; None where that is not known.
     """
 
     problem: Problem
@@ -54,6 +55,7 @@ class Solution:
     unknown: int = 0
     seconds: float | None = None
     interrupted: bool = False
+    start_returned: bool | None = None
     tolerance: float = TOLERANCE
 
     @cached_property
@@ -82,6 +84,14 @@ class Solution:
     def objective(self) -> float | None:
         """The objective at the point, recomputed."""
         return None if self.point is None else self.problem.objective_value(self.point)
+
+    @property
+    def gap(self) -> float | None:
+        """How far the dual bound is below the objective, relative to the objective; None without either."""
+        if self.objective is None or self.bound is None:
+            return None
+        apart = max(self.objective - self.bound, 0.0)
+        return apart and (apart / abs(self.objective) if self.objective else np.inf)
 
     @cached_property
     def violation(self) -> Violation | None:

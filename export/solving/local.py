@@ -12,15 +12,19 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
 from ...models.errors import InputError, MissingSolverError, SolutionError, UnsupportedBySolverError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
+from ...models.instance.grid import Floats
 from ...models.processes.deadline import Deadline
 from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, leave_manifest
 from ..formats.registry import FORMATS, carried, write
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import DRIVEN, PROGRAMS, Solver, takes_in
+from .child import FEASIBLE
 from .job import Job, Limits, RunEnd
 
 
@@ -119,7 +123,20 @@ def _solve_in(
         # It is cut off by a full disk, most likely: nobody shall take it for an answer.
         solution.unlink(missing_ok=True)
         raise
-    return replace(found, bound=ended.bound, interrupted=ended.interrupted, seconds=seconds)
+    return replace(
+        found,
+        bound=ended.bound,
+        interrupted=ended.interrupted,
+        seconds=seconds,
+        start_returned=_is_start(found.point, point),
+    )
+
+
+def _is_start(point: Floats | None, start: Floats | None) -> bool | None:
+    """Whether the answer is the start but for rounding; None without the one or the other."""
+    if point is None or start is None:
+        return None
+    return bool(np.abs(point - start).max(initial=0.0) <= FEASIBLE)
 
 
 def _run(solver: Solver, job: Job) -> RunEnd:

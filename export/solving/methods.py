@@ -50,20 +50,31 @@ class Candidate:
     proof: Proof | None = None
 
     def facts(self) -> dict[str, Any]:
-        """What a report says of it: energies in both norms, singularities, skew, claims beside values."""
-        answer = self.field
+        """What a report says of it: the facts of its field, seconds, claims beside values."""
         facts: dict[str, Any] = {
             "method": self.method,
-            "energy_2_norm": answer.energy(2).total,
-            "energy_1_norm": answer.energy(1).total,
-            "singularities": len(answer.singularities.index),
-            "degenerate_pixels": int(answer.degenerate.sum()),
-            "mean_abs_beta_degrees": float(np.degrees(np.abs(answer.beta).mean())),
+            **field_facts(self.field),
             "seconds": round(self.seconds, 3),
             "interrupted": self.interrupted,
             **dict(self.counts),
         }
         return facts if self.solution is None else facts | solution_facts(self.solution)
+
+
+def field_facts(field: CrossField) -> dict[str, Any]:
+    """What is told of a field wherever one comes out: energies, singularities, skew, and its shape."""
+    shape = field.shape
+    return {
+        "energy_2_norm": field.energy(2).total,
+        "energy_1_norm": field.energy(1).total,
+        "stroke_deviation_mean_degrees": float(np.degrees(shape.mean_deviation)),
+        "stroke_deviation_90_percent_degrees": float(np.degrees(shape.most_deviation)),
+        "strokes_beyond_10_degrees": shape.far_strokes,
+        "lines_under_45_degrees": shape.narrow_pixels,
+        "singularities": len(field.singularities.index),
+        "degenerate_pixels": int(field.degenerate.sum()),
+        "mean_abs_beta_degrees": float(np.degrees(np.abs(field.beta).mean())),
+    }
 
 
 def solution_facts(solution: Solution) -> dict[str, Any]:
@@ -79,6 +90,8 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
         "objective_reported": solution.reported,
         "objective_recomputed": solution.objective,
         "dual_bound": solution.bound,
+        "gap": solution.gap,
+        "start_returned": solution.start_returned,
         "worst_violation": None if violation is None else violation.worst,
         "worst_family": None if violation is None else violation.worst_family,
         "furthest_rounding": solution.rounded,

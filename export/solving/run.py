@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...models.errors import CrossfieldError
+from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
@@ -19,23 +20,23 @@ from ..formats.registry import generator
 from ..solutions.solution import Solution
 from .compiling import compiling
 from .job import Limits
-from .methods import METHODS, Candidate, Method, Request, finite, solution_facts
+from .methods import METHODS, Candidate, Method, Request, field_facts, finite, solution_facts
 from .proven import Proven, certified
+from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 REPORT: Final = "report.json"
 CERTIFICATE: Final = "certificate.npz"
+START: Final = "start"
+"""What the field is called that the methods of a run start from: the improved greedy field."""
 
 
 def facts_with_energies(solution: Solution) -> dict[str, Any]:
-    """The facts of a solution and, where it has a point, the energies of its field in both norms."""
+    """The facts of a solution and, where it has a point, those of its field."""
     facts = solution_facts(solution)
     if solution.point is None:
         return facts
-    return facts | {
-        "energy_2_norm": finite(solution.field.energy(2).total),
-        "energy_1_norm": finite(solution.field.energy(1).total),
-    }
+    return facts | {key: finite(value) for key, value in field_facts(solution.field).items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Report:
 
     Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate` or
     `drawing`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of the 2-norm
-    energy of all fields, None where there is none.
+    energy of all fields, None where there is none. stages: the seconds of each stage, in turn.
     """
 
     instance: Instance
@@ -53,6 +54,7 @@ class Report:
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
     proven: Proven | None = None
+    stages: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Candidate:
@@ -69,6 +71,11 @@ class Report:
         """Number of solver files, lists of names not counted."""
         names = [entry["name"] for manifest in self.manifests for entry in manifest.document["files"]]
         return sum(not name.removesuffix(".gz").endswith((".row", ".col")) for name in names)
+
+    @property
+    def seconds(self) -> float:
+        """All seconds of the run until its report was written: those of the stages together."""
+        return round(sum(self.stages.values()), 3)
 
     def document(self) -> dict[str, Any]:
         """The report as JSON: instance, methods, files."""
@@ -89,10 +96,14 @@ class Report:
                 "stroke_pixels": len(instance.theta),
                 "parts": instance.grid.parts,
                 "pixel_size": instance.pixel_size,
+                "w_strokes": instance.w_strokes,
+                "w_beta": instance.w_beta,
             },
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
             "methods": [self.facts(candidate) for candidate in self.candidates],
+            "seconds": self.seconds,
+            "stages": self.stages,
             "failures": self.failures,
             "interrupted": self.interrupted or None,
             "files": self.files,
@@ -135,15 +146,16 @@ def run(
     options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
     method that searches; `progress` is first told what that makes in all. A method that fails is noted in the
     report; the fields that were found stand. Ctrl-C ends the present method with its best field and the run
-    with it: no further method is tried and nothing drawn. Before the first field is there it goes on as
+    with it: no further method is tried and nothing drawn. Before the solver files are there it goes on as
     KeyboardInterrupt. Raises OutputError.
     """
     folder, limits = make_folder(folder), limits or Limits()
-    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
-        (folder / stale).unlink(missing_ok=True)
+    _clear(folder)
     progress(plan(limits))
+    watch = Stopwatch()
     progress("greedy field")
     start = first_field(instance)
+    watch.lap(START)
     with compiling():
         manifests = write_all(
             instance,
@@ -154,18 +166,29 @@ def run(
             jobs=jobs,
             progress=lambda name: progress(f"writing {name}"),
         )
+        watch.lap("models")
         request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
-        found = _tried_in_turn(request)
+        found = _tried_in_turn(request, start, watch)
     # Equal but for rounding: the one that was found first.
     ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
     proven = _certified(found, folder / CERTIFICATE, limits, progress)
+    watch.lap("certificate")
     report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
+    watch.lap("fields")
     if not report.interrupted:
         report = _drawn(report, folder, progress)
+        watch.lap("pictures")
+    report = replace(report, stages=watch.stages)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
     return report
+
+
+def _clear(folder: Path) -> None:
+    """Take away what an earlier run has left that this one may not come to."""
+    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
+        (folder / stale).unlink(missing_ok=True)
 
 
 @dataclass
@@ -177,9 +200,9 @@ class _Found:
     interrupted: str = ""
 
 
-def _tried_in_turn(request: Request) -> _Found:
-    """What the methods of a run find, one after the other, until one of them is interrupted."""
-    found = _Found()
+def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
+    """The start, and what the methods of a run find in turn, until one of them is interrupted."""
+    found = _Found([Candidate(START, start, watch.stages[START])])
     for method in _tried():
         try:
             for candidate in method.find(request):
@@ -188,9 +211,8 @@ def _tried_in_turn(request: Request) -> _Found:
         except CrossfieldError as error:
             found.failures[method.name] = str(error)
         except KeyboardInterrupt:
-            if not found.candidates:
-                raise
             found.interrupted = method.name
+        watch.lap(method.name)
         if found.interrupted:
             break
     return found

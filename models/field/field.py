@@ -23,6 +23,13 @@ Norm = Literal[1, 2]
 
 DEGENERATE: Final = np.radians(2.5)
 """Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
+FAR: Final = np.radians(10)
+"""A stroke further than this from both lines was not followed."""
+NARROW: Final = QUARTER
+"""Lines that are less than this apart are a narrow cross."""
+MOST: Final = 0.9
+"""Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
+_ROUNDING: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,22 @@ class Energy:
     def total(self) -> float:
         """Smooth + strokes + beta."""
         return self.smooth + self.strokes + self.beta
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a designer sees of a field, whatever its energy and the weights.
+
+    mean_deviation, most_deviation: mean and 90 % quantile over the stroke pixels of the angle between the
+    stroke and the nearer line, in [0, pi/2] radians. far_strokes: share of the stroke pixels where it is more
+    than 10 degrees. narrow_pixels: share of all pixels whose lines are less than 45 degrees apart; inside the
+    bounds they are pi/2 - 2|beta| apart, so that is where |beta| > pi/8.
+    """
+
+    mean_deviation: float
+    most_deviation: float
+    far_strokes: float
+    narrow_pixels: float
 
 
 @dataclass(frozen=True)
@@ -90,7 +113,7 @@ class CrossField:
         if self.instance.sha256 != instance.sha256:
             raise InstanceError(
                 f"the field is on another instance ({self.instance.summary}), not on this one "
-                f"({instance.summary}); give a field of the same sketch, size and gauge"
+                f"({instance.summary}); give a field of the same sketch, size, gauge and weights"
             )
 
     @cached_property
@@ -164,6 +187,24 @@ class CrossField:
     def angle_between(self) -> Floats:
         """Angle between the two lines, in [0, pi/2] radians; shape (n,)."""
         return line_difference(self.alpha + self.beta, self.alpha + HALF - self.beta)
+
+    @property
+    def stroke_deviation(self) -> Floats:
+        """Angle between each stroke and the nearer line, in [0, pi/2] radians; shape (s,)."""
+        at, theta = self.instance.stroke_index, self.instance.theta
+        to_u = line_difference((self.alpha + self.beta)[at], theta)
+        return np.minimum(to_u, line_difference((self.alpha + HALF - self.beta)[at], theta))
+
+    @property
+    def shape(self) -> Shape:
+        """How far the lines are from the strokes, and how many crosses are narrow: no energy, no weights."""
+        deviation = self.stroke_deviation
+        return Shape(
+            mean_deviation=float(deviation.mean()),
+            most_deviation=float(np.quantile(deviation, MOST)),
+            far_strokes=float(np.mean(deviation > FAR)),
+            narrow_pixels=float(np.mean(self.angle_between < NARROW - _ROUNDING)),
+        )
 
     def cross_error(self, u: Floats, v: Floats) -> Floats:
         """Angle to the crosses with line angles u and v (n,), in radians.

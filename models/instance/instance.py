@@ -236,6 +236,12 @@ class Instance:
         """The same instance under another gauge."""
         return replace(self, gauge=gauge)
 
+    def with_weights(self, w_strokes: float | None = None, w_beta: float | None = None) -> Instance:
+        """The same instance under other weights; None leaves a weight as it is. Raises InstanceError."""
+        given = {"w_strokes": w_strokes, "w_beta": w_beta}
+        changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        return replace(self, **changed) if changed else self
+
     def turned(self) -> Instance:
         """The instance of the sketch turned by a quarter counter-clockwise."""
         row, column = self.stroke_pixels.T
@@ -258,13 +264,18 @@ class Instance:
 
     @property
     def summary(self) -> str:
-        """Name, grid, pixels, strokes, separate parts of the mask and gauge in a line."""
+        """Name, grid, pixels, strokes, parts of the mask, gauge, and weights that are not the defaults."""
         grid = self.grid
         parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
         return (
             f"{self.name}: {grid.width} x {grid.height}, {grid.size} pixels{parts}, "
-            f"{len(self.theta)} with strokes, gauge {self.gauge}"
+            f"{len(self.theta)} with strokes, gauge {self.gauge}{self._other_weights}"
         )
+
+    @property
+    def _other_weights(self) -> str:
+        names = [name for name in ("w_strokes", "w_beta") if getattr(self, name) != getattr(Instance, name)]
+        return "".join(f", {name} {getattr(self, name):g}" for name in names)
 
     @cached_property
     def sha256(self) -> str:

@@ -64,6 +64,8 @@ def read_sketch(
     mask: str | Path | None = None,
     gauge: Gauge = "strokes",
     name: str | None = None,
+    w_strokes: float | None = None,
+    w_beta: float | None = None,
 ) -> Instance:
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
@@ -73,11 +75,13 @@ def read_sketch(
     mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
     from half its area on.
-    gauge: as in Instance. name: the instance's name; by default made from the file name.
+    gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
+    weights of the stroke and the skew term, as in Instance; None: those of an Instance without any.
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
-    none. Raises InputError, with the file, for anything that cannot be used.
+    none. Raises InputError, with the file, for anything that cannot be used, and InstanceError for a weight
+    that cannot be.
     """
     path = Path(path)
     check_size(size)
@@ -86,9 +90,10 @@ def read_sketch(
     try:
         with naming(path):
             name = name or name_from(path.stem)
-            return instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
+            read = instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
+    return read.with_weights(w_strokes, w_beta)
 
 
 def instance_of(

@@ -61,16 +61,27 @@ def samples() -> list[Sample]:
     return list(SAMPLES.values())
 
 
-def sample(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> Instance:
+def sample(
+    name: str,
+    size: int = DEFAULT_SIZE,
+    gauge: Gauge = "strokes",
+    *,
+    w_strokes: float | None = None,
+    w_beta: float | None = None,
+) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
-    name: of one in `samples()`; size: 1..4096; gauge: as in Instance. For the exact answer of an analytic one
-    see `analytic`. Raises InputError for an unknown name or size.
+    name: of one in `samples()`; size: 1..4096; gauge, w_strokes, w_beta: as in Instance, its weights where
+    None. For the exact answer of an analytic one see `analytic`. Raises InputError for an unknown name or
+    size, InstanceError for a weight that cannot be.
     """
     check_size(size)
     if _known(name).kind == "analytic":
-        return analytic(name, size, gauge).instance
-    return instance_of(sample_svg(name).encode(), size=size, name=name, source=f"{name}.svg", gauge=gauge)
+        found = analytic(name, size, gauge).instance
+    else:
+        svg = sample_svg(name).encode()
+        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge)
+    return found.with_weights(w_strokes, w_beta)
 
 
 def sample_svg(name: str) -> str:

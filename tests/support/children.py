@@ -1,8 +1,9 @@
 """Processes of the tests' own: programs that are interrupted, as by Ctrl-C on a terminal,
-and who is left of whom.
+what they complain of, and who is left of whom.
 """
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -27,6 +28,11 @@ def interrupted(program: str) -> list[str]:
     out, err = child.communicate()
     assert (child.returncode, err) == (0, "")
     return out.splitlines()[-1].split()
+
+
+def complaints(err: str) -> str:
+    """Standard error without the lines that say, every few seconds, what is being done."""
+    return re.sub(r"^\[\d+ s\] .*\n", "", err, flags=re.MULTILINE)
 
 
 def running() -> dict[int, tuple[int, int]]:

@@ -16,7 +16,7 @@ from crossfield.models.sketch.read import DEFAULT_SIZE
 
 NAMED = {
     "run": ["samples", "size", "methods of a run"],
-    "instance": ["samples", "size"],
+    "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
     "export": ["samples", "size", "formulations", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "methods", "solvers"],
     "prove": ["samples", "size"],

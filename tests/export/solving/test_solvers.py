@@ -14,6 +14,7 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
+from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.nl import Layout
@@ -533,7 +534,7 @@ def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
             time.sleep(0.05)
         process.send_signal(number)
         out, err = process.communicate()
-    return process.returncode, out, err
+    return process.returncode, out, complaints(err)
 
 
 CTRL_C = {

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import crossfield as cf
 import pytest
-from children import all_end, descendants, running
+from children import all_end, complaints, descendants, running
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
 
@@ -43,7 +43,7 @@ def press(process, times=1):
     for _ in range(times):
         os.killpg(process.pid, signal.SIGINT)
     err = process.communicate()[1]
-    return process.returncode, err
+    return process.returncode, complaints(err)
 
 
 def pictures(folder):
@@ -57,7 +57,7 @@ def test_ctrl_c_in_the_search_ends_the_run_with_its_best_field(tmp_path):
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["interrupted"] == "search"
     by_method = {row["method"]: row for row in report["methods"]}
-    assert set(by_method) == {"greedy", "power", "power + QP", "search"}
+    assert set(by_method) == {"start", "greedy", "power", "power + QP", "search"}
     assert by_method["search"]["interrupted"] is True
     assert cf.read_field(tmp_path / "field.npz").energy().total == pytest.approx(
         min(row["energy_2_norm"] for row in report["methods"]), rel=1e-9

@@ -1,0 +1,80 @@
+"""The weights of strokes and skew, given wherever a sketch is read: to the commands and in Python."""
+
+import crossfield as cf
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.models.errors import InstanceError
+from crossfield.models.instance.instance import MOST_WEIGHT, Instance
+from crossfield.models.sketch.samples import sample_svg
+
+GIVEN = ["--w-strokes", "10", "--w-beta", "1e-4"]
+WEIGHTS = {"w_strokes": 10.0, "w_beta": 1e-4}
+
+
+@pytest.fixture
+def drawing(tmp_path):
+    path = tmp_path / "mouse.svg"
+    path.write_text(sample_svg("mouse"), encoding="utf-8")
+    return path
+
+
+def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawing):
+    """A file is weighed again: the rest of it, its name too, stays; a weight that is not given is kept."""
+    file = cf.write_instance(cf.sample("mouse", 8, w_beta=1e-3), tmp_path / "file.json")
+    for what, size, wanted in (
+        (drawing, ["--size", "8"], cf.read_sketch(drawing, size=8, **WEIGHTS)),
+        ("mouse", ["--size", "8"], cf.sample("mouse", 8, **WEIGHTS)),
+        ("wave_sheet", ["--size", "8"], cf.sample("wave_sheet", 8, **WEIGHTS)),
+        (file, [], cf.sample("mouse", 8, **WEIGHTS)),
+    ):
+        made = tmp_path / "made.npz"
+        assert invoke(["instance", str(what), *size, *GIVEN, "-q", "-o", str(made)]) == 0
+        instance = cf.read_instance(made)
+        assert instance.sha256 == wanted.sha256
+        assert (instance.w_strokes, instance.w_beta) == (10.0, 1e-4)
+    kept = cf.sample("mouse", 8, w_beta=1e-3).with_weights(w_strokes=10)
+    assert (kept.w_strokes, kept.w_beta) == (10.0, 1e-3)
+    assert len({kept.sha256, instance.sha256, cf.read_instance(file).sha256}) == 3
+
+
+def test_every_command_that_reads_a_sketch_takes_them(tmp_path, capsys):
+    """`run` too: tests/export/solving/test_run_truth.py."""
+    sketch, wanted = ["skew", "--size", "4", *GIVEN], cf.sample("skew", 4, **WEIGHTS).sha256
+    commands = {
+        "export": ["-f", "qp-fixed", "-F", "nl"],
+        "solve": ["-m", "greedy"],
+        "prove": ["--time-limit", "30"],
+    }
+    for command, options in commands.items():
+        assert invoke([command, *sketch, *options, "-o", str(tmp_path / command)]) == 0
+        assert "w_strokes 10, w_beta 0.0001" in capsys.readouterr().out
+    assert cf.read_instance(tmp_path / "export" / "skew.instance.json").sha256 == wanted
+    for field in ("solve/skew.greedy.field.npz", "prove/skew.proof.field.npz"):
+        assert cf.read_field(tmp_path / field).instance.sha256 == wanted
+
+
+def test_weights_that_cannot_be_are_refused(tmp_path, capsys, drawing):
+    file = cf.write_instance(cf.sample("skew", 4), tmp_path / "skew.json")
+    for option, value in (("--w-strokes", "-1"), ("--w-beta", "nan"), ("--w-strokes", "1e7")):
+        name = option[2:].replace("-", "_")
+        for what in ("skew", drawing, file):
+            assert invoke(["export", str(what), option, value, "-o", str(tmp_path / "out")]) == 1
+            assert f"crossfield: {name} is {float(value)}; it must be between 0" in capsys.readouterr().err
+        with pytest.raises(InstanceError, match=f"{name} is"):
+            cf.read_sketch(drawing, size=8, **{name: float(value)})
+    assert not (tmp_path / "out").exists()
+    assert cf.sample("skew", 4, w_strokes=0, w_beta=MOST_WEIGHT).w_beta == MOST_WEIGHT
+
+
+def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
+    cf.write_field(cf.greedy(cf.sample("skew", 4)), tmp_path / "field.npz")
+    start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
+    assert invoke(["solve", "skew", "--size", "4", "--w-strokes", "10", "-m", "search", *start]) == 1
+    said = capsys.readouterr().err
+    assert "w_strokes 10" in said
+    assert "size, gauge and weights" in said
+
+
+def test_the_summary_names_weights_that_are_not_the_defaults():
+    assert "w_" not in cf.sample("skew", 4).summary
+    assert cf.sample("skew", 4, w_strokes=Instance.w_strokes, w_beta=1.0).summary.endswith(", w_beta 1")

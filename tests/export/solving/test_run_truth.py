@@ -1,0 +1,88 @@
+"""A run tells where it began, which solver gave back its start, and where the time went."""
+
+import json
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.cli.output import show_report
+from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solving.methods import METHODS, Candidate
+from crossfield.export.solving.run import Report
+from crossfield.export.solving.stopwatch import Stopwatch
+from crossfield.models.search.improvement import first_field
+
+
+def test_stages_are_all_the_time_whatever_is_rounded():
+    times = iter([10.0, 10.00049, 10.00098, 11.5, 13.25])
+    watch = Stopwatch(lambda: next(times))
+    for stage in ("a", "b", "c", "a"):
+        watch.lap(stage)
+    assert watch.stages == {"a": pytest.approx(1.75), "b": 0.001, "c": pytest.approx(1.499)}
+    assert sum(watch.stages.values()) == pytest.approx(3.25, abs=1e-3)
+
+
+def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
+    instance = cf.sample("mouse", 8, w_strokes=10)
+    given = [
+        "run",
+        "mouse",
+        "--size",
+        "8",
+        "--w-strokes",
+        "10",
+        "--time-limit",
+        "0.5",
+        "--threads",
+        "1",
+        "-q",
+    ]
+    assert invoke([*given, "-o", str(tmp_path)]) == 0
+    told = json.loads((tmp_path / "report.json").read_text())
+    assert {key: told["instance"][key] for key in ("sha256", "w_strokes", "w_beta")} == {
+        "sha256": instance.sha256,
+        "w_strokes": 10.0,
+        "w_beta": instance.w_beta,
+    }
+    rows = {row["method"]: row for row in told["methods"]}
+    assert rows["start"]["energy_2_norm"] == first_field(instance).energy(2).total
+    assert rows["start"]["seconds"] == told["stages"]["start"]
+    tried = [method.name for method in METHODS.values() if method.in_runs]
+    assert list(told["stages"]) == ["start", "models", *tried, "certificate", "fields", "pictures"]
+    assert told["seconds"] == round(sum(told["stages"].values()), 3)
+    shape = cf.read_field(tmp_path / "field.npz").shape
+    best = rows[told["best"]]
+    assert best["strokes_beyond_10_degrees"] == shape.far_strokes
+    assert best["lines_under_45_degrees"] == shape.narrow_pixels
+    assert best["stroke_deviation_mean_degrees"] == pytest.approx(np.degrees(shape.mean_deviation))
+    assert best["stroke_deviation_90_percent_degrees"] == pytest.approx(np.degrees(shape.most_deviation))
+
+
+def test_a_solver_without_time_gives_back_its_start_and_it_is_said(capsys, tmp_path):
+    instance = cf.sample("mouse", 8)
+    problem, start = cf.formulate(instance, "milp-mccormick"), first_field(instance)
+    given_back = cf.solve(problem, limits=cf.Limits(1e-6), start=start)
+    assert given_back.start_returned is True
+    assert given_back.gap is None
+    late = replace(given_back, claimed=Status.LIMIT_WITH_POINT, bound=0.25 * given_back.objective)
+    assert late.gap == pytest.approx(0.75)
+    milp = Candidate("MILP", late.field, 1.0, late)
+    show_report(Report(instance, (Candidate("start", start, 0.1), milp), (), stages={"start": 0.1}), tmp_path)
+    said = capsys.readouterr().out
+    assert "start returned" in said
+    assert f"MILP gave back its start: objective {late.objective:.4g}, bound" in said
+    assert "gap 75%" in said
+    assert "0.1 s: start 0.1" in said
+
+
+def test_another_point_than_the_start_is_none_and_a_proven_one_has_no_gap():
+    instance = cf.sample("skew", 4)
+    problem, start = cf.formulate(instance, "milp-mccormick"), cf.power_field(instance).with_best_jumps()
+    solved = cf.solve(problem, limits=cf.Limits(60, threads=1), start=start)
+    assert solved.status == Status.OPTIMAL_GLOBAL
+    assert solved.start_returned is False
+    assert solved.gap == pytest.approx((solved.objective - solved.bound) / solved.objective)
+    assert solved.gap < 1e-3
+    assert cf.solve(problem, limits=cf.Limits(60, threads=1)).start_returned is None
