@@ -19,7 +19,7 @@ GROUND: Final = "models"
 
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations",
-    "models/search", "models/proof", "templates",
+    "models/search", "models/proof", "models/evaluation", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions",
     "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
@@ -82,7 +82,8 @@ WIDTH: Final = WHOLE + 2 * LEFT
 PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
-    "models/search": (1, 470), "models/proof": (2, 470), "templates": (3, 470), "export/bundle": (4, 470),
+    "models/evaluation": (0, 470), "models/search": (1, 470), "models/proof": (2, 470),
+    "templates": (3, 470), "export/bundle": (4, 470),
     "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
     "export/solving": (4, 620),
 }  # fmt: skip
@@ -100,6 +101,7 @@ FLOW: Final = (
     ("templates", "export/formats", "layouts", ""),
     ("models/search", "models/field", "CrossField", ""),
     ("models/search", "models/proof", "a field", ""),
+    ("models/sketch", "models/evaluation", "curves", ""),
 )
 """Where data goes: from, to, and what it is called."""
 INK: Final = {

@@ -20,6 +20,7 @@ NAMED = {
     "export": ["samples", "size", "formulations", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "methods", "solvers"],
     "prove": ["samples", "size"],
+    "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
     "draw": ["pictures"],
     "verify": ["programs"],
