@@ -82,8 +82,7 @@ WIDTH: Final = WHOLE + 2 * LEFT
 PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
-    "models/evaluation": (0, 470), "models/search": (1, 470), "models/proof": (2, 470),
-    "templates": (3, 470), "export/bundle": (4, 470),
+    "models/search": (1, 470), "models/proof": (2, 470), "templates": (3, 470), "export/bundle": (4, 470),
     "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
     "export/solving": (4, 620),
 }  # fmt: skip
@@ -101,7 +100,6 @@ FLOW: Final = (
     ("templates", "export/formats", "layouts", ""),
     ("models/search", "models/field", "CrossField", ""),
     ("models/search", "models/proof", "a field", ""),
-    ("models/sketch", "models/evaluation", "curves", ""),
 )
 """Where data goes: from, to, and what it is called."""
 INK: Final = {
