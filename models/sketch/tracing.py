@@ -92,15 +92,15 @@ def _redrawn(through: csr_array) -> Indices:
 
     through: 1 where a curve runs through a stroke pixel, (c, s).
     """
-    shared = (through @ through.T).tocsr()
-    length = through.sum(axis=1)
+    at_stroke = through.T.tocsr()
+    length = np.diff(through.indptr)
     stands_for = np.full(len(length), -1)
     for curve in np.argsort(-length, kind="stable"):
         if stands_for[curve] >= 0:
             continue
-        ends = slice(shared.indptr[curve], shared.indptr[curve + 1])
-        other = shared.indices[ends]
-        same = (shared.data[ends] > REDRAWN * length[other]) & (stands_for[other] < 0)
+        strokes = through.indices[through.indptr[curve] : through.indptr[curve + 1]]
+        other, shared = np.unique(at_stroke[strokes].indices, return_counts=True)
+        same = (shared > REDRAWN * length[other]) & (stands_for[other] < 0)
         stands_for[other[same]] = curve
     return stands_for
 
