@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
+    from .export.solving.evaluate import Evaluation as Evaluation
+    from .export.solving.evaluate import evaluate as evaluate
     from .export.solving.job import Limits as Limits
     from .export.solving.local import solve as solve
     from .export.solving.run import run as run
@@ -51,6 +53,7 @@ _HOME: Final = {
     "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
+    "Evaluation": ".export.solving.evaluate",
     "Instance": ".models.instance.instance",
     "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
@@ -59,6 +62,7 @@ _HOME: Final = {
     "Solution": ".export.solutions.solution",
     "analytic": ".models.sketch.surfaces",
     "draw": ".export.pictures.draw",
+    "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
     "greedy": ".models.search.greedy",

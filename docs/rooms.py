@@ -19,7 +19,7 @@ GROUND: Final = "models"
 
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations",
-    "models/search", "models/proof", "templates",
+    "models/search", "models/proof", "models/evaluation", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions",
     "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NoReturn
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
+from .evaluate_command import evaluate_command
 from .help_texts import Command
 from .inputs import known, load, options_of
 from .library_command import library
@@ -250,6 +251,7 @@ def export_command(
 
 command("solve")(solve_command)
 command("prove")(prove_command)
+command("evaluate")(evaluate_command)
 
 
 @command("read")

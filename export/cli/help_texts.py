@@ -27,6 +27,7 @@ NAMES: Final = {
         "METHODS",
         lambda methods: [each.name for each in methods.values() if each.in_runs],
     ),
+    "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
     "solvers": _of("..solvers_table", "DRIVEN"),
     "programs": _of("..solvers_table", "PROGRAMS"),
     "answers": _of(  # a description begins with the program

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
 from ..instance.elementary import length as vector_length
-from ..instance.grid import Floats
+from ..instance.grid import Bools, Floats, Ints
 
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
@@ -97,24 +97,63 @@ def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
 
     Raises InputError when they would fall into more than MAX_PIECES pieces.
     """
-    segments = _clipped((segments - (frame.x, frame.y)) / frame.pixel, frame)
-    step = segments[:, 1] - segments[:, 0]
-    length = vector_length(*step.T)
-    segments, step, length = segments[length > 0], step[length > 0], length[length > 0]
-    owner, start, end = _pieces(segments, step)
-    middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]
-    covered = (end - start) * length[owner]
-    unit = step / length[:, None]
+    cut = _cut(segments, frame)
+    unit = cut.unit
     double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
     amount, cosine, sine = np.zeros((3, *frame.shape))
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        quarter = _binned(middle + nudge, covered / 4 * double[:, owner], frame)
+        quarter = _binned(cut.middle + nudge, cut.covered / 4 * double, frame)
         amount, cosine, sine = amount + quarter[0], cosine + quarter[1], sine + quarter[2]
     return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
 
 
-def _clipped(segments: Floats, frame: Frame) -> Floats:
-    """The parts of segments (in pixels) that lie on the grid; the others are left out."""
+def covering_curves(
+    segments: Floats, curve: Ints, frame: Frame, least: float
+) -> tuple[Indices, Indices, Indices]:
+    """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
+
+    curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
+    `least` pixel sides and more; where no curve reaches that, the longest one does.
+    """
+    cut = _cut(segments, frame)
+    number, size = curve[cut.segment].astype(np.int64), frame.height * frame.width
+    keys, lengths = [], []
+    for nudge in product((-_NUDGE, _NUDGE), repeat=2):
+        cell, kept = _cells(cut.middle + nudge, frame)
+        keys.append(number[kept] * size + cell)
+        lengths.append(cut.covered[kept] / 4)
+    key, place = np.unique(np.concatenate(keys), return_inverse=True)
+    amount = np.bincount(place, np.concatenate(lengths), len(key))
+    pixel = key % size
+    most = np.zeros(size)
+    np.maximum.at(most, pixel, amount)
+    covers = amount >= np.minimum(least, most[pixel])
+    return key[covers] // size, *np.divmod(pixel[covers], frame.width)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """Segments cut at the pixel edges, in pixels: segment, middle, length and unit vector of each piece."""
+
+    segment: Indices
+    middle: Floats
+    covered: Floats
+    unit: Floats
+
+
+def _cut(segments: Floats, frame: Frame) -> _Cut:
+    segments, number = _clipped((segments - (frame.x, frame.y)) / frame.pixel, frame)
+    step = segments[:, 1] - segments[:, 0]
+    length = vector_length(*step.T)
+    long = length > 0
+    segments, step, length, number = segments[long], step[long], length[long], number[long]
+    owner, start, end = _pieces(segments, step)
+    middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]
+    return _Cut(number[owner], middle, (end - start) * length[owner], (step / length[:, None])[owner])
+
+
+def _clipped(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
+    """The parts of segments (in pixels) that lie on the grid, and their numbers; the others are left out."""
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     limit = np.array([frame.width, frame.height], dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -124,7 +163,7 @@ def _clipped(segments: Floats, frame: Frame) -> Floats:
     high = np.where(step == 0, -inside, walls.max(axis=0)).min(axis=1).clip(None, 1)
     kept = low < high
     start, step, low, high = start[kept], step[kept], low[kept, None], high[kept, None]
-    return np.stack([start + low * step, start + high * step], axis=1)
+    return np.stack([start + low * step, start + high * step], axis=1), np.nonzero(kept)[0]
 
 
 def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
@@ -155,12 +194,17 @@ def _pieces(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
 
 def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
     """Sums [c, height, width] of values (c, m) at points (m, 2) in pixels on the grid."""
-    column, row = np.floor(points).astype(np.int64).T
-    kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
-    cell = row[kept] * frame.width + column[kept]
+    cell, kept = _cells(points, frame)
     size = frame.height * frame.width
     sums = [np.bincount(cell, value[kept], size) for value in values]
     return np.array(sums, dtype=np.float64).reshape(-1, *frame.shape)
+
+
+def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
+    """Numbers of the pixels, row by row, at those of the points (m, 2) that are on the grid; which are."""
+    column, row = np.floor(points).astype(np.int64).T
+    kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
+    return row[kept] * frame.width + column[kept], kept
 
 
 def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_SEGMENTS
-from ..instance.grid import Bools, Floats
+from ..instance.grid import Bools, Floats, Ints
 
 _BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
 
@@ -20,11 +20,13 @@ class Curves:
     """The strokes of a vector sketch in its own units, x to the right and y **down**.
 
     points: float (k, 4, 2), control points of cubic Beziers; straight lines have theirs at the thirds.
+    curve: int (k,), number of the curve that each of them is a piece of, from 0 in the order of the file.
     red: bool (k,), True where a stroke is drawn in red.
     canvas: x, y, width and height of the page, or None when the file does not say.
     """
 
     points: Floats
+    curve: Ints
     red: Bools
     canvas: tuple[float, float, float, float] | None
 
@@ -34,6 +36,16 @@ def lines_as_cubics(start: Floats, end: Floats) -> Floats:
     thirds = np.arange(4.0).reshape(1, 4, 1) / 3
     cubics: Floats = start[:, None] * (1 - thirds) + end[:, None] * thirds
     return cubics
+
+
+def runs(points: Floats, shape: Ints) -> Ints:
+    """The number (k,), from 0, of the unbroken run of one shape that each cubic (k, 4, 2) is a piece of.
+
+    shape: int (k,), equal for all pieces of a shape. A run ends where the next piece starts elsewhere.
+    """
+    apart = (points[1:, 0] != points[:-1, 3]).any(axis=1) | (np.diff(shape) != 0)
+    numbers: Ints = np.concatenate([[0], np.cumsum(apart)]).astype(np.int32)
+    return numbers
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:

@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import InputError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
-from ..instance.grid import Bools
+from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
@@ -86,7 +86,7 @@ def read_sketch(
     path = Path(path)
     check_size(size)
     with_mask = None if mask is None else Path(mask)
-    data = _bytes_of(path)
+    data = bytes_of(path)
     try:
         with naming(path):
             name = name or name_from(path.stem)
@@ -159,7 +159,7 @@ def check_size(size: int) -> None:
         raise InputError(f"size is {size}; choose 1 to {MAX_SIZE} pixels for the longer side")
 
 
-def _bytes_of(path: Path) -> bytes:
+def bytes_of(path: Path) -> bytes:
     """The content of a regular file of bearable length, at least one byte."""
     if path.exists() and not path.is_file():
         raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
@@ -171,28 +171,45 @@ def _bytes_of(path: Path) -> bytes:
 
 def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
     """The sketch that bytes hold, by content first and suffix second."""
-    start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if data[:2] == b"\x1f\x8b":
-        raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
-    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return _of_curves(read_svg(data))
-    drawn = _PICTURE.match(data) is None
-    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
-        return _of_curves(read_scap(data))
-    if suffix == ".svg" and drawn:
-        return _of_curves(read_svg(data))
+    curves = curves_in(data, suffix)
+    if curves is not None:
+        return _of_curves(curves)
     picture = read_picture(data, size)
     return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
 
 
+def curves_in(data: bytes, suffix: str) -> Curves | None:
+    """The curves of a vector sketch, None for a picture. Raises InputError.
+
+    suffix: of the file, for content that does not tell.
+    """
+    start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if data[:2] == b"\x1f\x8b":
+        raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
+    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return read_svg(data)
+    drawn = _PICTURE.match(data) is None
+    if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
+        return read_scap(data)
+    if suffix == ".svg" and drawn:
+        return read_svg(data)
+    return None
+
+
 def _of_curves(curves: Curves) -> _Sketch:
     def covers(frame: Frame) -> tuple[Cover, Cover]:
-        segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
-        mixed = curves.red.any() and not curves.red.all()
-        line = curves.red[owner] if mixed else np.ones(len(owner), dtype=bool)
+        segments, _, line = segments_of(curves, frame)
         return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
 
     return _Sketch(bounding_box(curves.points), curves.canvas, covers)
+
+
+def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
+    """Segments (m, 2, 2), the number (m,) of each one's curve, and which (m,) are curvature lines."""
+    segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
+    mixed = curves.red.any() and not curves.red.all()
+    line = curves.red[owner] if mixed else np.ones(len(owner), dtype=bool)
+    return segments, curves.curve[owner], line
 
 
 def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
@@ -206,7 +223,7 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
     """The frame round the white part of a mask file, and the mask on it, or InputError about the file."""
     with naming(path):
-        return _mask_on_grid(read_white(_bytes_of(path)), page, size)
+        return _mask_on_grid(read_white(bytes_of(path)), page, size)
 
 
 def _mask_on_grid(

@@ -2,8 +2,9 @@
 
 Line 1 `#width height`, then optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally
 `@thickness`, one sample `x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards.
-The declared size need not bound the samples. Strokes of one cluster are meant as one curve; here each counts
-on its own.
+The declared size need not bound the samples. Strokes of one cluster are meant as one curve, and
+are one here when a curve is asked for by its number; their directions count one by one. A file that has all
+strokes in one cluster says nothing of curves: there each stroke is one.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..input_limits import LEAST_LENGTH, MAX_LINES
-from ..instance.grid import Floats
+from ..instance.grid import Floats, Ints
 from .curves import Curves, lines_as_cubics
 
 _GREATEST: Final = 1e9
@@ -29,6 +30,7 @@ def read_scap(data: bytes) -> Curves:
     lines = re.split(r"\r\n?|\n", text)
     canvas = _canvas(lines[0] if lines else "")
     strokes: list[list[tuple[float, float]]] = []
+    clusters: list[str] = []
     samples: list[tuple[float, float]] = []
     opened = 0
     for number, line in enumerate(map(str.strip, lines[1:]), start=2):
@@ -42,6 +44,7 @@ def read_scap(data: bytes) -> Curves:
         elif line == "}":
             if not opened:
                 raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
+            clusters.append(_cluster(lines[opened], len(strokes)))
             strokes.append(samples)
             opened = 0
         elif line and line[0] not in "#@":
@@ -52,15 +55,35 @@ def read_scap(data: bytes) -> Curves:
             samples.append(_sample(line, number))
     if opened:
         raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
-    return _curves(strokes, canvas)
+    return _curves(strokes, clusters, canvas)
 
 
-def _curves(strokes: list[list[tuple[float, float]]], canvas: tuple[float, float, float, float]) -> Curves:
-    paths: list[Floats] = [np.array(stroke) for stroke in strokes if len(stroke) > 1]
+def _curves(
+    strokes: list[list[tuple[float, float]]],
+    clusters: list[str],
+    canvas: tuple[float, float, float, float],
+) -> Curves:
+    drawn = [number for number, stroke in enumerate(strokes) if len(stroke) > 1]
+    paths: list[Floats] = [np.array(strokes[number]) for number in drawn]
     if not paths:
         raise InputError("holds no stroke of two or more samples")
+    curve = np.repeat(_numbers([clusters[number] for number in drawn]), [len(path) - 1 for path in paths])
     points = np.concatenate([lines_as_cubics(path[:-1], path[1:]) for path in paths])
-    return Curves(points, np.zeros(len(points), dtype=bool), canvas)
+    return Curves(points, curve, np.zeros(len(points), dtype=bool), canvas)
+
+
+def _cluster(line: str, stroke: int) -> str:
+    """The name of the cluster in a stroke's first line, `#stroke cluster`; the stroke's own without one."""
+    fields = line.strip().removeprefix("#").split()
+    return fields[1] if len(fields) == 2 and line.strip().startswith("#") else f"stroke {stroke}"
+
+
+def _numbers(clusters: list[str]) -> Ints:
+    """The number of each stroke's curve: its cluster, or the stroke itself where there is but one cluster."""
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(clusters))}
+    return np.array(
+        [numbers[name] for name in clusters] if len(numbers) > 1 else range(len(clusters)), dtype=np.int32
+    )
 
 
 def _canvas(line: str) -> tuple[float, float, float, float]:

@@ -37,7 +37,7 @@ from ..input_limits import (
 from ..instance.elementary import turned
 from ..instance.grid import Floats
 from .colour import is_paper, is_red
-from .curves import Curves
+from .curves import Curves, runs
 from .path_data import SHAPES, outline, pixels, too_many_curves
 from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
@@ -78,11 +78,9 @@ def read_svg(data: bytes) -> Curves:
             "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
         )
     red = is_red(np.array([_paint(style) for style, _ in shapes]))
-    return Curves(
-        np.concatenate([points for _, points in shapes]),
-        np.repeat(red, [len(points) for _, points in shapes]),
-        canvas,
-    )
+    points = np.concatenate([points for _, points in shapes])
+    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(points) for _, points in shapes])
+    return Curves(points, runs(points, shape), red[shape], canvas)
 
 
 def _parsed(data: bytes) -> Element:

@@ -20,6 +20,7 @@ NAMED = {
     "export": ["samples", "size", "formulations", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "methods", "solvers"],
     "prove": ["samples", "size"],
+    "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
     "draw": ["pictures"],
     "verify": ["programs"],
@@ -84,7 +85,8 @@ def test_choices_are_those_of_the_models_and_of_the_formats():
 
 def test_commands_are_listed_in_the_order_of_their_use():
     assert list(typer.main.get_command(app).commands) == [
-        "run", "instance", "export", "solve", "prove", "read", "draw", "verify", "list", "samples", "library",
+        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "verify", "list",
+        "samples", "library",
     ]  # fmt: skip
 
 

@@ -1,0 +1,175 @@
+"""The honest measure of methods: hide each curve of a drawing in turn, and ask the field for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.errors import CrossfieldError, InputError
+from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
+from ...models.instance.instance import Instance
+from ...models.processes.interruption import interruptible
+from ...models.processes.progress import Progress, silent
+from ...models.sketch.tracing import curves_of
+from ..formats.registry import generator
+from .job import Limits
+from .methods import METHODS, Request
+
+DEFAULT_METHODS: Final = ("greedy", "search")
+CURVES: Final = 8
+"""Curves of a drawing that are hidden, the longest ones."""
+SECONDS: Final = 5.0
+"""Time limit of a field: there are as many as curves times methods."""
+
+
+@dataclass(frozen=True)
+class CurveDeviation:
+    """What the methods made of a hidden curve.
+
+    curve: its number; pixels: its stroke pixels; degrees: by method, the mean angle in [0, 90] degrees
+    between the curve and the nearer line of the field; failures: by method, why there is no field.
+    """
+
+    curve: int
+    pixels: int
+    degrees: dict[str, float]
+    failures: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The methods' angles to the hidden curves of an instance, the longest curve first.
+
+    interrupted: whether Ctrl-C ended it; then these are the curves done before.
+    """
+
+    instance: Instance
+    methods: tuple[str, ...]
+    limits: Limits
+    curves: tuple[CurveDeviation, ...]
+    interrupted: bool = False
+
+    def summary(self, method: str) -> Summary | None:
+        """Mean, median and standard error in degrees over the curves; None where the method always failed."""
+        return summary(np.array([each.degrees[method] for each in self.curves if method in each.degrees]))
+
+    def document(self) -> dict[str, Any]:
+        """The evaluation as JSON. No clock is in it but what methods do with their time."""
+        return {
+            "format": "crossfield-evaluation",
+            "version": 1,
+            "generator": generator(),
+            "instance": {
+                "name": self.instance.name,
+                "source": self.instance.source,
+                "sha256": self.instance.sha256,
+                "pixels": self.instance.grid.size,
+                "stroke_pixels": len(self.instance.theta),
+                "w_strokes": self.instance.w_strokes,
+                "w_beta": self.instance.w_beta,
+            },
+            "seconds_per_field": self.limits.seconds,
+            "methods": {method: _facts(self.summary(method)) for method in self.methods},
+            "curves": [
+                {
+                    "curve": each.curve,
+                    "pixels": each.pixels,
+                    "degrees": each.degrees,
+                    "failures": each.failures,
+                }
+                for each in self.curves
+            ],
+            "interrupted": self.interrupted,
+        }
+
+
+def evaluate(
+    instance: Instance,
+    *,
+    sketch: str | Path | None = None,
+    methods: Iterable[str] = DEFAULT_METHODS,
+    curves: int = CURVES,
+    w_strokes: float | None = None,
+    limits: Limits | None = None,
+    progress: Progress = silent,
+) -> Evaluation:
+    """How far the fields of methods are from curves that they were not shown.
+
+    Each of the `curves` longest curves is hidden in turn: its stroke pixels go, as far as no other curve runs
+    through them, the mask and the other strokes stay. The measure is the mean angle between the curve and the
+    nearer line of the crosses on it; crosses at random have 22.5 degrees.
+
+    sketch: the file that the instance was read from, or the name of its sample, for what is a curve there;
+    without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
+    methods. w_strokes: another stroke weight than the instance's. limits: of each field, 5 seconds by
+    default. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
+    Raises InputError for unknown methods, and when no curve can be hidden.
+    """
+    methods, limits = tuple(dict.fromkeys(methods)), limits or Limits(SECONDS)
+    for name in methods:
+        if name not in METHODS:
+            raise InputError(f"there is no method {name!r}; choose one of {', '.join(METHODS)}")
+    if w_strokes is not None:
+        instance = replace(instance, w_strokes=w_strokes)
+    hidden = hidden_curves(instance, curves_of(instance, sketch), curves)
+    if not hidden:
+        raise InputError(
+            f"{instance.name} has no curve of {SHORTEST} pixels or more beside others that could be hidden; "
+            "choose a larger size, or a drawing of more curves"
+        )
+    done, interrupted = _in_turn(hidden, methods, limits, progress)
+    return Evaluation(instance, methods, limits, tuple(done), interrupted)
+
+
+def _in_turn(
+    hidden: list[HiddenCurve], methods: tuple[str, ...], limits: Limits, progress: Progress
+) -> tuple[list[CurveDeviation], bool]:
+    """What the methods make of one curve after the other; whether Ctrl-C ended that."""
+    done: list[CurveDeviation] = []
+    try:
+        with interruptible() as interrupted, TemporaryDirectory(prefix="crossfield-") as folder:
+            for number, curve in enumerate(hidden, start=1):
+
+                def tell(line: str, at: int = number) -> None:
+                    progress(f"curve {at} of {len(hidden)}: {line}")
+
+                request = Request(curve.rest, Path(folder), limits, progress=tell)
+                done.append(_measured(curve, methods, request, interrupted))
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        return done, True
+    return done, False
+
+
+def _measured(
+    curve: HiddenCurve, methods: tuple[str, ...], request: Request, interrupted: Callable[[], bool]
+) -> CurveDeviation:
+    """The methods' angles to a curve. KeyboardInterrupt after Ctrl-C: half a curve compares nothing."""
+    found = CurveDeviation(curve.number, len(curve.stroke), {}, {})
+    for method in methods:
+        try:
+            *_, answer = METHODS[method].find(request)
+            found.degrees[method] = float(np.degrees(curve.deviation(answer.field)))
+            stopped = answer.interrupted
+        except CrossfieldError as error:
+            found.failures[method], stopped = str(error), False
+        if stopped or interrupted():
+            raise KeyboardInterrupt
+    return found
+
+
+def _facts(found: Summary | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "curves": found.count,
+        "mean": found.mean,
+        "median": found.median,
+        "standard_error": found.error,
+    }

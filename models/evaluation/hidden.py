@@ -1,0 +1,105 @@
+"""Curves that are hidden in turn, and how far a field made without one is from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ..errors import InstanceError
+from ..field.field import CrossField
+from ..instance.angles import line_difference
+from ..instance.grid import Floats, Ints
+from ..instance.instance import Instance
+
+SHORTEST: Final = 3
+"""Stroke pixels of the shortest curve that is hidden."""
+MOST: Final = 0.5
+"""Greatest share of the stroke pixels that one curve may have: beyond, the drawing is hidden and no curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class HiddenCurve:
+    """A curve of an instance to be hidden.
+
+    number: of the curve, as in `curves_of`. stroke: int (k,), its stroke pixels' numbers in the instance.
+    """
+
+    number: int
+    instance: Instance
+    stroke: Ints
+
+    @cached_property
+    def rest(self) -> Instance:
+        """The instance without the curve's strokes; its mask and its other strokes are the same."""
+        kept = np.ones(len(self.instance.theta), dtype=bool)
+        kept[self.stroke] = False
+        whole = self.instance
+        return replace(
+            whole, stroke_pixels=whole.stroke_pixels[kept], theta=whole.theta[kept], w=whole.w[kept]
+        )
+
+    def deviation(self, field: CrossField) -> float:
+        """The mean angle from the curve to the nearer line of the crosses on it, in [0, pi/2] radians.
+
+        Crosses at random with lines at right angles have pi/8 on average.
+        field: on the same grid. Raises InstanceError for another one.
+        """
+        if not np.array_equal(field.instance.mask, self.instance.mask):
+            raise InstanceError(f"the field is not on the pixels of {self.instance.name}")
+        at, theta = self.instance.stroke_index[self.stroke], self.instance.theta[self.stroke]
+        lines = np.stack([field.alpha + field.beta, field.alpha + np.pi / 2 - field.beta])
+        return float(line_difference(lines[:, at], theta).min(axis=0).mean())
+
+
+def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurve]:
+    """Up to `most` curves that can be hidden, those with most stroke pixels first.
+
+    curve: int (s,), number of the one curve through each stroke pixel, negative where several run: these are
+    never hidden. Left out are curves of fewer than SHORTEST pixels, of more than MOST of all, and those
+    without which a part of the mask has no stroke that the field could follow.
+    """
+    numbers, count = np.unique(curve[curve >= 0], return_counts=True)
+    wanted = (count >= SHORTEST) & (count <= MOST * len(curve))
+    order = np.argsort(-count[wanted], kind="stable")
+    found: list[HiddenCurve] = []
+    part = _parts(instance)
+    for number in numbers[wanted][order]:
+        hidden = curve == number
+        if len(found) < most and np.isin(part[hidden], part[~hidden]).all():
+            found.append(HiddenCurve(int(number), instance, np.nonzero(hidden)[0].astype(np.int32)))
+    return found
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Angles of several curves: how many, mean and median in their unit, and the standard error of the mean.
+
+    error: sample deviation over the root of the count; None for a single angle. The curves of one drawing
+    are correlated: between drawings their means differ by more.
+    """
+
+    count: int
+    mean: float
+    median: float
+    error: float | None
+
+
+def summary(angles: Floats) -> Summary | None:
+    """Count, mean, median and standard error of angles (k,); None of none."""
+    count = len(angles)
+    if not count:
+        return None
+    error = float(angles.std(ddof=1) / np.sqrt(count)) if count > 1 else None
+    return Summary(count, float(angles.mean()), float(np.median(angles)), error)
+
+
+def _parts(instance: Instance) -> Ints:
+    """The number of the 4-connected part of the mask in which each stroke pixel lies, shape (s,)."""
+    from scipy import ndimage
+
+    row, column = instance.stroke_pixels.T
+    parts: Ints = ndimage.label(instance.mask)[0][row, column]
+    return parts

@@ -1,0 +1,142 @@
+"""Which curve of a sketch each stroke pixel comes from: known beside the instance, never a part of it.
+
+In a vector sketch a curve is an unbroken run of a path (SVG), or a cluster of strokes (.scap), with the
+shorter ones that redraw it: those that have more than half of their stroke pixels in common with it. A
+picture does not say; there, and where no sketch is at hand, a curve is a chain of stroke pixels that go on in
+each other's direction. A chain ends at a corner, and may end at a crossing.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import InputError, naming
+from ..instance.angles import line_difference
+from ..instance.elementary import arctangent
+from ..instance.grid import Ints
+from ..instance.instance import Instance
+from .cover import Frame, Indices, covering_curves
+from .curves import Curves
+from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
+from .samples import SAMPLES, sample_svg
+
+REACH: Final = 2
+"""Rows and columns from a pixel of a chain to the next: a crossing, which has no direction, is bridged."""
+ASIDE: Final = np.radians(27.0)
+"""Most that a chain's direction differs from the way to its next pixel.
+
+A little more than atan(1/2): of the 16 ways within REACH one is as near as that to every direction.
+"""
+TURN: Final = np.radians(15.0)
+"""Most that a chain turns from a pixel to the next: on a circle four pixels in radius."""
+REDRAWN: Final = 0.5
+"""Share of its stroke pixels from which on a curve only redraws another one."""
+SEVERAL: Final = -1
+"""The number of a stroke pixel through which several curves run."""
+_NONE: Final = -2
+
+
+def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
+    """The number of the one curve through each stroke pixel, int (s,), SEVERAL where more do.
+
+    sketch: the file that the instance was read from, or the name of a sample; None: not at hand. Pictures,
+    computed samples and instance files count as not at hand. Raises InputError for what cannot be read, and
+    for a sketch that has no curve where the instance has a stroke.
+    """
+    found = None if sketch is None else _drawn(sketch)
+    if found is None:
+        return chains(instance)
+    x, y = instance.origin
+    frame = Frame(x, y, instance.pixel_size, instance.grid.height, instance.grid.width)
+    segments, curve, line = segments_of(found, frame)
+    owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+    number = np.full(frame.shape, -1, dtype=np.int64)
+    number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
+    stroke = number[row, column]
+    only = _only(owner[stroke >= 0], stroke[stroke >= 0], len(instance.theta))
+    if (only == _NONE).any():
+        raise InputError(
+            f"draws nothing at {int((only == _NONE).sum())} stroke pixels of {instance.name}; "
+            "give the sketch that the instance was read from",
+            file=sketch,
+        )
+    return only
+
+
+def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
+    """The number of the one curve through each of `count` stroke pixels, SEVERAL, or _NONE.
+
+    owner, stroke: (k,), a curve and a stroke pixel that it runs through, each pair once.
+    """
+    names, curve = np.unique(owner, return_inverse=True)
+    through = csr_array((np.ones(len(curve)), (curve, stroke)), shape=(len(names), count))
+    single = csr_array(
+        (np.ones(len(names)), (_redrawn(through), np.arange(len(names)))), shape=(len(names), len(names))
+    )
+    merged = (single @ through).tocoo()
+    curves_there = np.bincount(merged.col, minlength=count)
+    only = np.where(curves_there == 0, _NONE, SEVERAL)
+    one = curves_there[merged.col] == 1
+    only[merged.col[one]] = names[merged.row[one]]
+    return only.astype(np.int32)
+
+
+def _redrawn(through: csr_array) -> Indices:
+    """The curve (c,) that each curve counts as: a longer one that it redraws, or itself.
+
+    through: 1 where a curve runs through a stroke pixel, (c, s).
+    """
+    at_stroke = through.T.tocsr()
+    length = np.diff(through.indptr)
+    stands_for = np.full(len(length), -1)
+    for curve in np.argsort(-length, kind="stable"):
+        if stands_for[curve] >= 0:
+            continue
+        strokes = through.indices[through.indptr[curve] : through.indptr[curve + 1]]
+        other, shared = np.unique(at_stroke[strokes].indices, return_counts=True)
+        same = (shared > REDRAWN * length[other]) & (stands_for[other] < 0)
+        stands_for[other[same]] = curve
+    return stands_for
+
+
+def chains(instance: Instance) -> Ints:
+    """The number of the chain of stroke pixels that each belongs to, int (s,), numbered from 0.
+
+    Two stroke pixels at most REACH apart are linked when their directions differ by at most TURN from each
+    other and by at most ASIDE from the line between them.
+    """
+    count = len(instance.theta)
+    number = np.full(np.add(instance.mask.shape, 2 * REACH), -1, dtype=np.int32)
+    row, column = instance.stroke_pixels.T + REACH
+    number[row, column] = np.arange(count)
+    ends = []
+    for down, right in product(range(REACH + 1), range(-REACH, REACH + 1)):
+        other = number[row + down, column + right]
+        one = np.nonzero(other >= 0)[0]
+        first, second = instance.theta[one], instance.theta[other[one]]
+        way = arctangent(np.full(len(one), -float(down)), np.full(len(one), float(right)))
+        aside = np.maximum(line_difference(first, way), line_difference(second, way))
+        linked = (aside <= ASIDE) & (line_difference(first, second) <= TURN) & (other[one] != one)
+        ends.append(np.stack([one[linked], other[one][linked]]))
+    first, second = np.concatenate(ends, axis=1)
+    links = csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    numbers: Ints = connected_components(links, directed=False)[1].astype(np.int32)
+    return numbers
+
+
+def _drawn(sketch: str | Path) -> Curves | None:
+    """The curves of a vector sketch, in a file or a sample; None of anything else."""
+    path = Path(sketch)
+    if not path.is_file() and str(sketch) in SAMPLES:
+        analytic = SAMPLES[str(sketch)].kind == "analytic"
+        return None if analytic else curves_in(sample_svg(str(sketch)).encode(), ".svg")
+    if path.suffix.lower() in {".json", ".npz"}:
+        return None
+    with naming(path):
+        return curves_in(bytes_of(path), path.suffix.lower())
