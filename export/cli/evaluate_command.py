@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .inputs import known, load
-from .options import GaugeName, Json, Mask, Quiet, Size, What
+from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, StrokeWeight, What
 from .output import complain, progress, say, say_json, show_table
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ def evaluate_command(
     size: Size = None,
     mask: Mask = None,
     gauge: GaugeName = None,
+    w_strokes: StrokeWeight = None,
+    w_beta: SkewWeight = None,
     time_limit: Annotated[
         float,
         typer.Option(
@@ -63,7 +65,7 @@ def evaluate_command(
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge)
+        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
         found = evaluate(
             instance,
             sketch=sketch,
@@ -104,6 +106,8 @@ def _show(found: Evaluation) -> None:
         rows.append([fact.replace("_", " "), "", *of_all])
     columns = ("hidden curve", "pixels", *found.methods)
     show_table(found.instance.summary, columns, rows, numbers=columns[1:])
+    if not found.drawn:
+        say("nothing says what the curves are: they are chains of stroke pixels")
     say("degrees between a hidden curve and the nearer line of the field; 22.5 at random")
     for curve in found.curves:
         for name, reason in curve.failures.items():

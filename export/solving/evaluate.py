@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -15,7 +15,7 @@ from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_c
 from ...models.instance.instance import Instance
 from ...models.processes.interruption import interruptible
 from ...models.processes.progress import Progress, silent
-from ...models.sketch.tracing import curves_of
+from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
 from .job import Limits
 from .methods import METHODS, Request
@@ -45,13 +45,15 @@ class CurveDeviation:
 class Evaluation:
     """The methods' angles to the hidden curves of an instance, the longest curve first.
 
-    interrupted: whether Ctrl-C ended it; then these are the curves done before.
+    drawn: whether the curves are those of the sketch; else they are chains of stroke pixels. interrupted:
+    whether Ctrl-C ended it; then these are the curves done before.
     """
 
     instance: Instance
     methods: tuple[str, ...]
     limits: Limits
     curves: tuple[CurveDeviation, ...]
+    drawn: bool = False
     interrupted: bool = False
 
     def summary(self, method: str) -> Summary | None:
@@ -74,6 +76,7 @@ class Evaluation:
                 "w_beta": self.instance.w_beta,
             },
             "seconds_per_field": self.limits.seconds,
+            "curves_of": "sketch" if self.drawn else "chains",
             "methods": {method: _facts(self.summary(method)) for method in self.methods},
             "curves": [
                 {
@@ -94,7 +97,6 @@ def evaluate(
     sketch: str | Path | None = None,
     methods: Iterable[str] = DEFAULT_METHODS,
     curves: int = CURVES,
-    w_strokes: float | None = None,
     limits: Limits | None = None,
     progress: Progress = silent,
 ) -> Evaluation:
@@ -106,7 +108,7 @@ def evaluate(
 
     sketch: the file that the instance was read from, or the name of its sample, for what is a curve there;
     without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
-    methods. w_strokes: another stroke weight than the instance's. limits: of each field, 5 seconds by
+    methods. limits: of each field, 5 seconds by
     default. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
     Raises InputError for unknown methods, and when no curve can be hidden.
     """
@@ -114,8 +116,6 @@ def evaluate(
     for name in methods:
         if name not in METHODS:
             raise InputError(f"there is no method {name!r}; choose one of {', '.join(METHODS)}")
-    if w_strokes is not None:
-        instance = replace(instance, w_strokes=w_strokes)
     hidden = hidden_curves(instance, curves_of(instance, sketch), curves)
     if not hidden:
         raise InputError(
@@ -123,7 +123,7 @@ def evaluate(
             "choose a larger size, or a drawing of more curves"
         )
     done, interrupted = _in_turn(hidden, methods, limits, progress)
-    return Evaluation(instance, methods, limits, tuple(done), interrupted)
+    return Evaluation(instance, methods, limits, tuple(done), has_curves(sketch), interrupted)
 
 
 def _in_turn(

@@ -69,6 +69,11 @@ def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
     return only
 
 
+def has_curves(sketch: str | Path | None) -> bool:
+    """Whether a sketch is at hand and says what its curves are; else chains are taken for them."""
+    return sketch is not None and _drawn(sketch) is not None
+
+
 def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
     """The number of the one curve through each of `count` stroke pixels, SEVERAL, or _NONE.
 
