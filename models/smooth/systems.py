@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
@@ -45,10 +47,31 @@ def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
 def factored(matrix: Any) -> Solve:
     """The solver of a Hermitian system that is positive semidefinite: of H + 1e-9, so that it is definite."""
     pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
-    # The dense blocks of sparse factors are tiny: threads would cost many times the work.
-    with threadpool_limits(1, user_api="blas"):
+    with one_thread():
         # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
-        solve: Solve = splu(
+        factors = splu(
             pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        ).solve
+        )
+
+    def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        with one_thread():
+            solution: np.ndarray[Any, Any] = factors.solve(right)
+        return solution
+
     return solve
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """A context in which BLAS keeps to one thread.
+
+    The dense blocks of sparse factors are tiny, and threads would cost many times the work. Sums do not
+    depend on the number of threads either.
+    """
+    limit: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limit
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """The libraries of this process that run threads; looking for them takes milliseconds."""
+    return ThreadpoolController()
