@@ -42,12 +42,13 @@ if TYPE_CHECKING:
     from .models.proof.record import Proof as Proof
     from .models.search.greedy import greedy as greedy
     from .models.search.improvement import improved as improved
-    from .models.search.power_field import power_field as power_field
     from .models.search.search import Search as Search
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
     from .models.sketch.samples import samples as samples
     from .models.sketch.surfaces import analytic as analytic
+    from .models.smooth.polyvector import polyvector_field as polyvector_field
+    from .models.smooth.power_field import power_field as power_field
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
@@ -67,7 +68,8 @@ _HOME: Final = {
     "formulate": ".models.formulations.problem",
     "greedy": ".models.search.greedy",
     "improved": ".models.search.improvement",
-    "power_field": ".models.search.power_field",
+    "polyvector_field": ".models.smooth.polyvector",
+    "power_field": ".models.smooth.power_field",
     "prove": ".models.proof.prove",
     "read_certificate": ".models.proof.certificate",
     "read_field": ".models.field.file",

@@ -18,7 +18,8 @@ GROUND: Final = "models"
 """At its top what every folder uses, and so left out of the table."""
 
 ORDER: Final = (
-    "models", "models/processes", "models/instance", "models/sketch", "models/field", "models/formulations",
+    "models", "models/processes", "models/instance", "models/sketch", "models/field",
+    "models/smooth", "models/formulations",
     "models/search", "models/proof", "models/evaluation", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions",
     "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",

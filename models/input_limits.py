@@ -54,6 +54,8 @@ MAX_ARCHIVE: Final = 1 << 31
 """Bytes of an .npz, packed and unpacked: far more than a field that can be solved takes."""
 MAX_HEAD: Final = 1 << 20
 """Bytes of the text in an .npz."""
+MAX_NUMBER: Final = 40
+"""Characters of a number in a .rawfield, on average; a double has 24 at most."""
 
 # Solutions
 MAX_SOLUTION: Final = 1 << 31

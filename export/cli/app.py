@@ -318,10 +318,17 @@ def read_command(
 @command("draw")
 def draw_command(
     what: Annotated[
-        Path, typer.Argument(metavar="FIELD|INSTANCE", help="File (.npz, .json) of a field or an instance.")
+        Path,
+        typer.Argument(
+            metavar="FIELD|INSTANCE", help="File of a field (.npz, .json, .rawfield) or an instance."
+        ),
     ],
     output: Output,
     *,
+    on: Annotated[
+        Path | None,
+        typer.Option("--on", metavar="INSTANCE", help="The instance (.npz, .json) of a .rawfield."),
+    ] = None,
     kind: Annotated[
         str | None, typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds.")
     ] = None,
@@ -335,7 +342,7 @@ def draw_command(
     _require_suffix(output, tuple(SUFFIXES))
     with progress(quiet=quiet) as show:
         show("reading")
-        subject = _field_or_instance(what)
+        subject = _field_or_instance(what, on)
         show("drawing")
         draw(
             subject,
@@ -415,13 +422,17 @@ def _line(error: Exception) -> str:
     return f"this should not happen, please report it: {what} (crossfield --debug ... shows where)"
 
 
-def _field_or_instance(path: Path) -> CrossField | Instance:
+def _field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
     from ...models.field.file import read_field
     from ...models.instance.file import read_instance
 
     if not path.is_file():
         raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
-    _require_suffix(path, (".npz", ".json"))
+    _require_suffix(path, (".npz", ".json", ".rawfield"))
+    if on is not None:
+        return read_field(path, on=read_instance(on))
+    if path.suffix.lower() == ".rawfield":
+        raise InputError("holds no instance; give the one it is on by --on", file=path)
     try:
         return read_field(path)
     except CrossfieldError as as_field:

@@ -151,7 +151,8 @@ Start = Annotated[
     typer.Option(
         "--start",
         metavar="FIELD",
-        help="Field (.npz, .json) on the same instance to start from; its jumps are the data of qp-fixed.",
+        help="Field (.npz, .json, .rawfield) on the same instance to start from; "
+        "its jumps are the data of qp-fixed.",
     ),
 ]
 GamsLayout = Annotated[

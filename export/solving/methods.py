@@ -19,8 +19,10 @@ from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy
 from ...models.search.improvement import first_field
-from ...models.search.power_field import power_field
+from ...models.search.polyvector_start import polyvector_start
 from ...models.search.search import Search
+from ...models.smooth.polyvector import polyvector_field
+from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
 from .job import Limits
@@ -157,6 +159,13 @@ def _power(request: Request) -> Iterator[Candidate]:
     yield _timed("power + QP", lambda: fitted(power.field))
 
 
+def _polyvector(request: Request) -> Iterator[Candidate]:
+    request.progress("PolyVector field")
+    over = Deadline.after(request.limits.seconds).passed
+    yield _timed("polyvector", lambda: polyvector_field(request.instance))
+    yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
+
+
 def _search(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
     request.progress("search: starting fields")
@@ -256,6 +265,12 @@ METHODS: Final = {
             "power",
             "smooth exp(4 i theta), right angles; then the best angles for its jumps",
             _power,
+            timed=False,
+        ),
+        Method(
+            "polyvector",
+            "smooth polynomials whose roots are the lines, at any angle; then the best angles for its jumps",
+            _polyvector,
             timed=False,
         ),
         Method(

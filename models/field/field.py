@@ -17,7 +17,7 @@ from ..errors import InstanceError
 from ..instance.angles import line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
-from .jumps import best_jumps, parity_sign, stepped
+from .jumps import best_jumps, label_of, parity_sign, stepped
 
 Norm = Literal[1, 2]
 
@@ -29,7 +29,9 @@ NARROW: Final = QUARTER
 """Lines that are less than this apart are a narrow cross."""
 MOST: Final = 0.9
 """Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
-_ROUNDING: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
+_EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
+_ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
+_MOST_ANGLE: Final = 1e6  # radians that leave enough digits modulo pi
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,24 @@ class CrossField:
                 raise InstanceError(f"{name} holds a value that is not finite")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_lines(cls, instance: Instance, u: Floats, v: Floats) -> CrossField:
+        """The field of the crosses with lines at angles u and v, with the best jumps.
+
+        u, v: shape (n,), the pixels in the order of `instance.grid`, radians counter-clockwise from +x with y
+        up. They need not be at right angles. Turns by pi and the order of the two lines do not matter: the
+        label is that in the window of the instance's gauge. Under `strokes` its u is the line nearer to the
+        stroke; under `box` it may be the other one, whose distance the energy then counts
+        (docs/mathematics.md, 4). Crosses stay as they are; both lines may be one, with |beta| = pi/4.
+        Raises InstanceError for another shape and for values that are no angles: not finite, or beyond 1e6.
+        """
+        alpha, beta = label_of(_angles(instance, u, "u"), _angles(instance, v, "v"))
+        steps = _window_steps(instance, alpha)
+        steps[instance.stroke_index] = _nearer_steps(instance, alpha, beta, steps)
+        alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
+        beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
+        return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
     def check_instance(self, instance: Instance) -> None:
         """Nothing, when the field is on this instance. Raises InstanceError when it is on another one."""
@@ -203,7 +223,7 @@ class CrossField:
             mean_deviation=float(deviation.mean()),
             most_deviation=float(np.quantile(deviation, MOST)),
             far_strokes=float(np.mean(deviation > FAR)),
-            narrow_pixels=float(np.mean(self.angle_between < NARROW - _ROUNDING)),
+            narrow_pixels=float(np.mean(self.angle_between < NARROW - _EQUAL)),
         )
 
     def cross_error(self, u: Floats, v: Floats) -> Floats:
@@ -238,7 +258,7 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
     """
     lower = instance.alpha_lower
-    steps = np.ceil((lower - alpha) / HALF - 1e-12).astype(np.int32)
+    steps = _window_steps(instance, alpha)
     steps[instance.stroke_index] = _stroke_steps(instance, alpha, beta, steps)
     alpha, beta, p = stepped(instance.grid, alpha, beta, p, steps)
     kept = CrossField(
@@ -251,6 +271,11 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
     return best if best.energy().total < kept.energy().total else kept
 
 
+def _window_steps(instance: Instance, alpha: Floats) -> Ints:
+    """The step of each label into its window, shape (n,)."""
+    return np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
+
+
 def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
     """The step of each stroke pixel's label, shape (s,):
     of three the one with the least clipping and misfit of the stroke.
@@ -260,15 +285,54 @@ def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) 
     energy punishes.
     """
     at = instance.stroke_index
-    lower, upper = instance.alpha_lower[at], instance.alpha_upper[at]
     faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
     candidates = np.stack([steps[at], steps[at] + 1, faithful])
-    moved = alpha[at] + HALF * candidates
-    shifted = np.clip(moved, lower, upper)
-    turned = np.clip(parity_sign(candidates) * beta[at], -QUARTER, QUARTER)
-    cost = np.abs(moved - shifted) + np.abs(shifted + turned - instance.target)
-    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(len(at))]
+    clipped, misfit = _losses(instance, alpha, beta, candidates)
+    return _cheapest(candidates, clipped + misfit)
+
+
+def _nearer_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
+    """The step of each stroke pixel's label into its window, (s,); of two, on its edge, that nearer to it."""
+    at = instance.stroke_index
+    candidates = np.stack([steps[at], steps[at] + 1])
+    clipped, misfit = _losses(instance, alpha, beta, candidates)
+    fits = clipped <= 2 * HALF * _ROUNDING
+    fits[0] = True
+    return _cheapest(candidates, np.where(fits, misfit, np.inf))
+
+
+def _losses(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> tuple[Floats, Floats]:
+    """What clipping takes of alpha, and the misfit that is left, for steps (k, s) of strokes; (k, s) each."""
+    at = instance.stroke_index
+    moved = alpha[at] + HALF * steps
+    shifted = np.clip(moved, instance.alpha_lower[at], instance.alpha_upper[at])
+    turned = np.clip(parity_sign(steps) * beta[at], -QUARTER, QUARTER)
+    return np.abs(moved - shifted), np.abs(shifted + turned - instance.target)
+
+
+def _cheapest(candidates: Ints, cost: Floats) -> Ints:
+    best: Ints = candidates[np.argmin(np.round(cost, 12), axis=0), np.arange(candidates.shape[1])]
     return best
+
+
+def _angles(instance: Instance, given: Any, name: str) -> Floats:
+    """The angles (n,). Raises InstanceError."""
+    try:
+        angles = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InstanceError(f"{name} holds something other than numbers; give angles in radians") from error
+    size = instance.grid.size
+    if angles.shape != (size,):
+        raise InstanceError(
+            f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"
+        )
+    wrong = ~(np.abs(angles) <= _MOST_ANGLE)
+    if wrong.any():
+        raise InstanceError(
+            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
+            f"give radians up to {_MOST_ANGLE:g}"
+        )
+    return angles
 
 
 def _unit(angle: Floats) -> Floats:

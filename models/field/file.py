@@ -1,17 +1,9 @@
-"""Field files: .npz and JSON, with field and instance, and .rawfield with a mesh for Directional.
+"""Field files: .npz and JSON, with field and instance, and .rawfield beside a mesh (rawfield.py).
 
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
             version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
             No pickles.
 .json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
-.rawfield   written only, with a Wavefront .obj beside it. Directional's raw field (its page on file
-            formats): a line `4 F`, then for each face u, v, -u, -v as 12 numbers. Counter-clockwise in every
-            row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
-
-The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
-Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no quad
-of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
-2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
 """
 
 from __future__ import annotations
@@ -43,6 +35,7 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from .field import CrossField
+from .rawfield import most_bytes, of_rawfield, to_obj, to_rawfield
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -66,20 +59,24 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     """
     path = Path(path)
     write = _of_suffix(_WRITERS, path, "written")
-    if write is _rawfield:
-        write_bytes(path.with_suffix(".obj"), _obj(field.instance))
+    if write is to_rawfield:
+        write_bytes(path.with_suffix(".obj"), to_obj(field.instance))
     return write_bytes(path, write(field))
 
 
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
-    """The field that a .npz or .json file holds, with its instance.
+    """The field that a .npz, .json or .rawfield file holds, with its instance.
 
-    on: the instance that it must be on, when one is given.
-    Raises InputError for another suffix and an unreadable file, and InstanceError, with file and place, for a
-    damaged one and another instance.
+    on: the instance that it must be on, when one is given. A .rawfield holds no instance and needs it: its
+    faces are the triangles of the .obj that `write_field` leaves, or one for each pixel; its four vectors
+    u, v, -u, -v, of any length and in any order, become the two lines of `CrossField.from_lines`.
+    Raises InputError for another suffix, an unreadable file, and a .rawfield without an instance; and
+    InstanceError, with file and place, for a damaged one and another instance.
     """
     path = Path(path)
-    read = _of_suffix(_READERS, path, "read")
+    if path.suffix.lower() == ".rawfield":
+        return _read_rawfield(path, on)
+    read = _of_suffix(_READERS, path, "read", ".rawfield")
     with naming(path):
         field = read(read_bytes(path, MAX_ARCHIVE))
         if on is not None:
@@ -87,11 +84,23 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
         return field
 
 
-def _of_suffix(table: dict[str, _Kind], path: Path, verb: str) -> _Kind:
+def _read_rawfield(path: Path, on: Instance | None) -> CrossField:
+    if on is None:
+        raise InputError(
+            "holds no instance, so that nothing says which pixels its rows are; give the instance: "
+            "read_field(path, on=instance)",
+            file=path,
+        )
+    with naming(path):
+        return of_rawfield(read_bytes(path, most_bytes(on)), on)
+
+
+def _of_suffix(table: dict[str, _Kind], path: Path, verb: str, *others: str) -> _Kind:
     found = table.get(path.suffix.lower())
     if found is None:
         raise InputError(
-            f"a field cannot be {verb} as {path.suffix!r}; choose one of {', '.join(table)}", file=path
+            f"a field cannot be {verb} as {path.suffix!r}; choose one of {', '.join([*table, *others])}",
+            file=path,
         )
     return found
 
@@ -208,48 +217,9 @@ def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> N
     p[pair[pair >= 0]] = jumps[pair >= 0].astype(np.int32)
 
 
-def _rawfield(field: CrossField) -> bytes:
-    vectors = np.zeros((field.instance.grid.size, 4, 3))
-    vectors[:, :, :2] = np.stack([field.u, field.v, -field.u, -field.v], axis=1)
-    rows = _lines(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
-    return f"4 {2 * len(vectors)}\n{rows}".encode()
-
-
-def _obj(instance: Instance) -> bytes:
-    """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
-    places, corners = _corners(instance.grid)
-    x = instance.origin[0] + instance.pixel_size * places[:, 1]
-    y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
-    vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
-    faces = _lines(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
-    return (
-        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
-        f"row by row; y up\n{vertices}{faces}"
-    ).encode()
-
-
-def _corners(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row."""
-    down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
-    row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
-    inside = np.pad(grid.mask, 1)
-    # Pixels round the corner: beyond it across, and on its two sides.
-    across = inside[row + down, column + right]
-    beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
-    apart = across & ~beside & (right == 1)
-    key = 2 * (row.astype(np.int64) * (grid.width + 1) + column) + apart
-    vertices, corners = np.unique(key, return_inverse=True)
-    places = np.stack(np.divmod(vertices // 2, grid.width + 1), axis=1)
-    return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
-
-
-def _lines(table: np.ndarray[Any, Any], lead: str = "") -> str:
-    return "".join(f"{lead}{' '.join(map(repr, row))}\n" for row in table.tolist())
-
-
 _WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
     ".npz": _npz,
     ".json": _json,
-    ".rawfield": _rawfield,
+    ".rawfield": to_rawfield,
 }
 _READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _of_npz, ".json": _of_json}

@@ -1,4 +1,4 @@
-"""Jumps between crosses of neighbouring pixels: signs of beta, best jumps, steps of the label.
+"""Labels of crosses, and jumps between those of neighbouring pixels: signs of beta, best jumps, steps.
 
 The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
 cross.
@@ -8,13 +8,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..instance.angles import wrap
 from ..instance.grid import Floats, Grid, Ints
-from ..instance.instance import HALF, Instance
+from ..instance.instance import HALF, QUARTER, Instance
 
 
 def parity_sign(p: Ints) -> Floats:
     """The sign (-1)^p of each jump."""
     return 1.0 - 2.0 * (p & 1).astype(np.float64)
+
+
+def label_of(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """A label (alpha, beta) of the crosses with line angles u, v in radians: alpha + beta is u modulo pi.
+
+    |beta| <= pi/4; it is pi/4 where both lines are one. Shapes that broadcast.
+    """
+    u = wrap(u, 0.0, np.pi)
+    v = wrap(v, u, np.pi)
+    return (u + v) / 2 - QUARTER, (u - v) / 2 + QUARTER
 
 
 def best_jumps(instance: Instance, alpha: Floats, beta: Floats, norm: int = 2) -> Ints:

@@ -37,7 +37,7 @@ from ..field.field import CrossField, Norm
 from ..instance.angles import wrap
 from ..instance.grid import Floats
 from ..instance.instance import HALF
-from ..search.energy import stroke_weight
+from ..smooth.systems import stroke_weight
 from .lattice import Lattice, few_unreached, reached, strip
 
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ..instance.angles import wrap
 from ..instance.grid import Floats
 from ..instance.instance import HALF, QUARTER
-from ..search.energy import stroke_weight
+from ..smooth.systems import stroke_weight
 from .common_lattice import CommonLattice
 from .lattice import Lattice
 

@@ -1,5 +1,5 @@
 """Fields without a solver.
 
-The greedy and the power field, best angles for given jumps, local improvement, and the search over jumps.
+The greedy field, best angles for given jumps, local improvement, and the search over jumps.
 Whatever needs an installed solver or a written file is export/solving.
 """

@@ -7,21 +7,17 @@ and w_beta.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.sparse.linalg import LinearOperator, cg
 
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
+from ..smooth.systems import PULL, Solve, factored, one_thread, stroke_weight, symmetric
 
-Solve = Callable[[Floats], Floats]
-
-PULL: Final = 1e-9
-"""Pull towards the present angles: parts without strokes, or w_beta = 0, leave H singular."""
 CLOSE: Final = 1e-2
 """Relative residual of a step that ranks jumps like the exact one."""
 
@@ -62,36 +58,11 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     beside = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.w_beta])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
-    matrix = _symmetric(row, column, beside, diagonal)
+    matrix = symmetric(row, column, beside, diagonal)
     goal = weight.copy()
     goal[at] *= instance.target
     pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
     return Quadratic(matrix, np.concatenate([pulled + goal, goal]))
-
-
-def _symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
-    """The sparse symmetric matrix with those entries on one side of the diagonal, each place once."""
-    every = np.arange(len(diagonal), dtype=np.int32)
-    values = np.concatenate([beside, beside, diagonal])
-    place = (np.concatenate([row, column, every]), np.concatenate([column, row, every]))
-    return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
-
-
-def stroke_weight(instance: Instance) -> Floats:
-    """Weight w_strokes w of each pixel, 0 without a stroke; shape (n,)."""
-    weight = np.zeros(instance.grid.size)
-    weight[instance.stroke_index] = instance.w_strokes * instance.w
-    return weight
-
-
-def factored(matrix: Any) -> Solve:
-    """The solver of a system that is positive semidefinite: of H + 1e-9, so that it is definite."""
-    pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
-    # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
-    solve: Solve = splu(
-        pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    ).solve
-    return solve
 
 
 def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
@@ -126,5 +97,6 @@ class LinearSolver:
         """The step by few conjugate gradients with the factorisation at hand; whether they sufficed."""
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
         pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
-        step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
+        with one_thread():
+            step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
         return step, not failed

@@ -31,7 +31,8 @@ from scipy.linalg.blas import dgemm
 from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
-from .energy import PULL, energy_at
+from ..smooth.systems import PULL
+from .energy import energy_at
 from .free_field import free_bounds
 from .patch_energy import PatchEnergy
 

@@ -23,13 +23,14 @@ from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
 from ..processes.side_by_side import checked, side_by_side
+from ..smooth.power_field import power_field
 from .coarse import halved, prolonged
 from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
 from .improvement import first_field, improved, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
-from .power_field import power_field
+from .polyvector_start import polyvector_start
 from .walk import LOWER, Explored, Task, explore
 
 RoundProgress = Callable[[int, float], object]
@@ -88,9 +89,10 @@ def search(
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
     100 a second), and the last solve, with 5 % and half a second more.
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy and
-    power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so far. Raises
-    InputError for a limit that is not positive and too many jobs, InstanceError for a start on another one.
+    jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy,
+    PolyVector and power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so
+    far. Raises InputError for a limit that is not positive and too many jobs, InstanceError for a start on
+    another one.
     """
     if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
@@ -167,12 +169,14 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of greedy field, given field and, in time, power field, each improved in time,
+    """The best of greedy field, given field and, in time, PolyVector and power field, each improved in time,
     or what is suggested from it.
     """
     fields = [first_field(instance, limits.over)]
     if given is not None:
         fields.append(improved(given, limits.over))
+    if not limits.over():
+        fields.append(improved(polyvector_start(instance, limits.over), limits.over))
     if not limits.over():
         fields.append(improved(power_field(instance), limits.over))
     best = min(fields, key=_energy)

@@ -536,6 +536,8 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
         "greedy",
         "power",
         "power + QP",
+        "polyvector",
+        "polyvector + QP",
         "search",
         "prove",
     }

@@ -162,7 +162,7 @@ def test_a_run_keeps_the_field_of_least_2_norm_energy(two_parts):
     assert field.energy(2).total == pytest.approx(min(energies), rel=1e-9)
     assert energies == pytest.approx(sorted(energies), rel=1e-8)
     assert report["best"] == report["methods"][0]["method"]
-    assert len(report["methods"]) == 8
+    assert len(report["methods"]) == 10
     assert report["failures"] == {}
     for row in report["methods"]:
         if "status" in row:
@@ -171,6 +171,8 @@ def test_a_run_keeps_the_field_of_least_2_norm_energy(two_parts):
     assert by_method["start"]["energy_2_norm"] <= by_method["greedy"]["energy_2_norm"] + 1e-7
     assert by_method["search"]["energy_2_norm"] <= by_method["greedy"]["energy_2_norm"] + 1e-7
     assert by_method["power + QP"]["energy_2_norm"] <= by_method["power"]["energy_2_norm"] + 1e-7
+    polyvector, best = by_method["polyvector"], by_method["polyvector + QP"]
+    assert best["energy_2_norm"] <= polyvector["energy_2_norm"] + 1e-7
     assert by_method["MILP"]["energy_1_norm"] <= by_method["greedy"]["energy_1_norm"] + 1e-7
     assert by_method["two-stage"]["energy_2_norm"] <= by_method["MILP"]["energy_2_norm"] + 1e-7
 
@@ -411,9 +413,9 @@ def test_the_table_of_a_run_stands_in_lines(two_parts):
     rows = [
         line
         for line in two_parts[1].stdout.splitlines()
-        if re.match(r" ?(start|greedy|power|MILP|two-stage|search|prove)", line)
+        if re.match(r" *(start|greedy|power|polyvector|MILP|two-stage|search|prove)", line)
     ]
-    assert len(rows) == 8
+    assert len(rows) == 10
     assert sum("*" in row for row in rows) == 1
     assert "*" in rows[0]
 

@@ -113,8 +113,8 @@ def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
             write_field(field, tmp_path / name)
     refused(
         read_field,
-        tmp_path / "a.rawfield",
-        "cannot be read as '.rawfield'; choose one of .npz, .json",
+        tmp_path / "a.obj",
+        "cannot be read as '.obj'; choose one of .npz, .json, .rawfield",
         InputError,
     )
     assert list(tmp_path.iterdir()) == []

@@ -9,11 +9,11 @@ from crossfield.models.search.search import search as search_patches
 
 
 def test_a_search_is_never_above_what_a_short_proof_finds():
-    """Without a round of search: the improved greedy and power fields of the saddle have the wrong jumps."""
-    instance = cf.sample("saddle", 24)
+    """Without a round of search: all fields of the bent cylinder that it starts from have the wrong jumps."""
+    instance = cf.sample("cylinder_bend", 22)
     patches = search_patches(instance, rounds=0, jobs=1).field.energy().total
     one, two = (cf.search(instance, rounds=0, jobs=jobs).field for jobs in (1, 2))
-    assert two.energy().total < 1.3971 < 1.5 < patches
+    assert two.energy().total < 2.631 < 2.739 < patches
     assert (one.alpha.tobytes(), one.beta.tobytes()) == (two.alpha.tobytes(), two.beta.tobytes())
     assert one.p.tolist() == two.p.tolist()
 

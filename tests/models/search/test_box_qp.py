@@ -8,8 +8,8 @@ from crossfield.export.solving.two_stage import fit_angles
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
-from crossfield.models.search.power_field import power_field
 from crossfield.models.sketch.samples import sample, samples
+from crossfield.models.smooth.power_field import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each

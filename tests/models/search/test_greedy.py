@@ -12,9 +12,9 @@ from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy
 from crossfield.models.search.improvement import first_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
-from crossfield.models.search.power_field import power_field
 from crossfield.models.search.search import search
 from crossfield.models.sketch.samples import sample
+from crossfield.models.smooth.power_field import power_field
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st

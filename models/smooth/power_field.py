@@ -7,11 +7,12 @@ everywhere.
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from .energy import energy_at, factored, stroke_weight
+from .systems import factored, smoothness, stroke_weight
 
 
 def power_field(instance: Instance) -> CrossField:
@@ -26,9 +27,7 @@ def power_field(instance: Instance) -> CrossField:
     weight = stroke_weight(instance)
     goal = np.zeros((grid.size, 2))
     goal[instance.stroke_index] = np.stack([np.cos(4 * instance.theta), np.sin(4 * instance.theta)], axis=-1)
-    # Without jumps the part of alpha in H is the very matrix of this energy.
-    alike = energy_at(instance, np.zeros(len(grid.first), dtype=np.int32)).matrix[: grid.size, : grid.size]
-    z = factored(alike)(weight[:, None] * goal)
+    z = factored(smoothness(instance) + sparse.diags_array(weight))(weight[:, None] * goal)
     alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
     start = relabelled(instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
     return start.with_best_jumps()

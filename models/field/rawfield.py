@@ -1,0 +1,182 @@
+"""Directional's raw field of a mesh (.rawfield), and the mesh of an instance (.obj).
+
+A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. What is written here goes
+counter-clockwise in every row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
+
+The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
+Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no quad
+of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
+2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
+
+Fields by others are read: vectors of any length and in any order, as long as there are two pairs of opposite
+ones in the plane of the mesh. Where the two triangles of a pixel differ, the pixel gets the lines between.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+import numpy as np
+
+from ..errors import InstanceError, shortened
+from ..input_limits import MAX_NUMBER
+from ..instance.angles import double_angle, line_difference, line_of
+from ..instance.elementary import arctangent
+from ..instance.grid import Bools, Floats, Grid, Ints
+from ..instance.instance import Instance
+from .field import CrossField
+
+_ROW: Final = 12  # numbers of a face
+_OPPOSITE: Final = 1e-3  # radians by which a line's two vectors may fail to be opposite
+_FLAT: Final = 1e-6  # part of a vector that may point out of the plane
+_NUMBERS: Final = re.compile(rb"[-+.0-9eE \t]*")
+
+
+def to_rawfield(field: CrossField) -> bytes:
+    """The text of the field's .rawfield: each pixel's row twice."""
+    vectors = np.zeros((field.instance.grid.size, 4, 3))
+    vectors[:, :, :2] = np.stack([field.u, field.v, -field.u, -field.v], axis=1)
+    rows = _lines(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
+    return f"4 {2 * len(vectors)}\n{rows}".encode()
+
+
+def to_obj(instance: Instance) -> bytes:
+    """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
+    places, corners = _corners(instance.grid)
+    x = instance.origin[0] + instance.pixel_size * places[:, 1]
+    y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
+    vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
+    faces = _lines(corners[:, [0, 2, 3, 0, 3, 1]].reshape(-1, 3) + 1, "f ")
+    return (
+        f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
+        f"row by row; y up\n{vertices}{faces}"
+    ).encode()
+
+
+def _corners(grid: Grid) -> tuple[Ints, Ints]:
+    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row."""
+    down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
+    inside = np.pad(grid.mask, 1)
+    # Pixels round the corner: beyond it across, and on its two sides.
+    across = inside[row + down, column + right]
+    beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
+    apart = across & ~beside & (right == 1)
+    key = 2 * (row.astype(np.int64) * (grid.width + 1) + column) + apart
+    vertices, corners = np.unique(key, return_inverse=True)
+    places = np.stack(np.divmod(vertices // 2, grid.width + 1), axis=1)
+    return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
+
+
+def _lines(table: np.ndarray[Any, Any], lead: str = "") -> str:
+    return "".join(f"{lead}{' '.join(map(repr, row))}\n" for row in table.tolist())
+
+
+def most_bytes(instance: Instance) -> int:
+    """Bytes of the longest .rawfield of the instance that is read."""
+    return (MAX_NUMBER + 1) * (2 + 2 * instance.grid.size * _ROW)
+
+
+def of_rawfield(data: bytes, instance: Instance) -> CrossField:
+    """The field of a .rawfield on the instance, with two faces a pixel, or one.
+
+    Raises InstanceError that names the line.
+    """
+    lines = data.splitlines()
+    rows = _faces(lines[0] if lines else b"", instance)
+    body = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
+    if len(body) != rows:
+        raise InstanceError(f"has {len(body)} rows of vectors, but its first line says {rows}")
+    vectors = _vectors(body).reshape(rows, 4, 3)
+    u, v = _two_lines(vectors, [number for number, _ in body])
+    if rows == 2 * instance.grid.size:
+        u, v = _between(u.reshape(-1, 2).T, v.reshape(-1, 2).T)
+    return CrossField.from_lines(instance, u, v)
+
+
+def _faces(head: bytes, instance: Instance) -> int:
+    """The number of faces that the first line states."""
+    words = head.split()
+    if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
+        raise InstanceError(
+            f"line 1: is {_shown(head)}, not the degree 4 and the number of faces; give a .rawfield as text"
+        )
+    degree, faces = map(int, words)
+    if degree != 4:
+        raise InstanceError(f"line 1: has {degree} vectors a face; crosses have 4: u, v, -u, -v")
+    size = instance.grid.size
+    if faces not in (size, 2 * size):
+        raise InstanceError(
+            f"line 1: has {faces} faces, but {instance.name} has {size} pixels; "
+            f"give {2 * size}, those of its .obj, or {size}, one for each pixel"
+        )
+    return faces
+
+
+def _vectors(body: list[tuple[int, bytes]]) -> Floats:
+    """The numbers of all rows, 12 each."""
+    for number, line in body:
+        words = len(line.split())
+        if words != _ROW:
+            raise InstanceError(f"line {number}: has {words} numbers; give {_ROW}, x y z of four vectors")
+        if not _NUMBERS.fullmatch(line):
+            raise InstanceError(f"line {number}: holds something other than numbers: {_shown(line)}")
+    try:
+        return np.array(b" ".join(line for _, line in body).split(), dtype=np.float64)
+    except ValueError:
+        number, line = next((number, line) for number, line in body if not _are_numbers(line))
+        raise InstanceError(f"line {number}: holds something other than numbers: {_shown(line)}") from None
+
+
+def _are_numbers(line: bytes) -> bool:
+    try:
+        np.array(line.split(), dtype=np.float64)
+    except ValueError:
+        return False
+    return True
+
+
+def _shown(line: bytes) -> str:
+    return repr(shortened(line.decode("utf-8", "replace")))
+
+
+def _two_lines(vectors: Floats, numbers: list[int]) -> tuple[Floats, Floats]:
+    """The angles u, v (k,) in radians of the two lines of four vectors each, (k, 4, 3)."""
+    largest = np.abs(vectors).max(axis=2, keepdims=True)
+    _refuse(~np.isfinite(largest).all(axis=(1, 2)), numbers, "holds a number beyond the range of doubles")
+    _refuse((largest == 0).any(axis=(1, 2)), numbers, "holds a vector of length 0, which has no direction")
+    unit = vectors / largest  # squares of the numbers themselves might be beyond the range of doubles
+    unit /= np.linalg.norm(unit, axis=2, keepdims=True)
+    _refuse((np.abs(unit[:, :, 2]) > _FLAT).any(axis=1), numbers, "has a vector out of the plane z = 0")
+    rows = np.arange(len(unit))
+    partner = 1 + np.argmin(np.einsum("kc,kvc->kv", unit[:, 0], unit[:, 1:]), axis=1)
+    other = np.where(partner == 1, 2, 1)
+    angle = arctangent(unit[:, :, 1], unit[:, :, 0])
+    u, v = angle[:, 0], angle[rows, other]
+    # Of the indices 0 to 3, which add up to 6.
+    last = 6 - partner - other
+    opposite = np.stack([angle[rows, partner] - u, angle[rows, last] - v])
+    off = np.abs(np.mod(opposite, 2 * np.pi) - np.pi)
+    _refuse((off > _OPPOSITE).any(axis=0), numbers, "has no two pairs of opposite vectors: u, v, -u, -v")
+    return u, v
+
+
+def _refuse(wrong: Bools, numbers: list[int], reason: str) -> None:
+    if wrong.any():
+        raise InstanceError(f"line {numbers[int(np.argmax(wrong))]}: {reason} ({int(wrong.sum())} such rows)")
+
+
+def _between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """The lines between those of two crosses, shapes (2, n), paired as they are closest."""
+    straight = line_difference(u[0], u[1]) + line_difference(v[0], v[1])
+    crossed = line_difference(u[0], v[1]) + line_difference(v[0], u[1])
+    swap = crossed < straight
+    second = np.where(swap, v[1], u[1]), np.where(swap, u[1], v[1])
+    return _middle(u[0], second[0]), _middle(v[0], second[1])
+
+
+def _middle(first: Floats, second: Floats) -> Floats:
+    """The line between two lines, (n,), the first where they are the same."""
+    middle = line_of(double_angle(first) + double_angle(second))
+    return np.where(line_difference(first, second) < _OPPOSITE * 1e-9, first, middle)

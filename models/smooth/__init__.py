@@ -1,0 +1,5 @@
+"""Fields by one sparse system.
+
+The power field and the PolyVector field: unknowns that do not see labels or jumps are smoothed, and crosses,
+labels and jumps are read off. Whatever changes jumps afterwards is models/search.
+"""

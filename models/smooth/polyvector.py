@@ -1,0 +1,76 @@
+"""The PolyVector field: crosses of any angle from one linear system, without labels or jumps.
+
+Diamanti, Vaxman, Panozzo, Sorkine-Hornung: Designing N-PolyVector Fields with Complex Polynomials (Computer
+Graphics Forum 33, 2014). A cross is the pair of roots exp(2 i u), exp(2 i v) of z^2 + X1 z + X0, whose
+coefficients do not see which line is u and how often an angle was turned.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..field.field import CrossField, relabelled
+from ..field.jumps import free_jumps, label_of
+from ..instance.grid import Floats
+from ..instance.instance import HALF, Instance
+from .systems import factored, smoothness, stroke_weight
+
+_Complex = NDArray[np.complex128]
+
+HOLDS: Final = (0.1, 1.0, 100.0)
+"""Factors of the stroke weights that are worth trying: loose, that of the energy, hard."""
+
+_DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
+
+
+def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
+    """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
+
+    X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
+    where s = exp(2 i theta) is to be a root, and w_beta |X1|^2 over pixels, which asks for right angles where
+    nothing else says. Near a right-angled cross along the stroke that is 16 times the energy of
+    docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels
+    are then moved into the windows of the instance (docs/mathematics.md, 10).
+
+    hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them: among those
+    of `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings,
+    where strokes contradict each other and a hard hold makes singularities between them, and a hard one on
+    clean curves that cross.
+    """
+    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in _lines(*_polynomials(instance, hold)))
+    alpha, beta = label_of(u, v)
+    start = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
+    return start.with_best_jumps()
+
+
+def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
+    """The coefficients X0, X1 (n,) of each pixel."""
+    size, weight = instance.grid.size, hold * stroke_weight(instance)
+    root = np.zeros(size, dtype=np.complex128)
+    root[instance.stroke_index] = np.exp(2j * instance.theta)
+    alike = smoothness(instance) + sparse.diags_array(weight)
+    x = factored(_beside(alike, weight * root, instance.w_beta))(
+        np.concatenate([-weight * root**2, -weight * root])
+    )
+    return x[:size], x[size:]
+
+
+def _beside(alike: Any, cross: _Complex, skew: float) -> Any:
+    """The Hermitian matrix (2n, 2n) of both coefficients: `alike` for each, diagonals that tie them."""
+    size = len(cross)
+    at = np.nonzero(cross)[0]
+    tie = sparse.csr_array((cross[at], (at, at)), shape=(size, size))
+    return sparse.block_array(
+        [[alike, tie], [tie.conj().T, alike + skew * sparse.eye_array(size)]], format="csr"
+    )
+
+
+def _lines(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
+    """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; those of z^2 = 1 where both are 0."""
+    x0 = np.where((x0 == 0) & (x1 == 0), -1.0, x0)
+    apart = np.sqrt(x1**2 - 4 * x0)
+    return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2

@@ -1,0 +1,77 @@
+"""Sparse systems of smoothing on the grid: their matrices, and their factorisation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
+
+from ..instance.grid import Floats, Ints
+from ..instance.instance import Instance
+
+Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
+
+PULL: Final = 1e-9
+"""Pull towards the present values: parts without strokes, or w_beta = 0, leave a system singular."""
+
+
+def stroke_weight(instance: Instance) -> Floats:
+    """Weight w_strokes w of each pixel, 0 without a stroke; shape (n,)."""
+    weight = np.zeros(instance.grid.size)
+    weight[instance.stroke_index] = instance.w_strokes * instance.w
+    return weight
+
+
+def smoothness(instance: Instance) -> Any:
+    """The sparse matrix (n, n) of 2 |z_i - z_j|^2 over the pairs: twice the Laplacian of the grid."""
+    grid = instance.grid
+    degree = np.bincount(grid.first, minlength=grid.size) + np.bincount(grid.second, minlength=grid.size)
+    beside = np.full(len(grid.first), -2.0)
+    return symmetric(grid.first, grid.second, beside, 2 * degree.astype(np.float64))
+
+
+def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
+    """The sparse symmetric matrix with those entries on one side of the diagonal, each place once."""
+    every = np.arange(len(diagonal), dtype=np.int32)
+    values = np.concatenate([beside, beside, diagonal])
+    place = (np.concatenate([row, column, every]), np.concatenate([column, row, every]))
+    return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
+
+
+def factored(matrix: Any) -> Solve:
+    """The solver of a Hermitian system that is positive semidefinite: of H + 1e-9, so that it is definite."""
+    pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
+    with one_thread():
+        # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
+        factors = splu(
+            pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+
+    def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        with one_thread():
+            solution: np.ndarray[Any, Any] = factors.solve(right)
+        return solution
+
+    return solve
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """A context in which BLAS keeps to one thread.
+
+    The dense blocks of sparse factors are tiny, and threads would cost many times the work. Sums do not
+    depend on the number of threads either.
+    """
+    limit: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limit
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """The libraries of this process that run threads; looking for them takes milliseconds."""
+    return ThreadpoolController()

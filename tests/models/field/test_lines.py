@@ -1,0 +1,116 @@
+"""Fields from two lines a pixel: the same crosses whatever the turns and the order, in every gauge."""
+
+import numpy as np
+import pytest
+from crossfield.models.errors import InstanceError
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.jumps import best_jumps
+from crossfield.models.instance.angles import line_difference
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from exhaustive import random_instance
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+pytestmark = pytest.mark.numeric
+
+SEEDS = st.integers(0, 2**32 - 1)
+GAUGE = st.sampled_from(["strokes", "box"])
+
+
+def random_field(instance, rng):
+    """A field inside all bounds, some of its labels on the ends of their windows, some of its lines one."""
+    size = instance.grid.size
+    alpha = instance.alpha_lower + HALF * np.clip(rng.uniform(-0.2, 1.2, size), 0, 1)
+    beta = np.clip(rng.uniform(-1, 1, size), -QUARTER, QUARTER)
+    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
+
+
+def lines(field):
+    return field.alpha + field.beta, field.alpha + HALF - field.beta
+
+
+def assert_inside(field):
+    instance = field.instance
+    assert (field.alpha >= instance.alpha_lower).all()
+    assert (field.alpha <= instance.alpha_upper).all()
+    assert (np.abs(field.beta) <= QUARTER).all()
+    assert (field.p == best_jumps(instance, field.alpha, field.beta)).all()
+
+
+@given(seed=SEEDS, gauge=GAUGE)
+@settings(deadline=None)
+def test_own_lines_give_back_the_crosses_with_no_more_energy(seed, gauge):
+    field = random_field(random_instance(seed, gauge=gauge), np.random.default_rng(seed))
+    back = CrossField.from_lines(field.instance, *lines(field))
+    assert_inside(back)
+    assert back.cross_error(*lines(field)) == pytest.approx(np.zeros(len(field.alpha)), abs=1e-9)
+    for norm in (1, 2):
+        jumps = CrossField(
+            field.instance, field.alpha, field.beta, best_jumps(field.instance, field.alpha, field.beta, norm)
+        )
+        jumps_back = CrossField(
+            field.instance, back.alpha, back.beta, best_jumps(field.instance, back.alpha, back.beta, norm)
+        )
+        assert jumps_back.energy(norm).total <= jumps.energy(norm).total + 1e-9
+
+
+@given(seed=SEEDS, gauge=GAUGE)
+@settings(deadline=None)
+def test_turns_and_the_order_of_the_lines_do_not_matter(seed, gauge):
+    rng = np.random.default_rng(seed)
+    instance = random_instance(seed, gauge=gauge)
+    u, v = rng.uniform(-4, 4, (2, instance.grid.size))
+    field = CrossField.from_lines(instance, u, v)
+    assert_inside(field)
+    assert field.cross_error(u, v) == pytest.approx(np.zeros(len(u)), abs=1e-9)
+    swap = rng.random(len(u)) < 0.5
+    turns = np.pi * rng.integers(-9, 10, (2, len(u)))
+    other = CrossField.from_lines(instance, np.where(swap, v, u) + turns[0], np.where(swap, u, v) + turns[1])
+    assert other.cross_error(*lines(field)) == pytest.approx(np.zeros(len(u)), abs=1e-9)
+    assert other.energy().total == pytest.approx(field.energy().total, abs=1e-9)
+
+
+@given(seed=SEEDS)
+@settings(deadline=None)
+def test_u_is_the_line_nearer_to_the_stroke(seed):
+    instance = random_instance(seed)
+    u, v = np.random.default_rng(seed).uniform(0, np.pi, (2, instance.grid.size))
+    field = CrossField.from_lines(instance, u, v)
+    at = instance.stroke_index
+    off = [line_difference(line[at], instance.target) for line in lines(field)]
+    assert (off[0] <= off[1] + 1e-9).all()
+    assert np.abs(field.residual_r) == pytest.approx(off[0], abs=1e-9)
+
+
+def test_a_label_on_the_edge_of_the_box_carries_the_stroke():
+    for theta in (0.0, HALF):
+        instance = Instance("edge", [[True, True]], [[0, 1]], [theta], [1.0], gauge="box")
+        field = CrossField.from_lines(instance, [0.0, 0.0], [HALF, HALF])
+        assert field.energy().total == pytest.approx(0)
+
+
+def test_lines_that_are_one_make_a_cross_of_one_line():
+    instance = Instance("one", [[True, True]], [[0, 0]], [0.3], [1.0])
+    field = CrossField.from_lines(instance, [0.3, 1.0], [0.3 + np.pi, 1.0])
+    assert field.degenerate.all()
+    assert field.angle_between == pytest.approx([0, 0], abs=1e-9)
+    assert np.abs(field.residual_r) == pytest.approx([0], abs=1e-9)
+
+
+@for_each(
+    "u, message",
+    [
+        ([0.0], "u has shape (1,), but two has 2 pixels"),
+        ([[0.0, 1.0]], "u has shape (1, 2), but two has 2 pixels"),
+        ([0.0, np.nan], "u of pixel 1 is nan, which is no angle"),
+        ([2e6, 0.0], "u of pixel 0 is 2000000.0, which is no angle"),
+        (["a", "b"], "u holds something other than numbers"),
+        ([1j, 0.0], "u holds something other than numbers"),
+    ],
+)
+def test_what_is_no_angle_is_refused(u, message):
+    instance = Instance("two", [[True, True]], [[0, 0]], [0.3], [1.0])
+    with pytest.raises(InstanceError) as caught:
+        CrossField.from_lines(instance, u, [0.0, 0.0])
+    assert message in str(caught.value)

@@ -1,0 +1,124 @@
+"""The PolyVector field: exact on constant directions, at any angle, and it moves with the sketch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossfield.models.instance.angles import line_difference
+from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.search.improvement import improved
+from crossfield.models.search.polyvector_start import polyvector_start
+from crossfield.models.search.search import search
+from crossfield.models.sketch.samples import sample
+from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
+from crossfield.models.smooth.power_field import power_field
+from exhaustive import random_instance, sketch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+pytestmark = pytest.mark.numeric
+
+SEEDS = st.integers(0, 2**32 - 1)
+MOVES = {
+    "turned": (np.rot90, lambda angle: angle + HALF),
+    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
+    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
+}
+
+
+def lines(field):
+    return field.alpha + field.beta, field.alpha + HALF - field.beta
+
+
+@for_each("degrees", [0, 20, 45, 90, 120, 135, 179])
+def test_parallel_strokes_give_right_angles_along_them(degrees):
+    theta = np.full((6, 7), np.nan)
+    theta[[1, 4], 1:5] = np.radians(degrees)
+    for hold in HOLDS:
+        field = polyvector_field(sketch(np.ones((6, 7), bool), theta), hold=hold)
+        assert field.energy().total < 1e-9
+        assert np.abs(field.beta).max() < 1e-4
+
+
+@for_each("degrees", [10, 35, 60, 90])
+def test_two_families_at_any_angle_are_exact(degrees):
+    theta = np.full((8, 8), np.nan)
+    theta[:, 1], theta[:, 5] = np.radians(100), np.radians(100 - degrees)
+    field = polyvector_field(sketch(np.ones((8, 8), bool), theta, w_beta=0))
+    assert field.energy().total < 1e-9
+    assert field.cross_error(
+        np.full(64, np.radians(100)), np.full(64, np.radians(100 - degrees))
+    ) == pytest.approx(np.zeros(64), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_the_field_moves_with_the_sketch(name):
+    move, turn = MOVES[name]
+    for instance in (sample("mouse", 24), sample("bottle", 20), sample("singular", 16)):
+        field = polyvector_field(instance)
+        moved = polyvector_field(getattr(instance, name)())
+        there = [turn(move(field.image(line)))[moved.instance.mask] for line in lines(field)]
+        assert moved.cross_error(*there) == pytest.approx(np.zeros(len(there[0])), abs=1e-6)
+        assert moved.energy().total == pytest.approx(field.energy().total, rel=1e-6)
+
+
+@given(
+    seed=SEEDS,
+    gauge=st.sampled_from(["strokes", "box"]),
+    w_beta=st.sampled_from([0, 1e-6, 1]),
+    w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
+)
+@settings(deadline=None)
+def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
+    instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
+    field = polyvector_field(instance)
+    assert (field.alpha >= instance.alpha_lower).all()
+    assert (field.alpha <= instance.alpha_upper).all()
+    assert (np.abs(field.beta) <= QUARTER).all()
+    assert (field.p >= instance.p_min).all()
+    assert (field.p <= instance.p_max).all()
+    assert 0 <= field.energy().total < np.inf
+
+
+def test_parts_without_strokes_are_constant_and_cost_nothing():
+    mask = np.ones((5, 9), bool)
+    mask[:, 4] = False
+    theta = np.full(mask.shape, np.nan)
+    theta[:, 1] = 0.3
+    instance = sketch(mask, theta)
+    field = polyvector_field(instance)
+    far = instance.grid.columns > 4
+    assert (field.alpha[far] == 0).all()
+    assert (field.beta[far] == 0).all()
+    assert field.energy().total < 1e-9
+
+
+def test_a_hard_hold_keeps_the_strokes():
+    instance = sample("mouse", 24)
+    off = []
+    for hold in HOLDS:
+        u, v = lines(polyvector_field(instance, hold=hold))
+        at = instance.stroke_index
+        off.append(
+            np.minimum(line_difference(u[at], instance.theta), line_difference(v[at], instance.theta)).mean()
+        )
+    assert off[0] > off[1] > off[2]
+    assert off[2] < np.radians(0.5)
+
+
+def test_the_start_is_the_best_of_the_holds():
+    instance = sample("cylinder_bend", 16)
+    start = polyvector_start(instance).energy().total
+    assert (
+        start <= min(improved(polyvector_field(instance, hold=hold)).energy().total for hold in HOLDS) * 1.05
+    )
+    assert polyvector_start(instance, lambda: True).energy().total >= start
+
+
+def test_the_search_begins_where_the_polyvector_field_leads():
+    """The improved greedy and power fields of the saddle have the wrong jumps."""
+    instance = sample("saddle", 24)
+    reached = improved(polyvector_start(instance)).energy().total
+    assert reached < 0.95 * improved(power_field(instance)).energy().total
+    assert search(instance, rounds=0).field.energy().total <= reached + 1e-9
