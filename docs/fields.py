@@ -450,7 +450,8 @@ greedy`) and the power field with the best angles for its jumps (`--method power
 energies of fields inside all bounds; lower is better. Singularities, mean skew abs(beta) in degrees and
 seconds stand in the order greedy / power + QP / search. {cores} cores, Python {python}. GB: memory of all
 processes of the search together, pages that they share counted in each. The search starts from the greedy
-field and the power field, both improved, so that it cannot end above either. *improved* is the greedy field
+field and the power field, both improved, so that it cannot end above either; these rows are from before it
+began at PolyVector fields and at the dual of a coarse lattice too. *improved* is the greedy field
 after local improvement (`crossfield.improved`), from which solvers start; *lower by* is the search against
 greedy / against improved.
 

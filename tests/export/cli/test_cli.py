@@ -413,7 +413,7 @@ def test_the_table_of_a_run_stands_in_lines(two_parts):
     rows = [
         line
         for line in two_parts[1].stdout.splitlines()
-        if re.match(r" *(start|greedy|power|polyvector|MILP|two-stage|search|prove)", line)
+        if re.match(r" ?(start|greedy|power|polyvector|MILP|two-stage|search|prove)", line)
     ]
     assert len(rows) == 10
     assert sum("*" in row for row in rows) == 1
