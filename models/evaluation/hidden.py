@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import InstanceError
 from ..field.field import CrossField
-from ..instance.angles import line_difference
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 
@@ -50,8 +49,7 @@ class HiddenCurve:
         if not np.array_equal(field.instance.mask, self.instance.mask):
             raise InstanceError(f"the field is not on the pixels of {self.instance.name}")
         at, theta = self.instance.stroke_index[self.stroke], self.instance.theta[self.stroke]
-        lines = np.stack([field.alpha + field.beta, field.alpha + np.pi / 2 - field.beta])
-        return float(line_difference(lines[:, at], theta).min(axis=0).mean())
+        return float(field.deviation(at, theta).mean())
 
 
 def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurve]:

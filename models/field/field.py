@@ -211,9 +211,12 @@ class CrossField:
     @property
     def stroke_deviation(self) -> Floats:
         """Angle between each stroke and the nearer line, in [0, pi/2] radians; shape (s,)."""
-        at, theta = self.instance.stroke_index, self.instance.theta
-        to_u = line_difference((self.alpha + self.beta)[at], theta)
-        return np.minimum(to_u, line_difference((self.alpha + HALF - self.beta)[at], theta))
+        return self.deviation(self.instance.stroke_index, self.instance.theta)
+
+    def deviation(self, pixels: Ints, theta: Floats) -> Floats:
+        """Angle between theta and the nearer line at each of some pixels, in [0, pi/2] radians: (k,)."""
+        to_u = line_difference((self.alpha + self.beta)[pixels], theta)
+        return np.minimum(to_u, line_difference((self.alpha + HALF - self.beta)[pixels], theta))
 
     @property
     def shape(self) -> Shape:
