@@ -24,6 +24,9 @@ _Complex = NDArray[np.complex128]
 HOLDS: Final = (0.1, 1.0, 100.0)
 """Factors of the stroke weights that are worth trying: loose, that of the energy, hard."""
 
+_HARDEST: Final = 1e4
+"""Greatest weight of a stroke: beside it the 2 of a pair is nothing, and `PULL` still counts in 16 digits."""
+
 _DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
 
 
@@ -49,7 +52,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
 
 def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
     """The coefficients X0, X1 (n,) of each pixel."""
-    size, weight = instance.grid.size, hold * stroke_weight(instance)
+    size, weight = instance.grid.size, np.minimum(hold * stroke_weight(instance), _HARDEST)
     root = np.zeros(size, dtype=np.complex128)
     root[instance.stroke_index] = np.exp(2j * instance.theta)
     alike = smoothness(instance) + sparse.diags_array(weight)

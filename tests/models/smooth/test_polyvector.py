@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.improvement import improved
 from crossfield.models.search.polyvector_start import polyvector_start
 from crossfield.models.search.search import search
@@ -122,3 +122,12 @@ def test_the_search_begins_where_the_polyvector_field_leads():
     reached = improved(polyvector_start(instance)).energy().total
     assert reached < 0.95 * improved(power_field(instance)).energy().total
     assert search(instance, rounds=0).field.energy().total <= reached + 1e-9
+
+
+def test_one_pixel_under_the_heaviest_strokes_is_solved():
+    """Its system has one equation for two unknowns, which a heavy weight must not drown the pull of."""
+    for theta in np.linspace(0, 3.1, 40):
+        one = Instance("one", [[True]], [[0, 0]], [theta], [1.0], w_strokes=1e6, w_beta=0.0)
+        for hold in HOLDS:
+            found = polyvector_field(one, hold=hold)
+            assert found.stroke_deviation.max() < 1e-6
