@@ -481,6 +481,7 @@ def in_child(*arguments, prelude=""):
 @pytest.mark.parametrize(
     "package,formulation", [("highspy", "milp-mccormick"), ("casadi", "qp-fixed"), ("casadi", "miqp-exact")]
 )
+@pytest.mark.slow
 def test_a_missing_solver_is_named(tmp_path, instance, package, formulation):
     cf.write_instance(instance, tmp_path / "tiny.json")
     before = listing(tmp_path)

@@ -42,6 +42,7 @@ def assert_same(model: Model, expected: Model) -> None:
         np.testing.assert_array_equal(getattr(model, name), getattr(expected, name), err_msg=name)
 
 
+@pytest.mark.slow
 @both
 @pytest.mark.parametrize("reader", [pytest.param(name, marks=pytest.mark.needs(name)) for name in READERS])
 @for_each("label", LOW_DEGREE)

@@ -167,6 +167,7 @@ def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.oracles
 def test_verify_hands_them_to_their_readers(tmp_path: Path):
     """SCIP reads every .osil, GLPK the linear .mod, as the table states; nobody is handed .qplib or .bar."""
@@ -474,6 +475,7 @@ def scip_optimum(path: Path) -> float:
     return float(scip.getObjVal())
 
 
+@pytest.mark.slow
 @for_each("formulation", FORMULATIONS)
 def test_scip_finds_the_same_optimum_from_osil_as_from_nl(formulation: str, tmp_path: Path):
     problem = make_problem(formulation, tiny())

@@ -43,6 +43,7 @@ def limits_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     return np.array(lower), np.array(upper)
 
 
+@pytest.mark.slow
 @for_each("label", CASES)
 def test_casadi_sees_the_problem(label: str, tmp_path: Path):
     problem = problem_of(label)
@@ -90,6 +91,7 @@ def difference(problem: Problem, point: np.ndarray, column: int) -> tuple[float,
     return (high - low) / 2e-5, (high_rows - low_rows) / 2e-5
 
 
+@pytest.mark.slow
 @for_each("binary", [False, True])
 @for_each("label", CASES)
 def test_scip_sees_the_columns(label: str, binary: bool, tmp_path: Path):

@@ -687,6 +687,7 @@ def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built,
     assert all(whole[name] == data for name, data in content(out).items())
 
 
+@pytest.mark.slow
 def test_entries_that_left_the_specification_leave_the_folder_and_other_files_stay(built, spec, copy):
     (copy / "notes.txt").write_text("mine")
     (copy / "cf_mine_n004_qp.nl").write_text("mine too")

@@ -488,6 +488,7 @@ def told(folder, file, words):
     return found
 
 
+@pytest.mark.slow
 @for_each("what", PLAIN)
 def test_what_was_changed_is_found(what, built, tmp_path):
     spoil, file, words = PLAIN[what]
@@ -669,6 +670,7 @@ def states(before, after):
         "all but the checksums",
     ],
 )
+@pytest.mark.slow
 def test_a_submission_that_was_stopped_is_told_and_mended_by_the_next(state, built, solved, tmp_path):
     before, after = everything_below(built), everything_below(solved[2])
     lib = shutil.copytree(built, tmp_path / "lib")

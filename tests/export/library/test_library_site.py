@@ -663,6 +663,7 @@ def test_it_works_from_a_folder_without_any_server(browser, site):
     assert browser.get_log("browser") == []
 
 
+@pytest.mark.slow
 @for_each("width", [320, 390])
 @for_each("page", KINDS)
 def test_a_phone_never_scrolls_sideways(browser, address, page, width):
@@ -699,6 +700,7 @@ return found.sort((a, b) => a[0] - b[0]);
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", KINDS)
 def test_text_has_contrast_in_light_and_in_dark_mode(browser, address, page):
     grounds = []

@@ -164,6 +164,7 @@ def test_two_pixels_with_exchanged_lines_meet_with_jump_one(name, solver):
     assert solution.field.beta == pytest.approx([b, -b], abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("gauge", ["box", "strokes"])
 def test_the_milp_has_the_optimum_of_the_enumeration(seed, gauge):
@@ -231,6 +232,7 @@ def solution_of(label, solver):
     return cf.solve(formulated(SMALL, name, relax=relax), solver, start=start, limits=cf.Limits(250))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label,solver", DONE)
 def test_every_pair_of_the_table_is_solved(label, solver):
     solution = solution_of(label, solver)

@@ -102,6 +102,7 @@ def refuses(path: Path, solver: str) -> bool:
     return solver in SOLVERS and SOLVERS[solver].refusal(held, "read") is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instance", LARGER)
 @each_solver
 def test_optima_agree(verified: Callable[[str], Verification], solver: str, instance: str):

@@ -237,6 +237,7 @@ WRITERS = {
 }
 
 
+@pytest.mark.slow
 @for_each("writer", WRITERS)
 @for_each("name", ["miqcp-bilinear", "milp-mccormick", "qp-fixed"])
 def test_blocks_leave_no_seam_in_any_format(name, writer, monkeypatch):

@@ -333,6 +333,7 @@ def test_crossing_strokes_leave_no_coarse_stroke():
     assert halved(sketch(np.ones((2, 2), bool), theta)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w_beta", [0.0, 1e-6])
 def test_parts_without_strokes_and_free_skews_do_no_harm(w_beta):
     mask = np.ones((6, 11), bool)
