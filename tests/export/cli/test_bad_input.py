@@ -505,6 +505,7 @@ def test_a_missing_solver_is_named(tmp_path, instance, package, formulation):
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_without_one_solver_another_that_takes_the_class_is_used(tmp_path, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
     arguments = ("solve", tmp_path / "tiny.json", "-f", "milp-mccormick", "--json", "-o", tmp_path / "out")

@@ -443,6 +443,7 @@ def in_terminal(arguments, columns=80):
     return code, written.decode()
 
 
+@pytest.mark.slow
 def test_progress_is_shown_on_a_terminal_only(tmp_path, instance_file):
     arguments = ("solve", instance_file, "-f", "qp-fixed", "-o", tmp_path / "t")
     code, shown = in_terminal(arguments)

@@ -31,6 +31,7 @@ def test_a_field_of_another_instance_is_refused(theirs, tmp_path, capsys):
     assert "the field is on another instance" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_search_starts_at_a_raw_field(theirs, tmp_path):
     field, instance = theirs
     folder = tmp_path / "out"

@@ -771,6 +771,7 @@ def test_a_damaged_ledger_is_one_line(copy, capfd):
         assert words in shown
 
 
+@pytest.mark.slow
 def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothing():
     """Every record is about the very problem that is built today, no bound is above a point,
     and every kept field has the objective told.

@@ -82,6 +82,7 @@ def test_it_lies_in_the_library_with_its_checksum_and_its_checker(built):
     assert (built / CERTIFICATE).stat().st_size < 100_000
 
 
+@pytest.mark.slow
 def test_the_same_certificate_is_made_twice(built, tmp_path):
     (tmp_path / "spec.toml").write_text(SPEC.replace("[1, 2]", "[1]"))
     again = build(read_spec(tmp_path / "spec.toml"), tmp_path / "again").folder

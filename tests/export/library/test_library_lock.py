@@ -121,6 +121,7 @@ def test_who_waits_too_long_is_told_for_whom(copy, holder, monkeypatch, capsys):
     assert "cannot be read" in capsys.readouterr().err  # what is wrong anyway waits for nobody
 
 
+@pytest.mark.slow
 def test_a_verification_waits_for_changes_and_changes_for_it(copy, holder, monkeypatch):
     """Before, it looked at files while they were written, and found them damaged."""
     monkeypatch.setattr(lock, "PATIENCE", 0.3)

@@ -582,6 +582,7 @@ def test_a_click_on_a_head_sorts_by_value_and_what_is_missing_comes_last(browser
     )
 
 
+@pytest.mark.slow
 def test_everything_works_from_the_keyboard(browser, address):
     from selenium.webdriver import Keys
 
@@ -614,6 +615,7 @@ def test_everything_works_from_the_keyboard(browser, address):
     assert [row[0] for row in shown_rows(browser)] == ["cf_rand_n006_s1_milp"]
 
 
+@pytest.mark.slow
 def test_filters_narrow_the_table_and_live_in_the_address(browser, address):
     from selenium.webdriver.support.wait import WebDriverWait
 

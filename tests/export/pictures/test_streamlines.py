@@ -166,6 +166,7 @@ def test_tracing_does_not_depend_on_labels(index):
         np.testing.assert_allclose(same, line, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [0.0, 0.25, -0.25])
 def test_placement_does_not_depend_on_labels(index):
     field = waves(square(24)) if index == 0 else quarter(24, index, 1.2, 0.4)

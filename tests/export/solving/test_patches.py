@@ -60,6 +60,7 @@ def test_a_piece_without_strokes_takes_the_nearest_one_along():
     assert np.nonzero(piece.pairs)[0].tolist() == [3, 4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_patches_as_large_as_the_grid_reach_the_optimum_over_all_jumps(seed):
     instance = random_instance(seed, shape=(2, 2), strokes=4)

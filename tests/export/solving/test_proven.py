@@ -15,6 +15,7 @@ from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.certificate import read_certificate
 
 
+@pytest.mark.slow
 def test_a_run_says_what_is_proven_of_every_field(tmp_path, capsys):
     given = ["run", "skew", "--size", "4", "--time-limit", "20", "--threads", "1"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0

@@ -24,6 +24,7 @@ def test_stages_are_all_the_time_whatever_is_rounded():
     assert sum(watch.stages.values()) == pytest.approx(3.25, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     instance = cf.sample("mouse", 8, w_strokes=10)
     given = [

@@ -394,6 +394,7 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
     assert not list((tmp_path / "files").glob("*.start"))
 
 
+@pytest.mark.slow
 def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_path, monkeypatch):
     """Where Ctrl-C is ignored, as in a shell's background; this HiGHS goes on until it is asked to end."""
     told_to_highs(

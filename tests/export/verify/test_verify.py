@@ -125,6 +125,7 @@ def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     assert {f.program for f in found if f.verdict == Verdict.AGREES} == present
 
 
+@pytest.mark.slow
 def test_the_result_lies_in_the_folder(verified: Callable[[str], Verification]):
     found = verified("1 x 3")
     assert found.ok
@@ -149,7 +150,6 @@ def test_options_and_packed_files(tmp_path: Path):
     assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_lonely_columns(tmp_path: Path):
     """A pixel without stroke and neighbour: its alpha stands in no term."""

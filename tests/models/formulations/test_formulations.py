@@ -188,6 +188,7 @@ def test_two_pixels_solved():
     assert solve(formulate(instance, "qp-fixed", p=[0]), "ipopt").field.energy().total > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
 def test_parallel_strokes_and_two_families_cost_nothing(degrees):
     """Strokes of one direction, or of two at any angle, are met by one constant cross;
@@ -241,6 +242,7 @@ def test_the_box_forces_skew_and_depends_on_the_axes():
     assert optimum(boxed.turned()) == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 @pytest.mark.parametrize("gauge", GAUGES)
 def test_printed_facet_is_a_relaxation(gauge, seed):

@@ -163,6 +163,7 @@ def holds(lattice, cross):
     return inside.all()
 
 
+@pytest.mark.slow
 def test_pruning_keeps_every_field_of_no_more_energy():
     dropped = 0
     with crew(1) as hands:

@@ -25,6 +25,7 @@ def test_shares_that_are_carried_on_rise_faster():
         assert carried.bound() <= first_field(lattice.instance).energy().total
 
 
+@pytest.mark.slow
 def test_where_no_finer_level_fits_the_rest_goes_to_the_search(monkeypatch, tmp_path):
     """The level is raised once more, and its record replaced; the certificate holds all the same."""
     instance = cf.sample("ring", 12)

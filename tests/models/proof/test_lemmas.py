@@ -103,6 +103,7 @@ def test_computed_costs_of_the_four_labels_round_a_cross_average_to_no_more_than
         assert (found <= exact + 1e-12).all(), (seed, h)
 
 
+@pytest.mark.slow
 def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_over_the_boxes():
     seen = np.zeros(2, int)
     for seed in range(150):

@@ -65,6 +65,7 @@ def test_one_pixel_and_one_row():
                 assert proof.status == "optimal"
 
 
+@pytest.mark.slow
 def test_a_proof_of_the_gauge_box_is_no_higher_than_its_optimum():
     instance = random_instance(5, shape=(2, 2), gauge="box")
     proof = cf.prove(instance, jobs=1, **a_few_steps())

@@ -415,6 +415,7 @@ def test_dust_does_not_widen_the_frame():
     assert_same(read(png(image), 30, "a.png"), read(png(drawn(200)), 30, "a.png"), angle=1e-3, weight=1e-3)
 
 
+@pytest.mark.slow
 def test_a_picture_finer_than_needed_gives_the_same_directions():
     large = png(drawn(525, 4).resize((4200, 4200)), compress_level=1)
     coarse, fine = read(png(drawn(525, 4)), 24, "a.png"), read(png(drawn(1050, 8)), 24, "a.png")
