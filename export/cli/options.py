@@ -63,8 +63,8 @@ StrokeWeight = Annotated[
     typer.Option(
         "--w-strokes",
         metavar="X",
-        help="Weight of the distance from the strokes in the energy, 0 to {most weight}; by default {stroke"
-        " weight}, or that of the instance file.",
+        help="Weight of the distance from the strokes, 0 to {most weight}, the same on every grid; by default"
+        " {stroke weight}, or that of the instance file.",
     ),
 ]
 SkewWeight = Annotated[
@@ -72,8 +72,8 @@ SkewWeight = Annotated[
     typer.Option(
         "--w-beta",
         metavar="X",
-        help="Weight of the skew beta in the energy, 0 to {most weight}; by default {skew weight}, or that of"
-        " the instance file.",
+        help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default {skew weight},"
+        " or that of the instance file.",
     ),
 ]
 Facet = Annotated[

@@ -74,6 +74,8 @@ class Evaluation:
                 "stroke_pixels": len(self.instance.theta),
                 "w_strokes": self.instance.w_strokes,
                 "w_beta": self.instance.w_beta,
+                "stroke_weight": self.instance.stroke_weight,
+                "skew_weight": self.instance.skew_weight,
             },
             "seconds_per_field": self.limits.seconds,
             "curves_of": "sketch" if self.drawn else "chains",
@@ -108,9 +110,9 @@ def evaluate(
 
     sketch: the file that the instance was read from, or the name of its sample, for what is a curve there;
     without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
-    methods. limits: of each field, 5 seconds by
-    default. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
-    Raises InputError for unknown methods, and when no curve can be hidden.
+    methods. limits: of each field, 5 seconds by default. Ctrl-C ends it with the curves done so far, or,
+    before there is one, as KeyboardInterrupt. Raises InputError for unknown methods, and when no curve can be
+    hidden.
     """
     methods, limits = tuple(dict.fromkeys(methods)), limits or Limits(SECONDS)
     for name in methods:

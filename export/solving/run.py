@@ -98,6 +98,8 @@ class Report:
                 "pixel_size": instance.pixel_size,
                 "w_strokes": instance.w_strokes,
                 "w_beta": instance.w_beta,
+                "stroke_weight": instance.stroke_weight,
+                "skew_weight": instance.skew_weight,
             },
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),

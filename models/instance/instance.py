@@ -12,7 +12,16 @@ import numpy as np
 
 from ..errors import InstanceError
 from .angles import wrap
+from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
+from .weights import (
+    SKEW_WEIGHT,
+    STROKE_WEIGHT,
+    skew_coefficient,
+    skew_weight,
+    stroke_coefficient,
+    stroke_weight,
+)
 
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
@@ -50,9 +59,12 @@ def whole_numbers(values: Any, name: str) -> Ints:
     return given.astype(np.int32)
 
 
-def _in_digits(value: float) -> float:
-    """The number rounded to 12 significant decimal digits."""
-    return float(f"{value:.12g}") + 0.0  # no -0.0
+def _check_weight(name: str, value: float) -> None:
+    if not 0 <= value <= MOST_WEIGHT:
+        raise InstanceError(
+            f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, "
+            "beyond which rounding hides the other terms"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +78,9 @@ class Instance:
     rounded to 12 decimals, and as 0 within 1e-8 of the horizontal: a cost that small would be dropped by
     readers of the files.
     w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
-    w_strokes, w_beta: weights of the stroke and the skew term (1 and 1e-6), at most 1e6: beyond, an energy
-    that rounding leaves in the one term hides the others.
+    w_strokes, w_beta: coefficients of the stroke and the skew term of the energy (1 and 1e-6), at most
+    1e6: beyond, an energy that rounding leaves in the one term hides the others. They count per pixel;
+    weights that mean the same on every grid: `with_weights`.
     gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
     source: where the sketch came from, one line of text.
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
@@ -98,10 +111,10 @@ class Instance:
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         self._freeze("theta", np.asarray(self.theta, dtype=np.float64))
         self._freeze("w", np.asarray(self.w, dtype=np.float64))
-        object.__setattr__(self, "origin", (_in_digits(self.origin[0]), _in_digits(self.origin[1])))
+        object.__setattr__(self, "origin", (in_digits(self.origin[0]), in_digits(self.origin[1])))
         for name in ("w_strokes", "w_beta"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        object.__setattr__(self, "pixel_size", _in_digits(self.pixel_size))
+        object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
         self._check_scalars()
         self._check_strokes()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
@@ -122,12 +135,7 @@ class Instance:
         if self.gauge not in GAUGES:
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
         for name in ("w_strokes", "w_beta"):
-            value = getattr(self, name)
-            if not 0 <= value <= MOST_WEIGHT:
-                raise InstanceError(
-                    f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}, "
-                    "beyond which rounding hides the other terms"
-                )
+            _check_weight(name, getattr(self, name))
         if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
             raise InstanceError(
                 f"pixel_size is {self.pixel_size}; it must be between {1 / _FARTHEST:g} and {_FARTHEST:g}"
@@ -237,10 +245,31 @@ class Instance:
         return replace(self, gauge=gauge)
 
     def with_weights(self, w_strokes: float | None = None, w_beta: float | None = None) -> Instance:
-        """The same instance under other weights; None leaves a weight as it is. Raises InstanceError."""
-        given = {"w_strokes": w_strokes, "w_beta": w_beta}
-        changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        """The same instance under other weights, which mean the same on every grid (docs/weights.md).
+
+        w_strokes, w_beta: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6; on another
+        one they are w_strokes 24 / side and w_beta (24 / side)^2. None leaves a weight as it is. Raises
+        InstanceError.
+        """
+        changed: dict[str, Any] = {}
+        for name, weight, coefficient in (
+            ("w_strokes", w_strokes, stroke_coefficient),
+            ("w_beta", w_beta, skew_coefficient),
+        ):
+            if weight is not None:
+                _check_weight(name, weight)
+                changed[name] = coefficient(weight, max(self.mask.shape))
         return replace(self, **changed) if changed else self
+
+    @property
+    def stroke_weight(self) -> float:
+        """The weight of the strokes that means the same on every grid; w_strokes on one of 24 pixels."""
+        return stroke_weight(self.w_strokes, max(self.mask.shape))
+
+    @property
+    def skew_weight(self) -> float:
+        """The weight of the skew that means the same on every grid; w_beta on one of 24 pixels."""
+        return skew_weight(self.w_beta, max(self.mask.shape))
 
     def turned(self) -> Instance:
         """The instance of the sketch turned by a quarter counter-clockwise."""
@@ -264,7 +293,7 @@ class Instance:
 
     @property
     def summary(self) -> str:
-        """Name, grid, pixels, strokes, parts of the mask, gauge, and weights that are not the defaults."""
+        """Name, grid, pixels, strokes, parts of the mask, gauge, and weights unless they are defaults."""
         grid = self.grid
         parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
         return (
@@ -274,8 +303,12 @@ class Instance:
 
     @property
     def _other_weights(self) -> str:
-        names = [name for name in ("w_strokes", "w_beta") if getattr(self, name) != getattr(Instance, name)]
-        return "".join(f", {name} {getattr(self, name):g}" for name in names)
+        said = {"w_strokes": (self.stroke_weight, STROKE_WEIGHT), "w_beta": (self.skew_weight, SKEW_WEIGHT)}
+        return "".join(
+            f", {name} {weight:g}"
+            for name, (weight, of_sketches) in said.items()
+            if weight != of_sketches and getattr(self, name) != getattr(Instance, name)
+        )
 
     @cached_property
     def sha256(self) -> str:

@@ -20,6 +20,7 @@ from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
+from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
@@ -64,8 +65,8 @@ def read_sketch(
     mask: str | Path | None = None,
     gauge: Gauge = "strokes",
     name: str | None = None,
-    w_strokes: float | None = None,
-    w_beta: float | None = None,
+    w_strokes: float = STROKE_WEIGHT,
+    w_beta: float = SKEW_WEIGHT,
 ) -> Instance:
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
@@ -76,7 +77,8 @@ def read_sketch(
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
     from half its area on.
     gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
-    weights of the stroke and the skew term, as in Instance; None: those of an Instance without any.
+    weights of the stroke and the skew term that mean the same on every grid, as in `Instance.with_weights`;
+    their defaults are 20 and 1e-6 (docs/weights.md).
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
@@ -99,7 +101,7 @@ def read_sketch(
 def instance_of(
     data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
 ) -> Instance:
-    """The instance of a sketch given as the bytes of a file, as read_sketch. Raises InputError."""
+    """The instance of a sketch, given as a file's bytes, under the default weights. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower())
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
@@ -121,7 +123,7 @@ def instance_of(
         source=" ".join(source.split()),
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
-    )
+    ).with_weights(STROKE_WEIGHT, SKEW_WEIGHT)
 
 
 def name_from(text: str) -> str:

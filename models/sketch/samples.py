@@ -8,6 +8,7 @@ from typing import Final, Literal
 
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
+from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
@@ -66,14 +67,14 @@ def sample(
     size: int = DEFAULT_SIZE,
     gauge: Gauge = "strokes",
     *,
-    w_strokes: float | None = None,
-    w_beta: float | None = None,
+    w_strokes: float = STROKE_WEIGHT,
+    w_beta: float = SKEW_WEIGHT,
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
-    name: of one in `samples()`; size: 1..4096; gauge, w_strokes, w_beta: as in Instance, its weights where
-    None. For the exact answer of an analytic one see `analytic`. Raises InputError for an unknown name or
-    size, InstanceError for a weight that cannot be.
+    name: of one in `samples()`; size: 1..4096; gauge: as in Instance; w_strokes, w_beta: as in
+    `Instance.with_weights`. For the exact answer of an analytic one see `analytic`. Raises InputError for
+    an unknown name or size, InstanceError for a weight that cannot be.
     """
     check_size(size)
     if _known(name).kind == "analytic":

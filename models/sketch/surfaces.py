@@ -18,6 +18,7 @@ from ..instance.angles import wrap
 from ..instance.elementary import arctangent, cosine, length, sine, turned
 from ..instance.grid import Bools, Floats
 from ..instance.instance import Gauge, Instance
+from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from .cover import Frame, cover_by_segments, fit_frame
 from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
@@ -123,14 +124,22 @@ SURFACES: Final[dict[str, Surface]] = {
 """The surfaces by name: two developable ones and one that is not."""
 
 
-def analytic(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> AnalyticInstance:
+def analytic(
+    name: str,
+    size: int = DEFAULT_SIZE,
+    gauge: Gauge = "strokes",
+    *,
+    w_strokes: float = STROKE_WEIGHT,
+    w_beta: float = SKEW_WEIGHT,
+) -> AnalyticInstance:
     """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
 
     A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are
     evenly parametrised curvature lines of both families, so many that the share of stroke pixels comes as
     close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
-    drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance.
-    Raises InputError for an unknown name or size.
+    drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance;
+    w_strokes, w_beta: as in `Instance.with_weights`. Raises InputError for an unknown name or size,
+    InstanceError for a weight that cannot be.
     """
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
@@ -152,7 +161,7 @@ def analytic(name: str, size: int = DEFAULT_SIZE, gauge: Gauge = "strokes") -> A
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
     )
-    return AnalyticInstance(instance, u_angle, v_angle)
+    return AnalyticInstance(instance.with_weights(w_strokes, w_beta), u_angle, v_angle)
 
 
 def _frame(surface: Surface, size: int) -> Frame:

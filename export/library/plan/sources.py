@@ -23,10 +23,15 @@ RAGGED_SHARE: Final = 0.75
 
 
 def instance_from(recipe: InstanceRecipe) -> Instance:
-    """The instance of a recipe, under the recipe's name. Raises InputError that names it."""
+    """The instance of a recipe, under the recipe's name. Raises InputError that names it.
+
+    Its weights are the coefficients of the paper, 1 and 1e-6, on every grid: what others have published of
+    these problems is about them.
+    """
     make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
     try:
-        return replace(make(recipe), name=recipe.name)
+        of_paper = {weight: getattr(Instance, weight) for weight in ("w_strokes", "w_beta")}
+        return replace(make(recipe), name=recipe.name, **of_paper)
     except CrossfieldError as error:
         raise InputError(f"{recipe.name}: {error}") from error
 

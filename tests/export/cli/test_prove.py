@@ -16,7 +16,19 @@ from crossfield.models.proof import check_certificate
 def folder(tmp_path_factory):
     """What `prove` has written for a sample of some pixels, and what it has printed."""
     folder = tmp_path_factory.mktemp("proof")
-    command = ["prove", "mouse", "--size", "8", "-o", str(folder), "--time-limit", "100", "-q"]
+    command = [
+        "prove",
+        "mouse",
+        "--size",
+        "8",
+        "--w-strokes",
+        "0.3",
+        "-o",
+        str(folder),
+        "--time-limit",
+        "100",
+        "-q",
+    ]
     assert invoke(command) == 0
     (report,) = folder.glob("*.proof.json")
     return folder, json.loads(report.read_text())
@@ -44,14 +56,15 @@ def test_field_certificate_and_report_agree(folder):
 
 
 def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
-    given = ["prove", "mouse", "--size", "4", "--norm", "1", "--time-limit", "100", "--json"]
+    sketch = ["mouse", "--size", "4", "--w-strokes", "0.2"]
+    given = ["prove", *sketch, "--norm", "1", "--time-limit", "100", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mouse.proof.field.npz", "mouse.proof.json"]
     field = read_field(of(tmp_path, "field.npz"))
     assert (report["norm"], report["status"]) == (1, "optimal")
     assert report["energy"] == pytest.approx(field.energy(1).total, abs=1e-12)
-    solved = ["solve", "mouse", "--size", "4", "-f", "milp-mccormick", "--time-limit", "100", "--json"]
+    solved = ["solve", *sketch, "-f", "milp-mccormick", "--time-limit", "100", "--json"]
     assert invoke([*solved, "-o", str(tmp_path / "milp")]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["status"] == "optimal-global"
@@ -81,7 +94,21 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
 
 def test_tightened_files_of_a_proof(folder, tmp_path):
     folder, _ = folder
-    command = ["export", "mouse", "--size", "8", "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
+    command = [
+        "export",
+        "mouse",
+        "--size",
+        "8",
+        "--w-strokes",
+        "0.3",
+        "-o",
+        str(tmp_path),
+        "-f",
+        "miqp-exact",
+        "-F",
+        "lp",
+        "-q",
+    ]
     assert invoke([*command, "--tightened", str(of(folder, "certificate.npz"))]) == 0
     (manifest,) = tmp_path.glob("*.manifest.json")
     windows = json.loads(manifest.read_text())["windows"]

@@ -1,10 +1,12 @@
 """The weights of strokes and skew, given wherever a sketch is read: to the commands and in Python."""
 
 import crossfield as cf
+import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InstanceError
-from crossfield.models.instance.instance import MOST_WEIGHT, Instance
+from crossfield.models.instance.instance import MOST_WEIGHT
+from crossfield.models.instance.weights import STROKE_WEIGHT
 from crossfield.models.sketch.samples import sample_svg
 
 GIVEN = ["--w-strokes", "10", "--w-beta", "1e-4"]
@@ -31,9 +33,9 @@ def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawin
         assert invoke(["instance", str(what), *size, *GIVEN, "-q", "-o", str(made)]) == 0
         instance = cf.read_instance(made)
         assert instance.sha256 == wanted.sha256
-        assert (instance.w_strokes, instance.w_beta) == (10.0, 1e-4)
+        assert (instance.stroke_weight, instance.skew_weight) == (10.0, 1e-4)
     kept = cf.sample("mouse", 8, w_beta=1e-3).with_weights(w_strokes=10)
-    assert (kept.w_strokes, kept.w_beta) == (10.0, 1e-3)
+    assert (kept.stroke_weight, kept.skew_weight) == (10.0, 1e-3)
     assert len({kept.sha256, instance.sha256, cf.read_instance(file).sha256}) == 3
 
 
@@ -63,7 +65,43 @@ def test_weights_that_cannot_be_are_refused(tmp_path, capsys, drawing):
         with pytest.raises(InstanceError, match=f"{name} is"):
             cf.read_sketch(drawing, size=8, **{name: float(value)})
     assert not (tmp_path / "out").exists()
-    assert cf.sample("skew", 4, w_strokes=0, w_beta=MOST_WEIGHT).w_beta == MOST_WEIGHT
+    for given in ({"w_strokes": MOST_WEIGHT}, {"w_beta": MOST_WEIGHT}):
+        with pytest.raises(InstanceError, match="must be between"):  # on so coarse a grid
+            cf.sample("skew", 4, **given)
+        assert cf.sample("skew", 24, **given).w_strokes > 0
+
+
+def test_a_weight_means_the_same_on_every_grid():
+    """Each pixel cut in four, its stroke through two of them: the field's energy is the same in all terms."""
+    mask = np.ones((5, 7), dtype=bool)
+    rows = np.arange(5)
+    coarse = cf.Instance("coarse", mask, np.stack([rows, 3 + 0 * rows], axis=1), 0.3 + 0.1 * rows, np.ones(5))
+    fine_rows = np.arange(10)
+    fine = cf.Instance(
+        "fine",
+        np.ones((10, 14), dtype=bool),
+        np.stack([fine_rows, 6 + 0 * fine_rows], axis=1),
+        np.repeat(coarse.theta, 2),
+        np.ones(10),
+    )
+    energies = []
+    for instance in (coarse.with_weights(3.0, 1e-2), fine.with_weights(3.0, 1e-2)):
+        scale = 24 / max(instance.mask.shape)
+        assert (instance.w_strokes, instance.w_beta) == pytest.approx((3 * scale, 1e-2 * scale**2))
+        assert (instance.stroke_weight, instance.skew_weight) == (3.0, 1e-2)
+        size = instance.grid.size
+        alpha, pairs = np.full(size, 0.5), np.zeros(len(instance.grid.first), dtype=int)
+        energies.append(cf.CrossField(instance, alpha, np.full(size, 0.1), pairs).energy())
+    assert energies[0].strokes == pytest.approx(energies[1].strokes)
+    assert energies[0].beta == pytest.approx(energies[1].beta)
+    assert min(energies[0].strokes, energies[0].beta) > 0
+
+
+def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
+    mask = np.ones((2, 30), dtype=bool)
+    instance = cf.Instance("own", mask, np.array([[0, 0]]), np.zeros(1), np.ones(1))
+    assert (instance.w_strokes, instance.w_beta) == (1.0, 1e-6)
+    assert "w_strokes" not in instance.summary
 
 
 def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
@@ -77,4 +115,4 @@ def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
 
 def test_the_summary_names_weights_that_are_not_the_defaults():
     assert "w_" not in cf.sample("skew", 4).summary
-    assert cf.sample("skew", 4, w_strokes=Instance.w_strokes, w_beta=1.0).summary.endswith(", w_beta 1")
+    assert cf.sample("skew", 4, w_strokes=STROKE_WEIGHT, w_beta=1.0).summary.endswith(", w_beta 1")

@@ -38,7 +38,8 @@ def skew(tmp_path_factory):
     """A folder with the MILP of a sample in LP, MPS and as an AMPL model, its instance and manifest."""
     folder = tmp_path_factory.mktemp("skew")
     formats = ["--format", "lp", "--format", "mps", "--format", "mod"]
-    arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats]
+    weights = ["--w-strokes", "0.17", "--w-beta", "2.8e-8"]
+    arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats, *weights]
     assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
     return folder
 

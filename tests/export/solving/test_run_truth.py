@@ -42,9 +42,10 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     ]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     told = json.loads((tmp_path / "report.json").read_text())
-    assert {key: told["instance"][key] for key in ("sha256", "w_strokes", "w_beta")} == {
+    assert {key: told["instance"][key] for key in ("sha256", "w_strokes", "w_beta", "stroke_weight")} == {
         "sha256": instance.sha256,
-        "w_strokes": 10.0,
+        "w_strokes": 30.0,
+        "stroke_weight": 10.0,
         "w_beta": instance.w_beta,
     }
     rows = {row["method"]: row for row in told["methods"]}

@@ -111,7 +111,7 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 
 def test_limits_end_a_proof_with_what_it_has():
-    instance = cf.sample("bottle", 12)
+    instance = cf.sample("bottle", 12, w_strokes=0.5)
     told = []
     some = cf.prove(instance, gap=0.5, progress=lambda *what: told.append(what))
     assert some.ended == "gap"

@@ -1,0 +1,6 @@
+"""Numbers that are the same where the last digit differs between processors."""
+
+
+def in_digits(value: float) -> float:
+    """The number rounded to 12 significant decimal digits."""
+    return float(f"{value:.12g}") + 0.0  # no -0.0

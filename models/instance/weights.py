@@ -1,0 +1,40 @@
+"""Weights that mean the same on every grid, and the coefficients of the energy that they are on one.
+
+The smoothness of a field is a sum of squared differences over pairs of pixels, and stays what it is when the
+grid is made finer: twice as many pixels a side are four times as many pairs of half the difference. A stroke
+then runs through twice as many pixels, and the area holds four times as many. So a weight of the strokes is
+divided by the pixels of the longer side, and a weight of the skew by their square.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from .digits import in_digits
+
+REFERENCE: Final = 24
+"""Pixels of the longer side of the grid on which weights are the coefficients of the energy."""
+STROKE_WEIGHT: Final = 20.0
+"""Default weight of the strokes of a sketch; docs/weights.md says why."""
+SKEW_WEIGHT: Final = 1e-6
+"""Default weight of the skew in a sketch."""
+
+
+def stroke_coefficient(weight: float, longer: int) -> float:
+    """The coefficient w_strokes of a weight of the strokes; longer: pixels of the grid's longer side."""
+    return weight * REFERENCE / longer
+
+
+def skew_coefficient(weight: float, longer: int) -> float:
+    """The coefficient w_beta of a weight of the skew; longer: pixels of the grid's longer side."""
+    return weight * REFERENCE**2 / longer**2
+
+
+def stroke_weight(coefficient: float, longer: int) -> float:
+    """The weight of the strokes, to 12 digits, whose coefficient on a grid this is."""
+    return in_digits(coefficient * longer / REFERENCE)
+
+
+def skew_weight(coefficient: float, longer: int) -> float:
+    """The weight of the skew, to 12 digits, whose coefficient on a grid this is."""
+    return in_digits(coefficient * longer**2 / REFERENCE**2)
