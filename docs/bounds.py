@@ -210,7 +210,7 @@ problems, and what solvers prove of files that are [tightened by
 them](proofs.md#what-mip-solvers-prove) stands there.
 
 Random directions on two pixels in five of a full grid, {seconds:g} s each in the first table. What is proven
-with other solvers, and how the search compares, stands in [fields.md](fields.md#against-proven-optima);
+with other solvers, and how the search compares, stands in [energies.md](energies.md#against-proven-optima);
 bounds of all entries of the instance library in its sidecars. Beyond these sizes the bounds that these
 solvers give are those of the relaxation, which say next to nothing.
 

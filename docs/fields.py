@@ -1,502 +1,275 @@
-"""Make docs/fields.md: how good the fields of each method are, against each other and against proven optima.
+"""Make docs/fields.md and docs/weights.md, how good fields are, from docs/fields.json.
 
-    python docs/fields.py [--sketches FOLDER] [--seconds S] [--work FOLDER]
+    python docs/fields.py [--measure PART ...] [--sketches FOLDER] [--seconds S] [--jobs N]
 
-Takes about 2 S seconds for each sample and each sketch of the folder. Each field comes from a `crossfield
-solve --method` of its own. With --work, what is done stays in that folder, and the command goes on there when
-it is given again.
+With --measure, parts are measured first, and their rows in docs/fields.json replaced: `methods` (hidden
+curves, each method), `weights` (hidden curves, each weight of the strokes), `strokes` (how far fields are
+from the strokes that they were shown), `surfaces` (fields of surfaces with a known answer, with and without
+noise on the strokes). FOLDER has line drawings by others; the samples are there without it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.bundle.manifest import write_all
-from crossfield.export.verify.verify import Check, verify
-from crossfield.models.field.field import CrossField
+from crossfield.export.solving.methods import METHODS
+from crossfield.models.errors import InputError
+from crossfield.models.evaluation.hidden import summary
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.box_qp import fitted
+from crossfield.models.instance.weights import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
+from energies import SKETCHES
+from fields_text import FIELDS, WEIGHTS
 from make import markdown, said
-from PIL import Image
 
 DOCS: Final = Path(__file__).resolve().parent
-SIZES: Final = (24, 48)
-LARGE: Final = 128
-LARGE_SKETCHES: Final = 4
-PICTURED: Final = ("cylinder_bend", "mouse", "singular")
-SKETCHES: Final = (".svg", ".png", ".scap")
-PROVERS: Final = ("gurobi", "cplex")
-PROOF_SECONDS: Final = 60.0
-RANDOM: Final = 8  # random instances of 5 x 5 pixels
-PATCHED: Final = ("cylinder_bend", "mouse", "singular")
-PATCH_SECONDS: Final = 40.0
-HUGE: Final = 256
-IPOPT_SIZE: Final = 64
+KEPT: Final = DOCS / "fields.json"
+SIZES: Final = (24, 32, 48)
+TRIED: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0)
+"""Weights of the strokes, on every grid."""
+NOISE: Final = (0.0, 3.0, 8.0)
+"""Standard deviation of the noise on each stroke pixel, in degrees."""
+SEEDS: Final = 3
+OFF: Final = 10.0
+"""Degrees from which a stroke pixel counts as off its stroke."""
+LEFT_OUT: Final = {"prove", "patches", "two-stage"}
+"""Methods that are about energies, or that some seconds are too short for."""
+Rows = list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Sketch:
-    """A sample, or a drawing in a file with its mask, if it has one."""
+class Task:
+    """A drawing or a surface at a size, and the seconds of a field that is searched."""
 
     name: str
     what: str
-    mask: Path | None = None
-
-    @property
-    def arguments(self) -> list[str]:
-        """How it is named on the command line."""
-        return [self.what, *(["--mask", str(self.mask)] if self.mask else [])]
-
-    def instance(self, size: int) -> Instance:
-        """The instance of that size."""
-        if self.what in SAMPLES:
-            return cf.sample(self.what, size)
-        return cf.read_sketch(self.what, size=size, mask=self.mask)
-
-
-def sketches(folder: Path | None) -> list[Sketch]:
-    """Every sample, and every drawing of a folder; a picture called NAME_mask.png is the mask of NAME.png."""
-    found = [Sketch(name, name) for name in SAMPLES]
-    for path in sorted(folder.iterdir()) if folder else ():
-        if path.suffix in SKETCHES and not path.stem.endswith("_mask"):
-            mask = path.with_name(f"{path.stem}_mask.png")
-            found.append(
-                Sketch(path.name, str(path), mask if path.suffix == ".png" and mask.exists() else None)
-            )
-    return found
-
-
-@dataclass(frozen=True)
-class Row:
-    """What the methods made of a sketch.
-
-    improved: energy of the greedy field, improved; the search's memory in bytes, at most.
-    """
-
-    sketch: Sketch
     size: int
-    pixels: int
-    greedy: dict[str, Any]
-    power: dict[str, Any]
-    search: dict[str, Any]
-    improved: float
+    seconds: float
+    noise: float = 0.0
 
     @property
-    def lower(self) -> float:
-        """By which share the search is below the greedy field."""
-        return share(self.greedy["energy_2_norm"], self.search["energy_2_norm"])
+    def instance(self) -> Instance:
+        """Its instance, under the default weights."""
+        if self.what in SAMPLES:
+            return cf.sample(self.what, self.size)
+        return cf.read_sketch(self.what, size=self.size)
 
-    @property
-    def lower_than_improved(self) -> float:
-        """By which share the search is below the greedy field, improved."""
-        return share(self.improved, self.search["energy_2_norm"])
 
-    def cells(self) -> list[str]:
-        """Its line of the table."""
-        facts = (self.greedy, self.power, self.search)
-        greedy, power, search = (f"{each['energy_2_norm']:.4f}" for each in facts)
+def angles(task: Task, instance: Instance, tried: Iterable[str]) -> Rows:
+    """A row for each method: its angles in degrees to the hidden curves; none where none can be hidden."""
+    limits = cf.Limits(task.seconds, threads=1)
+    try:
+        found = cf.evaluate(instance, sketch=task.what, methods=tried, limits=limits)
+    except InputError:
+        return []
+    return [
+        {
+            "drawing": task.name,
+            "size": task.size,
+            "method": method,
+            "degrees": [round(each.degrees[method], 3) for each in found.curves if method in each.degrees],
+        }
+        for method in found.methods
+    ]
+
+
+def methods(task: Task) -> Rows:
+    """Hidden curves of a drawing, by method."""
+    return angles(task, task.instance, (name for name in METHODS if name not in LEFT_OUT))
+
+
+def weights(task: Task) -> Rows:
+    """Hidden curves of a drawing in greedy fields, by weight of the strokes."""
+    found = [(w, angles(task, task.instance.with_weights(w_strokes=w), ["greedy"])) for w in TRIED]
+    return [row | {"weight": w} for w, rows in found for row in rows]
+
+
+def strokes(task: Task) -> Rows:
+    """The share of the stroke pixels of a drawing that greedy fields miss by more than OFF, by weight."""
+    fields = [cf.greedy(task.instance.with_weights(w_strokes=w)) for w in TRIED]
+    off = [float((np.degrees(field.stroke_deviation) > OFF).mean()) for field in fields]
+    return [
+        {"drawing": task.name, "size": task.size, "weight": w, "off": round(share, 5)}
+        for w, share in zip(TRIED, off, strict=True)
+    ]
+
+
+def surfaces(task: Task) -> Rows:
+    """Mean cross error of fields of a surface, by weight of the strokes; noise on each stroke pixel."""
+    known = cf.analytic(task.name, task.size)
+    rows: Rows = []
+    for w in TRIED:
+        errors = []
+        for seed in range(SEEDS if task.noise else 1):
+            noise = np.random.default_rng(seed).standard_normal(len(known.instance.theta))
+            theta = known.instance.theta + np.radians(task.noise) * noise
+            shown = replace(known.instance, theta=theta).with_weights(w_strokes=w)
+            errors.append(np.degrees(cf.greedy(shown).cross_error(known.u_angle, known.v_angle)).mean())
+        facts = {"surface": task.name, "size": task.size, "noise": task.noise, "weight": w}
+        rows.append(facts | {"error": round(float(np.mean(errors)), 3)})
+    return rows
+
+
+MEASURES: Final[dict[str, Callable[[Task], Rows]]] = {
+    "methods": methods, "weights": weights, "strokes": strokes, "surfaces": surfaces,
+}  # fmt: skip
+
+
+def tasks(part: str, folder: Path | None, seconds: float) -> list[Task]:
+    """What is measured for a part, one after the other."""
+    if part == "surfaces":
+        names = [name for name, entry in SAMPLES.items() if entry.kind == "analytic"]
         return [
-            self.sketch.name,
-            str(self.size),
-            str(self.pixels),
-            greedy,
-            f"{self.improved:.4f}",
-            power,
-            search,
-            f"{100 * self.lower:.1f} % / {100 * self.lower_than_improved:.1f} %",
-            " / ".join(str(each["singularities"]) for each in facts),
-            " / ".join(f"{each['mean_abs_beta_degrees']:.1f}" for each in facts),
-            " / ".join(f"{each['seconds']:.1f}" for each in facts),
-            f"{self.search['memory'] / 1e9:.2f}",
+            Task(name, name, size, seconds, noise) for size in (24, 48) for noise in NOISE for name in names
         ]
+    own = [(name, name) for name, entry in SAMPLES.items() if entry.kind == "sketch"]
+    files = (path for path in sorted(folder.iterdir()) if path.suffix in SKETCHES) if folder else ()
+    others = [(path.name, str(path)) for path in files if not path.stem.endswith("_mask")]
+    return [Task(name, what, size, seconds) for size in SIZES for name, what in [*own, *others]]
 
 
-def share(greedy: float, search: float) -> float:
-    """By which share the search is below; 0 where both are nothing but the price of beta."""
-    return float((greedy - search) / greedy) if greedy > 1e-3 else 0.0
+def measured(part: str, folder: Path | None, seconds: float, jobs: int) -> Rows:
+    """The rows of a part."""
+    with ProcessPoolExecutor(jobs) as processes:
+        found = processes.map(MEASURES[part], tasks(part, folder, seconds))
+        return [row for rows in found for row in rows]
 
 
-COLUMNS: Final = (
-    "sketch", "size", "pixels", "greedy", "improved", "power + QP", "search", "lower by", "singularities",
-    "mean abs(beta)", "seconds", "GB",
-)  # fmt: skip
+# The pages
 
 
-def solved(
-    sketch: Sketch, size: int, method: str, seconds: float, folder: Path, *options: str
-) -> dict[str, Any]:
-    """The facts of `crossfield solve --method`, as `answered` has them."""
-    command = [
-        *("solve", *sketch.arguments, "--size", str(size), "--method", method),
-        *("--time-limit", str(seconds), "--json", "-o", str(folder), *options),
+def mean_and_median(rows: Rows) -> str:
+    """Mean and median over all curves of the rows; then the mean over drawings with its standard error."""
+    curves = summary(np.array([angle for row in rows for angle in row["degrees"]]))
+    drawings = summary(np.array([np.mean(row["degrees"]) for row in rows if row["degrees"]]))
+    if curves is None or drawings is None:
+        return "none"
+    between = "" if drawings.error is None else f" ({drawings.mean:.1f} +- {drawings.error:.1f})"
+    return f"{curves.mean:.2f} / {curves.median:.2f}{between}"
+
+
+def picked(rows: Rows, **facts: Any) -> Rows:
+    """The rows with these facts."""
+    return [row for row in rows if all(row[name] == value for name, value in facts.items())]
+
+
+def by_method(rows: Rows) -> str:
+    """Hidden curves: a row for each method, a column for each size."""
+    names = dict.fromkeys(row["method"] for row in rows)
+    table = [
+        [f"`{name}`", *(mean_and_median(picked(rows, method=name, size=size)) for size in SIZES)]
+        for name in names
     ]
-    return answered(command, folder, sketch.name)
+    return markdown(("method", *(f"{size} pixels" for size in SIZES)), table)
 
 
-def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
-    """What a command of crossfield says as JSON, and `memory`: bytes that its processes took at most.
-
-    In the folder it stays, with the files of the command, and is read from there the next time.
-    """
-    kept = folder / "facts.json"
-    if kept.exists():
-        return dict(json.loads(kept.read_text()))
-    whole = [sys.executable, "-m", "crossfield", *command]
-    with subprocess.Popen(whole, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
-        most = 0
-        while process.poll() is None:
-            most = max(most, memory_of(process.pid))
-            time.sleep(0.25)
-        answer = process.communicate()[0]
-    if process.returncode:
-        raise SystemExit(f"{name}: exit code {process.returncode}")
-    facts = dict(json.loads(answer)) | {"memory": most}
-    kept.write_text(json.dumps(facts, indent=1) + "\n")
-    return facts
+def by_drawing(rows: Rows, size: int) -> str:
+    """Hidden curves: a row for each drawing at a size, a column for each method."""
+    names = list(dict.fromkeys(row["method"] for row in rows))
+    table = []
+    for drawing in dict.fromkeys(row["drawing"] for row in rows):
+        found = [picked(rows, drawing=drawing, size=size, method=name) for name in names]
+        if any(each and each[0]["degrees"] for each in found):
+            count = str(max(len(each[0]["degrees"]) for each in found if each))
+            cells = [
+                f"{np.mean(each[0]['degrees']):.1f}" if each and each[0]["degrees"] else "-" for each in found
+            ]
+            table.append([drawing, count, *cells])
+    return markdown(("drawing", "curves", *(f"`{name}`" for name in names)), table)
 
 
-def field_in(folder: Path) -> Path:
-    """The field that `solved` left in a folder."""
-    (path,) = folder.glob("*.field.npz")
-    return path
-
-
-def memory_of(session: int) -> int:
-    """Bytes of memory that the processes of a session hold, shared pages counted once for each."""
-    total = 0
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:  # it has ended meanwhile
-            continue
-        total += int(fields[21]) * os.sysconf("SC_PAGE_SIZE") if int(fields[3]) == session else 0
-    return total
-
-
-def row(sketch: Sketch, size: int, seconds: float, folder: Path) -> Row:
-    """All methods on a sketch."""
-    here = place(folder, sketch, size)
-    facts = [solved(sketch, size, method, seconds, here / method) for method in ("greedy", "power", "search")]
-    greedy = cf.read_field(field_in(here / "greedy"))
-    found = Row(sketch, size, greedy.instance.grid.size, *facts, cf.improved(greedy).energy().total)
-    print(*found.cells(), file=sys.stderr, flush=True)
-    return found
-
-
-def place(folder: Path, sketch: Sketch, size: int) -> Path:
-    """The folder for the fields of a sketch of that size."""
-    return folder / f"{sketch.name}_{size}"
-
-
-def picture(sketch: Sketch, folder: Path) -> str:
-    """A picture of the greedy field and that of the search side by side, and the Markdown that shows it."""
-    name, here = sketch.name, place(folder, sketch, max(SIZES))
-    fields = {method: cf.read_field(field_in(here / method)) for method in ("greedy", "search")}
-    images = []
-    for method, field in fields.items():
-        title = (
-            f"{method}: energy {field.energy().total:.3f}, singularities: {len(field.singularities.index)}"
-        )
-        images.append(Image.open(cf.draw(field, here / f"{method}.png", title=title)).convert("RGB"))
-    both = Image.new("RGB", (sum(i.width for i in images), max(i.height for i in images)), "white")
-    both.paste(images[0], (0, 0))
-    both.paste(images[1], (images[0].width, 0))
-    path = DOCS / "pictures" / f"fields_{name}.png"
-    both.resize((both.width // 2, both.height // 2), Image.Resampling.LANCZOS).save(path, optimize=True)
-    return f"![{name}: greedy on the left, search on the right](pictures/{path.name})"
-
-
-def patches(sketch: Sketch, folder: Path) -> list[str]:
-    """What exact solvers reach from the improved greedy field, and from that of the search."""
-    size, here = min(SIZES), place(folder, sketch, min(SIZES))
-    start = here / "improved.npz"
-    cf.write_field(cf.improved(cf.read_field(field_in(here / "greedy"))), start)
-    cells = [sketch.name, f"{cf.read_field(start).energy().total:.4f}"]
-    again = solved(sketch, size, "search", PATCH_SECONDS, here / "again", "--start", str(start))
-    cells.append(f"{again['energy_2_norm']:.4f}")
-    found = str(field_in(here / "search"))
-    for solver, given in (("bonmin", str(start)), ("highs", str(start)), ("bonmin", found), ("highs", found)):
-        kept = here / f"patches-{solver}-{'start' if given == str(start) else 'search'}"
-        options = ("--solver", solver, "--start", given)
-        facts = solved(sketch, size, "patches", PATCH_SECONDS, kept, *options)
-        counts = [facts[key] for key in ("patches", "patches_closed", "patches_lower")]
-        cells.append(f"{facts['energy_2_norm']:.4f} ({' / '.join(map(str, counts))})")
-    print(*cells, file=sys.stderr, flush=True)
-    return cells
-
-
-PATCH_COLUMNS: Final = (
-    "sketch", "improved", "search", "Bonmin", "HiGHS", "search, then Bonmin", "search, then HiGHS",
-)  # fmt: skip
-
-
-def best_angles(sketch: Sketch, folder: Path) -> list[str]:
-    """Greedy field and angles at size 256, and the angles beside those of Ipopt at size 64."""
-    seconds = 600.0
-    facts = solved(sketch, HUGE, "greedy", seconds, place(folder, sketch, HUGE) / "greedy")
-    large = cold(cf.read_field(field_in(place(folder, sketch, HUGE) / "greedy")))
-    begin = time.perf_counter()
-    ours = fitted(large).energy().total
-    took = time.perf_counter() - begin
-    small = cold(cf.greedy(sketch.instance(IPOPT_SIZE)))
-    ipopt = cf.fit_angles(small, limits=cf.Limits(seconds)).field.energy().total
-    cells = [
-        sketch.name,
-        str(large.instance.grid.size),
-        f"{facts['seconds']:.1f}",
-        f"{took:.1f}",
-        f"{ours:.6f}",
-        f"{ipopt:.9f}",
-        f"{abs(fitted(small).energy().total - ipopt) / max(1.0, ipopt):.0e}",
+def by_weight(rows: Rows) -> str:
+    """Hidden curves: a row for each weight, a column for each size."""
+    table = [
+        [f"{w:g}", *(mean_and_median(picked(rows, weight=w, size=size)) for size in SIZES)] for w in TRIED
     ]
-    print(*cells, file=sys.stderr, flush=True)
-    return cells
+    return markdown(("weight", *(f"{size} pixels" for size in SIZES)), table)
 
 
-def cold(field: CrossField) -> CrossField:
-    """The field with every angle in the middle of its bounds: all that it tells of is the jumps."""
-    instance = field.instance
-    middle = (instance.alpha_lower + instance.alpha_upper) / 2
-    return CrossField(instance, middle, np.zeros(instance.grid.size), field.p)
+def missed(rows: Rows) -> str:
+    """Share of stroke pixels that are missed: mean over drawings and the worst one, by weight and size."""
+    table = []
+    for w in TRIED:
+        shares = [[row["off"] for row in picked(rows, weight=w, size=size)] for size in SIZES]
+        table.append([f"{w:g}", *(f"{np.mean(share):.1%} / {max(share):.1%}" for share in shares)])
+    return markdown(("weight", *(f"{size} pixels" for size in SIZES)), table)
 
 
-QP_COLUMNS: Final = (
-    "sketch", "pixels at 256", "greedy, s", "QP, s", "energy", "Ipopt's energy at 64", "ours differs by",
-)  # fmt: skip
+def by_surface(rows: Rows) -> str:
+    """Mean cross errors on surfaces: a row for each surface, size and noise, a column for each weight."""
+    cases = dict.fromkeys((row["surface"], row["size"], row["noise"]) for row in rows)
+    table = [
+        [
+            surface, str(size), f"{noise:g}",
+            *(f"{row['error']:.2f}" for row in picked(rows, surface=surface, size=size, noise=noise)),
+        ]
+        for surface, size, noise in cases
+    ]  # fmt: skip
+    return markdown(("surface", "size", "noise", *(f"{w:g}" for w in TRIED)), table)
 
 
-def tiny() -> Iterator[Instance]:
-    """Instances small enough for a proof: the smallest samples, and random strokes on 5 x 5 pixels."""
-    for name in SAMPLES:
-        for size in range(5, 12):
-            try:
-                instance = cf.sample(name, size)
-            except cf.CrossfieldError:  # the outline leaves no room on so coarse a grid
-                continue
-            if len(instance.theta) >= 3:
-                yield instance
-                break
-    for seed in range(RANDOM):
-        rng = np.random.default_rng(seed)
-        pixels = np.argwhere(rng.random((5, 5)) < 0.5)
-        theta = rng.uniform(0, np.pi, len(pixels))
-        yield Instance(f"random_{seed}", np.ones((5, 5), bool), pixels, theta, np.ones(len(pixels)))
-
-
-def proofs() -> str:
-    """The search beside the optimum of `miqp-exact` that a solver proves from the written file."""
-    rows, equal, proven = [], 0, 0
-    for instance in tiny():
-        begin = time.perf_counter()
-        field = cf.search(instance, rounds=40).field
-        seconds = time.perf_counter() - begin
-        greedy, found = cf.greedy(instance).energy().total, field.energy().total
-        best, bound = optimum(instance, field)
-        same = best is not None and abs(found - best.objective) <= 1e-6 * max(1, found)
-        proven += best is not None
-        equal += same
-        rows.append(
-            [
-                instance.name,
-                f"{instance.grid.width} x {instance.grid.height}",
-                f"{greedy:.7f}",
-                f"{found:.7f}",
-                f"{seconds:.1f}",
-                f"{best.objective:.7f}" if best else f"at least {bound:.7f}" if bound else "",
-                f"{best.program}, {best.seconds:.1f} s" if best else "none",
-                "yes" if same else "no" if best else "open",
-            ]
+def in_short(rows: Rows) -> str:
+    """How many curves of how many drawings there are, and which method is nearest at each size."""
+    names = dict.fromkeys(row["method"] for row in rows)
+    found = []
+    for size in SIZES:
+        of = {name: picked(rows, method=name, size=size) for name in names}
+        means = {
+            name: np.mean([angle for row in each for angle in row["degrees"]]) for name, each in of.items()
+        }
+        best = min(means, key=lambda name: means[name])
+        curves = max(sum(len(row["degrees"]) for row in each) for each in of.values())
+        drawings = max(sum(bool(row["degrees"]) for row in each) for each in of.values())
+        found.append(
+            f"{size} pixels, {curves} curves of {drawings} drawings: `{best}`, {means[best]:.1f} degrees"
         )
-        print(*rows[-1], file=sys.stderr, flush=True)
-    table = markdown(
-        ("instance", "grid", "greedy", "search", "s", "proven optimum", "by", "equal to 1e-6"), rows
-    )
-    return (
-        f"The search is equal to the proven optimum in {equal} of {proven}; "
-        f"{len(rows) - proven} of {len(rows)} stay open.\n\n{table}"
-    )
+    return "Nearest to hidden curves on average: at " + "; at ".join(found) + "."
 
 
-def optimum(
-    instance: Instance, start: CrossField, provers: tuple[str, ...] = PROVERS
-) -> tuple[Check | None, float | None]:
-    """The check of the first prover that closes `miqp-exact`, or None;
-    and the best dual bound of all that were asked.
-    """
-    bounds = []
-    with tempfile.TemporaryDirectory() as folder:
-        write_all(instance, folder, ["miqp-exact"], ["mps", "nl"], start=start)
-        for prover in provers:
-            for check in verify(folder, seconds=PROOF_SECONDS, programs=[prover]).checks:
-                if check.step == "solve" and check.proven:
-                    return check, check.bound
-                if check.step == "solve" and check.bound is not None:
-                    bounds.append(check.bound)
-    return None, max(bounds, default=None)
-
-
-def summary(rows: list[Row]) -> str:
-    """Whether the search was ever worse, and by how much it was lower."""
-    lines = []
-    for size in (*SIZES, None):
-        chosen = [row for row in rows if size in {row.size, None}]
-        worse = sum(row.search["energy_2_norm"] > row.greedy["energy_2_norm"] * (1 + 1e-9) for row in chosen)
-        shares = [row.lower for row in chosen]
-        numbers = (
-            np.mean(shares),
-            np.median(shares),
-            max(shares),
-            np.mean([row.lower_than_improved for row in chosen]),
-        )
-        lines.append(
-            [
-                "both" if size is None else str(size),
-                str(len(chosen)),
-                str(worse),
-                *(f"{100 * float(number):.1f} %" for number in numbers),
-            ]
-        )
-    columns = (
-        "size",
-        "sketches",
-        "search worse",
-        "lower on average",
-        "median",
-        "most",
-        "than improved, on average",
-    )
-    return markdown(columns, lines)
-
-
-def in_short(rows: list[Row], closed: str) -> str:
-    """By how much the search is lower than other fields, and how often it is the optimum.
-    closed: the part about proofs.
-    """
-    worse = sum(row.search["energy_2_norm"] > row.greedy["energy_2_norm"] * (1 + 1e-9) for row in rows)
-    lower, than_improved = (
-        100 * float(np.mean(shares))
-        for shares in ([row.lower for row in rows], [row.lower_than_improved for row in rows])
-    )
-    return (
-        f"In {len(rows)} cases the search is above the greedy field in {worse}. Its energy is {lower:.1f} "
-        f"% lower on average, and {than_improved:.1f} % lower than "
-        f"that of the greedy field after local improvement. {closed.partition(';')[0]}, "
-        "on grids that are small enough for a proof."
-    )
+def write_pages(kept: dict[str, Any]) -> None:
+    """Make both pages."""
+    command = said("python docs/fields.py")
+    rows = kept["rows"]
+    page = FIELDS.format(
+        said=command, short=in_short(rows["methods"]), methods=by_method(rows["methods"]),
+        drawings=by_drawing(rows["methods"], 32), seconds=kept["seconds"],
+    )  # fmt: skip
+    (DOCS / "fields.md").write_text(page)
+    page = WEIGHTS.format(
+        said=command, default=f"{STROKE_WEIGHT:g}", hidden=by_weight(rows["weights"]),
+        missed=missed(rows["strokes"]), surfaces=by_surface(rows["surfaces"]), off=f"{OFF:g}", seeds=SEEDS,
+    )  # fmt: skip
+    (DOCS / "weights.md").write_text(page)
 
 
 def main() -> None:
-    """Measure, draw and write the page."""
-    parser = argparse.ArgumentParser(description="Compare the methods and write docs/fields.md.")
-    parser.add_argument("--sketches", type=Path, help="Folder with further drawings: .svg, .png, .scap.")
-    parser.add_argument("--seconds", type=float, default=120.0, help="Time limit of each search.")
-    parser.add_argument("--work", type=Path, help="Folder for what is done; to go on there later.")
+    """Measure what is asked for, and write the pages."""
+    parser = argparse.ArgumentParser(
+        description="Measure fields, and write docs/fields.md and docs/weights.md."
+    )
+    parser.add_argument(
+        "--measure", nargs="+", choices=MEASURES, default=[], help="parts to be measured anew"
+    )
+    parser.add_argument("--sketches", type=Path, help="folder of line drawings by others")
+    parser.add_argument("--seconds", type=float, default=5.0, help="for each field that is searched")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     given = parser.parse_args()
-    every = sketches(given.sketches)
-    with tempfile.TemporaryDirectory() as name:
-        folder = given.work or Path(name)
-        rows = [row(sketch, size, given.seconds, folder) for size in SIZES for sketch in every]
-        large = [row(sketch, LARGE, given.seconds, folder) for sketch in every[-LARGE_SKETCHES:]]
-        angles = [best_angles(sketch, folder) for sketch in every[-2:]]
-        exact = [patches(sketch, folder) for sketch in [*named(every, PATCHED), every[-1]]]
-        closed = proofs()
-        text = PAGE.format(
-            said=said(f"python docs/fields.py --sketches FOLDER --seconds {given.seconds:g}"),
-            seconds=f"{given.seconds:g}",
-            cores=os.cpu_count(),
-            python=platform.python_version(),
-            short=in_short(rows, closed),
-            summary=summary(rows),
-            table=markdown(COLUMNS, [each.cells() for each in rows]),
-            large=markdown(COLUMNS, [each.cells() for each in large]),
-            pictures="\n\n".join(picture(sketch, folder) for sketch in named(every, PICTURED)),
-            patches=markdown(PATCH_COLUMNS, exact),
-            patch_seconds=f"{PATCH_SECONDS:g}",
-            angles=markdown(QP_COLUMNS, angles),
-            patch_size=min(SIZES),
-            proof_seconds=f"{PROOF_SECONDS:g}",
-            proofs=closed,
-        )
-    (DOCS / "fields.md").write_text(text)
+    kept = json.loads(KEPT.read_text()) if KEPT.exists() else {"seconds": given.seconds, "rows": {}}
+    for part in given.measure:
+        kept["rows"][part] = measured(part, given.sketches, given.seconds, given.jobs)
+        if part == "methods":
+            kept["seconds"] = given.seconds
+        KEPT.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
+    write_pages(kept)
 
-
-def named(every: list[Sketch], names: tuple[str, ...]) -> list[Sketch]:
-    """The sketches of those names."""
-    return [sketch for sketch in every if sketch.name in names]
-
-
-PAGE: Final = """# How good the fields are
-
-{said} The folder is one of line drawings by others; the samples are there without it.
-
-{short}
-
-`crossfield solve --method search --time-limit {seconds}` against the greedy strategy of BendFields (`--method
-greedy`) and the power field with the best angles for its jumps (`--method power`). Energies are 2-norm
-energies of fields inside all bounds; lower is better. Singularities, mean skew abs(beta) in degrees and
-seconds stand in the order greedy / power + QP / search. {cores} cores, Python {python}. GB: memory of all
-processes of the search together, pages that they share counted in each. The search starts from the greedy
-field and the power field, both improved, so that it cannot end above either; these rows are from before it
-began at PolyVector fields and at the dual of a coarse lattice too. *improved* is the greedy field
-after local improvement (`crossfield.improved`), from which solvers start; *lower by* is the search against
-greedy / against improved.
-
-{summary}
-
-{table}
-
-## Larger grids
-
-{large}
-
-## Side by side
-
-Size 48; the greedy field on the left, that of the search on the right. Red dots mark singularities of
-positive index, blue dots those of negative index.
-
-{pictures}
-
-## Angles for given jumps
-
-The greedy field at size 256, and the best angles for its jumps from a cold start: a projected Newton method
-with a sparse factorisation ([models/search/box_qp.py](../models/search/box_qp.py)). At size 64, the optimum
-of `qp-fixed` that Ipopt finds from the written .nl, and by how much ours differs, relative to it or to 1 if
-that is more.
-
-{angles}
-
-## Patches solved exactly
-
-`crossfield solve --method patches` sets small patches of the grid free, fixes all else and hands each to a
-solver: `miqp-exact` to Bonmin, in patches of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in
-patches of 5 x 5 and more. Size {patch_size}, {patch_seconds} s each. Three columns start at the improved
-greedy field: *search*, also at the improved power field where that is lower, *Bonmin* and *HiGHS*. The last
-two go on from the field of the search in the first table. In brackets: patches solved / solved to the end /
-that lowered the energy.
-
-{patches}
-
-## Against proven optima
-
-`miqp-exact` is the same problem as a convex MIQP: its file goes to the free editions of Gurobi, then CPLEX,
-{proof_seconds} s each, until one proves the optimum. The search takes 40 rounds.
-
-{proofs}
-"""
 
 if __name__ == "__main__":
     main()

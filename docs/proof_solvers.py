@@ -25,6 +25,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import Certificate, write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import windows_left
+from energies import Sketch
 
 THREADS: Final = 2
 PROVEN: Final = 1e-6
@@ -147,7 +148,7 @@ def largest(name: str, size: int, formulation: str, solver: str) -> Instance:
     """The sample at that size, or at the greatest below it that the free edition of the solver takes."""
     for smaller in range(size, 4, -1):
         try:
-            instance = cf.sample(name, smaller)
+            instance = Sketch(name, name).instance(smaller)
         except InstanceError:  # the outline leaves no room on so coarse a grid
             continue
         if fits(cf.formulate(instance, formulation), solver):

@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import crossfield as cf
 import proof_pictures
 import proof_solvers
 from crossfield.export.solvers_table import SOLVERS
@@ -33,7 +32,7 @@ from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import MOST_LABELS, prove
 from crossfield.models.sketch.samples import SAMPLES
-from fields import PROVERS, Sketch, answered, optimum, sketches, tiny
+from energies import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import markdown, said
 from proof_text import PROOF
 
@@ -74,7 +73,8 @@ def proven(sketch: Sketch, size: int, asked: Asked) -> Facts:
     """What `crossfield prove` says of a sketch, the size of its certificate, and the seconds of its check."""
     folder = asked.work / f"{sketch.name}_{size}_proof"
     command = [
-        *("prove", *sketch.arguments, "--size", str(size), "--time-limit", str(asked.seconds)),
+        *("prove", *sketch.arguments, "--size", str(size), *sketch.weights(size)),
+        *("--time-limit", str(asked.seconds)),
         *("--json", "-o", str(folder)),
     ]
     facts = answered(command, folder, sketch.name)
@@ -141,7 +141,7 @@ def settings(asked: Asked) -> Iterator[tuple[str, Facts]]:
 
 def pictures(asked: Asked) -> Iterator[tuple[str, Facts]]:
     """The pictures of what every level leaves of the crosses."""
-    proof = prove(cf.sample(PICTURED, SIZE), seconds=asked.seconds)
+    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), seconds=asked.seconds)
     certificate = write_certificate(proof, asked.work / f"{PICTURED}.certificate.npz")
     proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")
@@ -369,8 +369,9 @@ def page(kept: Kept) -> str:
 OPENING: Final = """
 `crossfield prove` finds a field, a lower bound of the 2-norm energy of all fields, and leaves a
 [certificate](files.md#certificates), which a checker of one file confirms without any code of the prover.
-All rows below come from it. Rows are kept in `proofs.json` beside this page; `python docs/proofs.py --measure
-samples` measures those of a part again, `python docs/proofs.py --help` lists the parts.
+All rows below come from it, under the coefficients of the paper (1 and 1e-6 on every
+grid). Rows are kept in `proofs.json` beside this page; `python docs/proofs.py --measure samples` measures
+those of a part again, `python docs/proofs.py --help` lists the parts.
 [What MIP solvers do without it](bounds.md) has a page of its own.
 """
 
@@ -404,8 +405,8 @@ CPLEX, else Bonmin, 60 s each. *Apart* is relative to 1, or to the optimum if th
 """
 
 DRAWINGS_TEXT: Final = """
-Line drawings by others, size 24, as in [how good the fields are](fields.md): `NAME.png` with its mask where
-`NAME_mask.png` lies beside it. `--sketches FOLDER` names the folder in which they are.
+Line drawings by others, size 24, as in [how low the energies are](energies.md): `NAME.png` with its mask
+where `NAME_mask.png` lies beside it. `--sketches FOLDER` names the folder in which they are.
 """
 
 SOLVERS_TEXT: Final = f"""

@@ -1,0 +1,95 @@
+"""What docs/fields.md and docs/weights.md say around the tables of fields.py."""
+
+from typing import Final
+
+FIELDS: Final = """# How good the fields are
+
+{said} `--measure` measures anew; `--sketches FOLDER` adds a folder of line drawings by others to the samples,
+as was done here.
+
+{short}
+
+## Hidden curves
+
+A designer draws some curvature lines and wants the others. So one curve of a drawing is hidden: all its
+stroke pixels go, the field is made from the rest, and what counts is the mean angle between the hidden curve
+and the nearer line of the crosses on it. Up to eight longest curves of a drawing are hidden in turn. No
+energy is consulted. Crosses at random, at right angles, would have 22.5 degrees. `crossfield evaluate` does
+this for one drawing.
+
+Degrees over all curves, mean / median, and in brackets the mean over drawings with its standard error: curves
+of one drawing are alike, so that this is the error to look at. Default weights; {seconds:g} s for a field
+that is searched. `prove`, `two-stage` and `patches` are about energies and left out.
+
+{methods}
+
+The same at 32 pixels by drawing, mean over its curves:
+
+{drawings}
+
+Differences between methods are smaller than those between drawings, and
+[a lower energy](energies.md) is not by itself a better field: the weight of the strokes counts for
+[more](weights.md).
+
+## Surfaces with a known answer
+
+[Accuracy](accuracy.md) has the errors of all methods on computed surfaces.
+"""
+
+WEIGHTS: Final = """# Weights
+
+{said} `--measure` measures anew, as in [how good the fields are](fields.md).
+
+The energy of a field is that of its smoothness, plus `w_strokes` times the squared distance from the strokes,
+plus `w_beta` times the squared skew ([mathematics](mathematics.md)).
+
+## The same on every grid
+
+The smoothness is a sum over pairs of neighbours. On a grid of half the pixel size there are four times as
+many pairs, each with half the difference: the sum stays. But a stroke runs through twice as many pixels, and
+there are four times as many pixels that may be skew. With the same coefficients a stroke counts half as much
+on a grid of twice the pixel size, and a field at 12 pixels misses strokes that the field at 96 follows.
+
+So the weights that `--w-strokes` and `--w-beta` say, and `w_strokes` and `w_beta` of `cf.read_sketch`,
+`cf.sample` and `Instance.with_weights`, are divided by the pixels $n$ of the grid's longer side and by their
+square. On a grid of 24 pixels, which is the default, they are the coefficients:
+
+$$
+\\text{{w\\_strokes}} = W_\\text{{strokes}} \\frac{{24}}{{n}}, \\qquad
+\\text{{w\\_beta}} = W_\\beta \\left(\\frac{{24}}{{n}}\\right)^2 .
+$$
+
+An instance, its file and every problem file hold the coefficients; `Instance.stroke_weight` and
+`Instance.skew_weight` give the weights back. The paper has the coefficients 1 and 1e-6 on every grid; so have
+instances made by hand, and those of the [library](library.md). `crossfield export mouse --size 48 --w-strokes
+2 --w-beta 4e-6` is under them.
+
+## The default of the strokes: {default}
+
+Greedy fields, in which jumps and angles react to the weight and no time limit has a say.
+
+**Hidden curves.** Degrees, mean / median over the curves, and the mean over drawings with its standard error.
+
+{hidden}
+
+**The strokes that were shown.** Stroke pixels whose nearer line is more than {off} degrees off: mean over
+drawings / worst drawing.
+
+{missed}
+
+**Surfaces with a known answer.** Mean cross error in degrees. Noise: standard deviation in degrees of an
+independent error of each stroke pixel, mean over {seeds} draws.
+
+{surfaces}
+
+A small weight lets the field smooth over strokes that a designer drew with care. A large one follows every
+tremble of the hand. From 10 on hidden curves differ by less than their error; surfaces gain up to 40 without
+noise, and lose beyond 5 to 20 under 8 degrees of it, which is a very rough sketch. {default} leaves few
+stroke pixels off on any drawing and stays near the best everywhere.
+
+## The default of the skew: 1e-6
+
+It decides only what nothing else does: where neither a stroke nor a neighbour has a say in the second line of
+a cross, it is at a right angle to the first. A weight of 0.1 and more keeps fields from the skew that
+perspective asks for.
+"""
