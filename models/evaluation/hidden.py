@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -35,10 +35,7 @@ class HiddenCurve:
         """The instance without the curve's strokes; its mask and its other strokes are the same."""
         kept = np.ones(len(self.instance.theta), dtype=bool)
         kept[self.stroke] = False
-        whole = self.instance
-        return replace(
-            whole, stroke_pixels=whole.stroke_pixels[kept], theta=whole.theta[kept], w=whole.w[kept]
-        )
+        return self.instance.with_strokes(kept)
 
     def deviation(self, field: CrossField) -> float:
         """The mean angle from the curve to the nearer line of the crosses on it, in [0, pi/2] radians.

@@ -27,7 +27,7 @@ def halved(instance: Instance) -> Instance | None:
     """The instance with each 2 x 2 pixels made one, or None when no stroke is left.
 
     A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
-    strokes, by the double angle.
+    strokes, by the double angle. It carries one at most: second strokes of crossings count on the fine grid.
     """
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
@@ -45,6 +45,9 @@ def halved(instance: Instance) -> Instance | None:
         stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
         theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
         w=weight[kept] / 4,
+        crossings=np.zeros(0, np.int32),
+        theta_cross=np.zeros(0),
+        w_cross=np.zeros(0),
         w_strokes=min(4 * instance.w_strokes, MOST_WEIGHT),
         w_beta=min(4 * instance.w_beta, MOST_WEIGHT),
         pixel_size=2 * instance.pixel_size,
