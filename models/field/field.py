@@ -181,7 +181,9 @@ class CrossField:
         return Energy(
             smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
             strokes=instance.w_strokes
-            * float(np.sum(instance.w * size(self.residual_r)) + np.sum(instance.w_cross * size(self.residual_x))),
+            * float(
+                np.sum(instance.w * size(self.residual_r)) + np.sum(instance.w_cross * size(self.residual_x))
+            ),
             beta=instance.w_beta * float(np.sum(size(self.beta))),
         )
 

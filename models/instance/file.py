@@ -132,7 +132,9 @@ def read_document(
 def of_document(document: object) -> Instance:
     """The instance that a parsed JSON document describes, or InstanceError with the place in it."""
     check_version(document, FORMAT, VERSION)
-    document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes, "crossings": _are_strokes})
+    document = check_schema(
+        document, "instance", __package__, rows={"strokes": _are_strokes, "crossings": _are_strokes}
+    )
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
         if len(row) != width:
@@ -163,7 +165,9 @@ def _crossings(second: list[Any], strokes: list[Any]) -> dict[str, Any]:
     number = {(stroke[0], stroke[1]): place for place, stroke in enumerate(strokes)} if second else {}
     for row, column, *_ in second:
         if (row, column) not in number:
-            raise InstanceError(f"the crossing [{row}, {column}] has no first stroke; list that among strokes")
+            raise InstanceError(
+                f"the crossing [{row}, {column}] has no first stroke; list that among strokes"
+            )
     return {
         "crossings": np.array([number[row, column] for row, column, *_ in second], dtype=np.int32),
         "theta_cross": np.array([stroke[2] for stroke in second], dtype=float),

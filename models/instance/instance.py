@@ -324,6 +324,20 @@ class Instance:
         changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
         return replace(self, **changed) if changed else self
 
+    @property
+    def every_stroke(self) -> tuple[Ints, Floats, Floats]:
+        """[row, column], direction and reliability of all strokes, (r, 2), (r,), (r,); second ones last."""
+        return (
+            np.concatenate([self.stroke_pixels, self.stroke_pixels[self.crossings]]),
+            np.concatenate([self.theta, self.theta_cross]),
+            np.concatenate([self.w, self.w_cross]),
+        )
+
+    def without_crossings(self) -> Instance:
+        """The same instance without the second strokes: no field of it has a higher energy there."""
+        nothing = np.zeros(0)
+        return replace(self, crossings=nothing, theta_cross=nothing, w_cross=nothing)
+
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """The same instance with only those stroke pixels, shape (s,), and their crossings.
 

@@ -40,14 +40,11 @@ def halved(instance: Instance) -> Instance | None:
     if not len(kept):
         return None
     return replace(
-        instance,
+        instance.without_crossings(),
         mask=mask,
         stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
         theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
         w=weight[kept] / 4,
-        crossings=np.zeros(0, np.int32),
-        theta_cross=np.zeros(0),
-        w_cross=np.zeros(0),
         w_strokes=min(4 * instance.w_strokes, MOST_WEIGHT),
         w_beta=min(4 * instance.w_beta, MOST_WEIGHT),
         pixel_size=2 * instance.pixel_size,

@@ -54,7 +54,7 @@ def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
     """The coefficients X0, X1 (n,) of each pixel."""
     size, strokes = instance.grid.size, instance.stroke_terms
     weight = np.minimum(hold * strokes.weight, _HARDEST)
-    root = np.exp(2j * np.concatenate([instance.theta, instance.theta_cross]))
+    root = np.exp(2j * instance.every_stroke[1])
 
     def sums(values: _Complex) -> _Complex:
         return strokes.at_pixels(values.real, size) + 1j * strokes.at_pixels(values.imag, size)

@@ -24,7 +24,7 @@ def power_field(instance: Instance) -> CrossField:
     (docs/mathematics.md, 10).
     """
     grid = instance.grid
-    strokes, theta = instance.stroke_terms, np.concatenate([instance.theta, instance.theta_cross])
+    strokes, (_, theta, _) = instance.stroke_terms, instance.every_stroke
     goal = np.stack(
         [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
     )
