@@ -54,8 +54,9 @@ class Shape:
 
     mean_deviation, most_deviation: mean and 90 % quantile over the stroke pixels of the angle between the
     stroke and its line, in [0, pi/2] radians; a crossing counts as two (`CrossField.stroke_deviation`).
-    far_strokes: share of the stroke pixels where it is more than 10 degrees. narrow_pixels: share of all pixels whose lines are less than 45 degrees apart; inside the
-    bounds they are pi/2 - 2|beta| apart, so that is where |beta| > pi/8.
+    far_strokes: share of the strokes where it is more than 10 degrees. narrow_pixels: share of all pixels
+    whose lines are less than 45 degrees apart; inside the bounds they are pi/2 - 2|beta| apart, so that is
+    where |beta| > pi/8.
     """
 
     mean_deviation: float
@@ -178,12 +179,11 @@ class CrossField:
         """
         instance = self.instance
         size = np.abs if norm == 1 else np.square
+        first = np.sum(instance.w * size(self.residual_r))
+        second = np.sum(instance.w_cross * size(self.residual_x))
         return Energy(
             smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
-            strokes=instance.w_strokes
-            * float(
-                np.sum(instance.w * size(self.residual_r)) + np.sum(instance.w_cross * size(self.residual_x))
-            ),
+            strokes=instance.w_strokes * float(first + second),
             beta=instance.w_beta * float(np.sum(size(self.beta))),
         )
 

@@ -1,8 +1,8 @@
 """The nine formulations, each one function that reads from top to bottom like the paper.
 
 Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
-S_c, the crossings S_x or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
-readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
+S_c, the crossings S_x or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the
+docs are all readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
 declaration.py; the symbols: symbols.py.
 """
 

@@ -1,9 +1,10 @@
 """The symbols of the formulations: which quantity each one means, and where on the grid it lives.
 
 A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
-S_c, those of them where two strokes meet, S_x, or the neighbour pairs E. A *slot* is a symbol in an expression over such a set; it names a quantity and
-the way to it: over the pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a
-sketch changes the length of the index arrays, never an expression.
+S_c, those of them where two strokes meet, S_x, or the neighbour pairs E. A *slot* is a symbol in an
+expression over such a set; it names a quantity and the way to it: over the pairs, alpha_i is alpha at the
+first pixel, alpha_j at the second. The size of a sketch changes the length of the index arrays, never an
+expression.
 """
 
 from __future__ import annotations

@@ -223,7 +223,7 @@ class Instance:
             )
         if not ((self.crossings >= 0) & (self.crossings < len(self.stroke_pixels))).all():
             raise InstanceError(
-                f"crossings holds a number that is no stroke pixel; there are {len(self.stroke_pixels)}, from 0"
+                f"crossings holds a number that is no stroke pixel; the last is {len(self.stroke_pixels) - 1}"
             )
         if (np.diff(self.crossings) <= 0).any():
             raise InstanceError("crossings are out of order or listed twice; list each once, ascending")
@@ -326,7 +326,7 @@ class Instance:
 
     @property
     def every_stroke(self) -> tuple[Ints, Floats, Floats]:
-        """[row, column], direction and reliability of all strokes, (r, 2), (r,), (r,); second ones last."""
+        """Pixels (r, 2), directions (r,) and reliabilities (r,) of all strokes, the second ones last."""
         return (
             np.concatenate([self.stroke_pixels, self.stroke_pixels[self.crossings]]),
             np.concatenate([self.theta, self.theta_cross]),
@@ -336,7 +336,7 @@ class Instance:
     def without_crossings(self) -> Instance:
         """The same instance without the second strokes: no field of it has a higher energy there."""
         nothing = np.zeros(0)
-        return replace(self, crossings=nothing, theta_cross=nothing, w_cross=nothing)
+        return replace(self, crossings=np.zeros(0, np.int32), theta_cross=nothing, w_cross=nothing)
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """The same instance with only those stroke pixels, shape (s,), and their crossings.
@@ -374,7 +374,7 @@ class Instance:
     def _moved(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
         """The instance with its stroke pixels elsewhere and every direction theta at sense theta + turn."""
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
-        crossings = np.argsort(order)[self.crossings]
+        crossings = np.argsort(order).astype(np.int32)[self.crossings]
         ascending = np.argsort(crossings)
         return replace(
             self,

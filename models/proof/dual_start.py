@@ -66,7 +66,8 @@ def suggested(field: CrossField, left: Callable[[], float], over: Over = never, 
     """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
 
     left: seconds that are left; with few of them, for very small and large grids, and where two strokes meet
-    at a pixel, which lattices do not know, it is the field itself. over: whether the time is over. jobs: threads; any number of them gives the same field.
+    at a pixel, which lattices do not know, it is the field itself. over: whether the time is over. jobs:
+    threads; any number of them gives the same field.
     """
     if not _FEWEST < field.instance.grid.size <= _MOST or len(field.instance.crossings):
         return field

@@ -93,8 +93,8 @@ def prove(
     if len(instance.crossings):
         raise InstanceError(
             f"no proof knows what two strokes at one pixel cost, and {instance.name} has "
-            f"{len(instance.crossings)} such pixels; prove instance.without_crossings(), whose bound holds for "
-            "it too, or search"
+            f"{len(instance.crossings)} such pixels; search, or prove instance.without_crossings(): its "
+            "bound holds too"
         )
     if (seconds is not None and not seconds > 0) or not gap >= 0 or jobs < 1:
         raise InputError("a proof needs a positive number of seconds and of jobs, and a gap of 0 or more")

@@ -113,8 +113,8 @@ class LinearFit:
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     """The field of least 1-norm energy with the jumps of `field` within its windows.
 
-    With it the multipliers of its first strokes, shape (s,) in [-1, 1]: with which force each is kept, in parts of
-    its weight.
+    With it the multipliers of its first strokes, shape (s,) in [-1, 1]: with which force each is kept, in
+    parts of its weight.
     """
     instance, m = field.instance, len(field.p)
     quarter = np.full(instance.grid.size, QUARTER)

@@ -34,10 +34,10 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
-    (two of them where two strokes meet), where s = exp(2 i theta) is to be a root, and w_beta |X1|^2 over pixels, which asks for right angles where
-    nothing else says. Near a right-angled cross along the stroke that is 16 times the energy of
-    docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels
-    are then moved into the windows of the instance (docs/mathematics.md, 10).
+    where s = exp(2 i theta) is to be a root (at a crossing both are), and w_beta |X1|^2 over pixels, which
+    asks for right angles where nothing else says. Near a right-angled cross along the stroke that is 16 times
+    the energy of docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha =
+    beta = 0. Labels are then moved into the windows of the instance (docs/mathematics.md, 10).
 
     hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them: among those
     of `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings,

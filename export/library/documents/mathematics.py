@@ -39,7 +39,7 @@ class Model:
     lines: tuple[Line, ...]
 
 
-def model(formulation: str, options: dict[str, Any], *, crossings: bool = False) -> Model:
+def model(formulation: str, options: dict[str, Any], *, crossings: bool = True) -> Model:
     """The mathematics of a formulation with options. Raises FormulationError for an unknown one.
 
     crossings: whether strokes meet on the instance; else what is about second strokes is left out.
@@ -48,7 +48,7 @@ def model(formulation: str, options: dict[str, Any], *, crossings: bool = False)
 
 
 @cache
-def _model(formulation: str, options: tuple[tuple[str, Any], ...], crossings: bool) -> Model:  # noqa: FBT001
+def _model(formulation: str, options: tuple[tuple[str, Any], ...], crossings: bool) -> Model:
     declared = declare(formulation, **dict(options))
     source = latex(declared if crossings else declared.without_crossings)
     return Model(source, tuple(_lines(source.split("\n")[1:-1])))
