@@ -109,26 +109,32 @@ def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
 
 def covering_curves(
     segments: Floats, curve: Ints, frame: Frame, least: float
-) -> tuple[Indices, Indices, Indices]:
+) -> tuple[Indices, Indices, Indices, Floats]:
     """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
 
+    Last the curve's mean double-angle vector there (k, 2), as in `Cover`.
     curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
     `least` pixel sides and more; where no curve reaches that, the longest one does.
     """
     cut = _cut(segments, frame)
     number, size = curve[cut.segment].astype(np.int64), frame.height * frame.width
-    keys, lengths = [], []
+    keys, lengths, unit = [], [], []
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
         cell, kept = _cells(cut.middle + nudge, frame)
         keys.append(number[kept] * size + cell)
         lengths.append(cut.covered[kept] / 4)
+        unit.append(cut.unit[kept])
     key, place = np.unique(np.concatenate(keys), return_inverse=True)
-    amount = np.bincount(place, np.concatenate(lengths), len(key))
+    (x, y), covered = np.concatenate(unit).T, np.concatenate(lengths)
+    amount, cosine, sine = (
+        np.bincount(place, covered * double, len(key)) for double in (1.0, x * x - y * y, -2 * x * y)
+    )
     pixel = key % size
     most = np.zeros(size)
     np.maximum.at(most, pixel, amount)
     covers = amount >= np.minimum(least, most[pixel])
-    return key[covers] // size, *np.divmod(pixel[covers], frame.width)
+    direction = np.stack([cosine, sine], axis=1)[covers] / amount[covers, None]
+    return key[covers] // size, *np.divmod(pixel[covers], frame.width), direction
 
 
 @dataclass(frozen=True, eq=False)
