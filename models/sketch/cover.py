@@ -133,8 +133,8 @@ def covering_curves(
     most = np.zeros(size)
     np.maximum.at(most, pixel, amount)
     covers = amount >= np.minimum(least, most[pixel])
-    direction = np.stack([cosine, sine], axis=1)[covers] / amount[covers, None]
-    return key[covers] // size, *np.divmod(pixel[covers], frame.width), direction
+    direction = np.stack([cosine, sine], axis=1) / np.where(amount > 0, amount, 1.0)[:, None]
+    return key[covers] // size, *np.divmod(pixel[covers], frame.width), direction[covers]
 
 
 @dataclass(frozen=True, eq=False)
