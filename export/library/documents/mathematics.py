@@ -39,7 +39,7 @@ class Model:
     lines: tuple[Line, ...]
 
 
-def model(formulation: str, options: dict[str, Any], *, crossings: bool = True) -> Model:
+def model(formulation: str, options: dict[str, Any], *, crossings: bool = False) -> Model:
     """The mathematics of a formulation with options. Raises FormulationError for an unknown one.
 
     crossings: whether strokes meet on the instance; else what is about second strokes is left out.
