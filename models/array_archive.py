@@ -15,6 +15,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final, cast
 
 import numpy as np
@@ -69,14 +70,24 @@ def pack_arrays(arrays: Arrays) -> bytes:
     return buffer.getvalue()
 
 
-def unpack_arrays(data: bytes, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
-    """The expected arrays of an .npz, whose names there are led by a prefix; other members are not looked at.
+def unpack_arrays(
+    data: bytes,
+    expected: Mapping[str, Expected],
+    prefix: str = "",
+    optional: Mapping[str, Expected] = MappingProxyType({}),
+) -> Arrays:
+    """The expected arrays of an .npz, whose names there are led by a prefix, and the optional ones it holds.
+
+    Other members are not looked at.
 
     Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled, or
     larger than it may be, and for a damaged archive.
     """
     try:
         with warnings.catch_warnings(action="error"), zipfile.ZipFile(io.BytesIO(data)) as archive:
+            held = set(archive.namelist())
+            found = {name: kind for name, kind in optional.items() if f"{prefix}{name}.npy" in held}
+            expected = {**expected, **found}
             members = {name: _member(archive, name, prefix) for name in expected}
             if sum(member.file_size for member in members.values()) > MAX_ARCHIVE:
                 raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")

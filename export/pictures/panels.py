@@ -191,15 +191,15 @@ def _sketch(axes: Any, picture: Picture) -> None:
 
 
 def _strokes(axes: Any, picture: Picture, colour: str, width: float, fade: float) -> None:
-    """A short segment at each stroke pixel, the more opaque the more reliable."""
+    """A short segment at each stroke pixel, two where strokes meet, the more opaque the more reliable."""
     from matplotlib.colors import to_rgba
 
-    instance = picture.instance
-    row, column = instance.stroke_pixels.T
+    pixels, theta, w = picture.instance.every_stroke
+    row, column = pixels.T
     centre = np.stack([column, -row], axis=1)
-    arm = 0.48 * np.stack([np.cos(instance.theta), np.sin(instance.theta)], axis=1)
+    arm = 0.48 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     colours = np.tile(to_rgba(colour), (len(row), 1))
-    colours[:, 3] = fade * (0.2 + 0.8 * instance.w)
+    colours[:, 3] = fade * (0.2 + 0.8 * w)
     _lines(axes, np.stack([centre - arm, centre + arm], axis=1), colours, width)
 
 

@@ -133,12 +133,12 @@ class _Sheet:
         ]
 
     def strokes(self, name: str, width: float) -> list[str]:
-        """A short segment at each stroke pixel."""
-        instance = self.instance
-        arm = 0.44 * np.stack([np.cos(instance.theta), -np.sin(instance.theta)], axis=1)
-        centre = instance.stroke_pixels[:, ::-1] + 0.5
+        """A short segment at each stroke pixel, two where strokes meet."""
+        pixels, theta, w = self.instance.every_stroke
+        arm = 0.44 * np.stack([np.cos(theta), -np.sin(theta)], axis=1)
+        centre = pixels[:, ::-1] + 0.5
         ends = np.stack([centre - arm, centre + arm], axis=1)
-        level = np.ceil(instance.w * _LEVELS).astype(int)
+        level = np.ceil(w * _LEVELS).astype(int)
         return [
             _path(name, self._segments(ends[level == each]), width, opacity=0.25 + 0.75 * each / _LEVELS)
             for each in np.unique(level).tolist()

@@ -35,20 +35,24 @@ class Residuals:
 
     @classmethod
     def at(cls, instance: Instance, p: Ints) -> Residuals:
-        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
+        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels.
+
+        Second strokes of crossings come after the first ones of all stroke pixels.
+        """
         n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
-        unit, m = sparse.eye_array(n, format="csr"), len(first)
-        nothing, at = sparse.csr_array((m, n)), unit[instance.stroke_index]
+        unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
+        nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
         a = sparse.hstack([unit[first] - unit[second], nothing])
         b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
-        r, skew = sparse.hstack([at, at]), sparse.hstack([sparse.csr_array((n, n)), unit])
+        r = sparse.hstack([at, sparse.diags_array(strokes.side) @ at])
+        skew = sparse.hstack([sparse.csr_array((n, n)), unit])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
-            np.concatenate([HALF * p, np.zeros(m), -instance.target, np.zeros(n)]),
+            np.concatenate([HALF * p, np.zeros(m), -strokes.goal, np.zeros(n)]),
             np.concatenate(
                 [
                     np.full(2 * m, 2.0),
-                    instance.w_strokes * instance.w,
+                    strokes.weight,
                     np.full(n, instance.w_beta),
                 ]
             ),
@@ -109,8 +113,8 @@ class LinearFit:
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     """The field of least 1-norm energy with the jumps of `field` within its windows.
 
-    With it the multipliers of its strokes, shape (s,) in [-1, 1]: with which force each is kept, in parts of
-    its weight.
+    With it the multipliers of its first strokes, shape (s,) in [-1, 1]: with which force each is kept, in
+    parts of its weight.
     """
     instance, m = field.instance, len(field.p)
     quarter = np.full(instance.grid.size, QUARTER)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,13 +48,7 @@ def excerpt(field: CrossField, free: Bools) -> Excerpt:
     mask = np.zeros_like(instance.mask)
     mask[grid.rows[pixels], grid.columns[pixels]] = True
     strokes = pixels[instance.stroke_index]
-    piece = replace(
-        instance,
-        mask=mask,
-        stroke_pixels=instance.stroke_pixels[strokes],
-        theta=instance.theta[strokes],
-        w=instance.w[strokes],
-    )
+    piece = instance.with_strokes(strokes, mask)
     return Excerpt(
         CrossField(piece, field.alpha[pixels], field.beta[pixels], field.p[pairs]),
         free[pixels],

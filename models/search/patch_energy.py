@@ -32,9 +32,9 @@ class PatchEnergy:
         self._first, self._second = np.split(number[ends], 2)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[beside], beta[beside]
-        self._strokes = np.nonzero(free[instance.stroke_index])[0].astype(np.int32)
-        self._at = number[instance.stroke_index[self._strokes]]
-        self._rest = _rest(CrossField(instance, alpha, beta, p), free, self._pairs, self._strokes)
+        strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
+        self._strokes = instance.stroke_terms.chosen(strokes, number)
+        self._rest = _rest(CrossField(instance, alpha, beta, p), free, self._pairs, strokes)
 
     def __call__(self, x: Floats, p: Ints) -> float:
         """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
@@ -43,8 +43,8 @@ class PatchEnergy:
         jumps, instance = p[self._pairs], self._instance
         a = alpha[self._first] - alpha[self._second] + HALF * jumps
         b = parity_sign(jumps) * beta[self._first] - beta[self._second]
-        r = alpha[self._at] + beta[self._at] - instance.target[self._strokes]
-        strokes = instance.w_strokes * float(instance.w[self._strokes] @ (r * r))
+        r = self._strokes.residuals(alpha, beta)
+        strokes = float(self._strokes.weight @ (r * r))
         return (
             self._rest + 2 * float(a @ a + b @ b) + strokes + instance.w_beta * float(inside[1] @ inside[1])
         )
@@ -54,6 +54,7 @@ def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
     """The energy that is none of the patch's: of other pixels, without these pairs and strokes."""
     instance = field.instance
     pair = field.residual_a**2 + field.residual_b**2
-    stroke, skew = instance.w * field.residual_r**2, field.beta[~free] ** 2
+    terms, skew = instance.stroke_terms, field.beta[~free] ** 2
+    stroke = terms.weight * terms.residuals(field.alpha, field.beta) ** 2
     pair[pairs], stroke[strokes] = 0.0, 0.0
-    return float(2 * pair.sum() + instance.w_strokes * stroke.sum() + instance.w_beta * skew.sum())
+    return float(2 * pair.sum() + stroke.sum() + instance.w_beta * skew.sum())

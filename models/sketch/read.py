@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -23,7 +23,7 @@ from ..instance.instance import Gauge, Instance
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
-from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
+from .cover import Cover, Frame, Meetings, block_means, cover_by_segments, fit_frame, meeting_curves
 from .curves import Curves, bounding_box, flatten
 from .outline import inside_outline, parts_with
 from .scap import read_scap
@@ -50,12 +50,14 @@ class _Sketch:
     """What every kind of sketch knows of itself, in its own units with y down.
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
-    covers: the cover of a frame by curvature lines and by other strokes.
+    covers: the cover of a frame by curvature lines and by other strokes. meetings: where on it curvature
+    lines meet, None for a picture, which does not say.
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
+    meetings: Callable[[Frame], Meetings] | None = None
 
 
 def read_sketch(
@@ -67,6 +69,7 @@ def read_sketch(
     name: str | None = None,
     w_strokes: float = STROKE_WEIGHT,
     w_beta: float = SKEW_WEIGHT,
+    crossings: bool = False,
 ) -> Instance:
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
@@ -79,6 +82,8 @@ def read_sketch(
     gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
     weights of the stroke and the skew term that mean the same on every grid, as in `Instance.with_weights`;
     their defaults are 20 and 1e-6 (docs/weights.md).
+    crossings: of a vector sketch, whether pixels in which exactly two of its curves meet at 30 degrees or
+    more get both directions, as `Instance.crossings`; no proof knows these.
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
@@ -92,14 +97,23 @@ def read_sketch(
     try:
         with naming(path):
             name = name or name_from(path.stem)
-            read = instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
+            read = instance_of(
+                data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name, crossings=crossings
+            )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
     return read.with_weights(w_strokes, w_beta)
 
 
 def instance_of(
-    data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
+    data: bytes,
+    *,
+    size: int,
+    name: str,
+    source: str,
+    mask: Path | None = None,
+    gauge: Gauge = "strokes",
+    crossings: bool = False,
 ) -> Instance:
     """The instance of a sketch, given as a file's bytes, under the default weights. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower())
@@ -110,10 +124,13 @@ def instance_of(
     lines, others = sketch.covers(frame)
     solve = _solve_mask(lines, others, given)
     weight = np.where(solve, lines.weight, 0.0)
+    met = sketch.meetings(frame).inside(solve) if crossings and sketch.meetings else None
+    if met is not None:
+        weight[met.row, met.column] = met.weight[:, 0]
     stroke = weight >= LEAST_WEIGHT
     if not stroke.any():
         raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
-    return Instance(
+    read = Instance(
         name=name,
         mask=solve,
         stroke_pixels=np.argwhere(stroke).astype(np.int32),
@@ -124,6 +141,18 @@ def instance_of(
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
     ).with_weights(STROKE_WEIGHT, SKEW_WEIGHT)
+    return read if met is None else _with_both(read, met)
+
+
+def _with_both(instance: Instance, met: Meetings) -> Instance:
+    """The instance with the directions of both curves at these of its stroke pixels."""
+    number = np.full(instance.mask.shape, -1, dtype=np.int32)
+    number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
+    at, theta = number[met.row, met.column], instance.theta.copy()
+    theta[at] = met.direction[:, 0]
+    return replace(
+        instance, theta=theta, crossings=at, theta_cross=met.direction[:, 1], w_cross=met.weight[:, 1]
+    )
 
 
 def name_from(text: str) -> str:
@@ -203,7 +232,11 @@ def _of_curves(curves: Curves) -> _Sketch:
         segments, _, line = segments_of(curves, frame)
         return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
 
-    return _Sketch(bounding_box(curves.points), curves.canvas, covers)
+    def meetings(frame: Frame) -> Meetings:
+        segments, curve, line = segments_of(curves, frame)
+        return meeting_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+
+    return _Sketch(bounding_box(curves.points), curves.canvas, covers, meetings)
 
 
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:

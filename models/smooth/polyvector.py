@@ -17,7 +17,7 @@ from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
 from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
-from .systems import factored, smoothness, stroke_weight
+from .systems import factored, smoothness
 
 _Complex = NDArray[np.complex128]
 
@@ -34,10 +34,10 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
-    where s = exp(2 i theta) is to be a root, and w_beta |X1|^2 over pixels, which asks for right angles where
-    nothing else says. Near a right-angled cross along the stroke that is 16 times the energy of
-    docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels
-    are then moved into the windows of the instance (docs/mathematics.md, 10).
+    where s = exp(2 i theta) is to be a root (at a crossing both are), and w_beta |X1|^2 over pixels, which
+    asks for right angles where nothing else says. Near a right-angled cross along the stroke that is 16 times
+    the energy of docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha =
+    beta = 0. Labels are then moved into the windows of the instance (docs/mathematics.md, 10).
 
     hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them: among those
     of `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings,
@@ -52,13 +52,16 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
 
 def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
     """The coefficients X0, X1 (n,) of each pixel."""
-    size, weight = instance.grid.size, np.minimum(hold * stroke_weight(instance), _HARDEST)
-    root = np.zeros(size, dtype=np.complex128)
-    root[instance.stroke_index] = np.exp(2j * instance.theta)
-    alike = smoothness(instance) + sparse.diags_array(weight)
-    x = factored(_beside(alike, weight * root, instance.w_beta))(
-        np.concatenate([-weight * root**2, -weight * root])
-    )
+    size, strokes = instance.grid.size, instance.stroke_terms
+    weight = np.minimum(hold * strokes.weight, _HARDEST)
+    root = np.exp(2j * instance.every_stroke[1])
+
+    def sums(values: _Complex) -> _Complex:
+        return strokes.at_pixels(values.real, size) + 1j * strokes.at_pixels(values.imag, size)
+
+    alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
+    once = sums(weight * root)
+    x = factored(_beside(alike, once, instance.w_beta))(np.concatenate([-sums(weight * root**2), -once]))
     return x[:size], x[size:]
 
 

@@ -18,16 +18,17 @@ from .systems import factored, smoothness, stroke_weight
 def power_field(instance: Instance) -> CrossField:
     """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
 
-    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha = arg(z)/4 and
-    beta = 0.
+    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes, both ones where two
+    meet; alpha = arg(z)/4 and beta = 0.
     Parts without a stroke get alpha = 0. Labels are then moved into the windows of the instance
     (docs/mathematics.md, 10).
     """
     grid = instance.grid
-    weight = stroke_weight(instance)
-    goal = np.zeros((grid.size, 2))
-    goal[instance.stroke_index] = np.stack([np.cos(4 * instance.theta), np.sin(4 * instance.theta)], axis=-1)
-    z = factored(smoothness(instance) + sparse.diags_array(weight))(weight[:, None] * goal)
+    strokes, (_, theta, _) = instance.stroke_terms, instance.every_stroke
+    goal = np.stack(
+        [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
+    )
+    z = factored(smoothness(instance) + sparse.diags_array(stroke_weight(instance)))(goal)
     alpha, beta = np.arctan2(z[:, 1], z[:, 0]) / 4, np.zeros(grid.size)
     start = relabelled(instance, alpha, beta, free_jumps(grid, alpha, beta)[0])
     return start.with_best_jumps()

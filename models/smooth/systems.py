@@ -22,10 +22,8 @@ PULL: Final = 1e-9
 
 
 def stroke_weight(instance: Instance) -> Floats:
-    """Weight w_strokes w of each pixel, 0 without a stroke; shape (n,)."""
-    weight = np.zeros(instance.grid.size)
-    weight[instance.stroke_index] = instance.w_strokes * instance.w
-    return weight
+    """Weight w_strokes w of each pixel, of both strokes where two meet, 0 without a stroke; shape (n,)."""
+    return instance.stroke_terms.at_pixels(instance.stroke_terms.weight, instance.grid.size)
 
 
 def smoothness(instance: Instance) -> Any:

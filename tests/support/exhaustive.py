@@ -62,17 +62,18 @@ def least_energy(instance, jumps):
     no windows.
     """
     grid, size = instance.grid, instance.grid.size
-    pairs, strokes = np.arange(len(grid.first)), np.arange(len(instance.theta))
+    pairs, terms = np.arange(len(grid.first)), instance.stroke_terms
+    strokes = np.arange(len(terms.pixel))
     a, b = np.zeros((2, len(pairs), 2 * size))
     a[pairs, grid.first], a[pairs, grid.second] = 1, -1
     b[pairs, size + grid.first], b[pairs, size + grid.second] = 1 - 2 * (jumps[0] & 1), -1
     r = np.zeros((len(strokes), 2 * size))
-    r[strokes, instance.stroke_index] = r[strokes, size + instance.stroke_index] = 1
-    root = np.sqrt(instance.w_strokes * instance.w)
+    r[strokes, terms.pixel], r[strokes, size + terms.pixel] = 1, terms.side
+    root = np.sqrt(terms.weight)
     skew = np.sqrt(instance.w_beta) * np.eye(2 * size)[size:]
     rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])
     right = np.zeros((len(jumps), len(rows)))
     right[:, : len(pairs)] = -np.sqrt(2) * HALF * jumps
-    right[:, 2 * len(pairs) : 2 * len(pairs) + len(strokes)] = root * instance.target
+    right[:, 2 * len(pairs) : 2 * len(pairs) + len(strokes)] = root * terms.goal
     basis = np.linalg.qr(rows)[0]
     return np.sum((right - (right @ basis) @ basis.T) ** 2, axis=1)

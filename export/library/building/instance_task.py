@@ -19,6 +19,7 @@ from ....models.instance.instance import Instance
 from ....models.search.box_qp import fitted
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, as_bytes
+from ..documents.statistics import sizes
 from ..ledger.certificates import Certified, certified
 from ..ledger.points import Known, Provenance, baseline_field, least_energy, ours, searched_field
 from ..ledger.search_1norm import better_in_1norm
@@ -75,7 +76,7 @@ def prepare(task: Preparation) -> Files:
     """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
     searched = searched_field(instance)
-    proven = certified(searched.field) if task.recipe.prove else None
+    proven = certified(searched.field) if task.recipe.prove and not len(instance.crossings) else None
     chosen = _chosen(instance, task, [searched, *([proven.known] if proven else [])])
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
@@ -144,9 +145,7 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
-            "pixels": instance.grid.size,
-            "strokes": len(instance.theta),
-            "pairs": len(instance.grid.first),
+            **sizes(instance),
         },
         "fields": fields,
         "files": [

@@ -19,7 +19,7 @@ from ...writing.curvature import probtype
 from ..building.entry_task import Entry
 from ..documents.check_point import BadInputError, check
 from ..documents.documents import problem_of
-from ..documents.statistics import counts, curvature, ranges
+from ..documents.statistics import counts, curvature, ranges, sizes
 from ..ledger.dual_bounds import is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger
@@ -64,7 +64,6 @@ def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Findi
 def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Finding]:
     """The sidecar tells of its problem what is so."""
     instance = problem.instance
-    grid = {"pixels": instance.grid.size, "strokes": len(instance.theta), "pairs": len(instance.grid.first)}
     facts: dict[str, Any] = {
         "class": problem.problem_class,
         "convex": problem.convex,
@@ -72,7 +71,7 @@ def _facts(name: str, sidecar: dict[str, Any], problem: Problem) -> Iterator[Fin
         "counts": counts(problem),
         "curvature": curvature(problem),
         "ranges": ranges(problem),
-        "instance": sidecar["instance"] | grid | {"sha256": instance.sha256},
+        "instance": sidecar["instance"] | sizes(instance) | {"sha256": instance.sha256},
     }
     for key, value in facts.items():
         if sidecar[key] != value:

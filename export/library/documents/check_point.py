@@ -30,7 +30,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from typing import NoReturn, Optional, TypeVar
+from typing import Any, NoReturn, Optional, TypeVar
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 ZERO, HALF, ONE, TWO = Decimal(0), Decimal("0.5"), Decimal(1), Decimal(2)
@@ -64,7 +64,7 @@ ADDED = re.compile(
 )
 """Columns that solvers and their readers add to a model; in a point they are passed over."""
 
-ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
+ON_PIXELS, ON_PAIRS = ("alpha", "beta", "psi", "gamma", "chi"), ("p", "p1", "p2", "s", "t", "z", "d", "u")
 
 Entry = tuple[int, Decimal]
 Product = tuple[int, int, Decimal]
@@ -527,18 +527,29 @@ def _worst(violations: Iterable[Place]) -> Place:
 # ------------------------------------------------------------------------------------- instance against point
 
 
-class Pixel:
-    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any."""
+Stroke = tuple[float, Decimal]
 
-    def __init__(self, place: str, gauge: str, stroke: tuple[float, Decimal] | None) -> None:
+
+class Pixel:
+    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any.
+
+    second: the same of a second stroke, which line v follows.
+    """
+
+    def __init__(self, place: str, gauge: str, stroke: Stroke | None, second: Stroke | None) -> None:
         self.place = place
         self.stroke: tuple[Decimal, Decimal] | None = None
+        self.second: tuple[Decimal, Decimal] | None = None
         self.low = 0.0
         self.window: tuple[Decimal, Decimal] = (ZERO, PI / 2)
         if stroke is None:
             return
         theta = stroke[0] % math.pi
         theta = theta if 1e-8 <= theta < math.pi else 0.0  # as the program itself has it
+        if second is not None:
+            least = math.pi / 4 - 1e-9 if gauge == "box" else theta
+            other = second[0] % math.pi
+            self.second = (Decimal(other + math.pi if other < least else other), second[1])
         if gauge == "box":
             theta = -math.pi / 4 + (theta + math.pi / 4) % math.pi
         else:
@@ -590,12 +601,15 @@ def _instance(document: dict[str, object]) -> Instance:
     if not (isinstance(mask, list) and isinstance(strokes, list)) or gauge not in ("strokes", "box"):
         raise ValueError(gauge)
     width = max(2, len(str(max(len(mask), *(len(row) for row in mask)) - 1)))
-    held = {(int(r), int(c)): (float(theta), Decimal(float(w))) for r, c, theta, w in strokes}
+    held, second = _held(strokes), _held(document.get("crossings", []))
     inside = [(r, c) for r, row in enumerate(mask) for c, pixel in enumerate(row) if pixel == "#"]
     at = {place: number for number, place in enumerate(inside)}
-    if len(held) < len(strokes) or any(place not in at for place in held):
+    if any(place not in at for place in held) or any(place not in held for place in second):
         raise ValueError("strokes")
-    pixels = [Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c))) for r, c in inside]
+    pixels = [
+        Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c)), second.get((r, c)))
+        for r, c in inside
+    ]
     pairs = [
         (f"{pixels[i].place}_{way}", i, at[other])
         for (r, c), i in at.items()
@@ -604,6 +618,14 @@ def _instance(document: dict[str, object]) -> Instance:
     ]
     weights = [Decimal(float(str(document.get(*item)))) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))]
     return Instance(pixels, pairs, (weights[0], weights[1]))
+
+
+def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
+    """Direction and weight of each stroke by row and column, each place once."""
+    held = {(int(r), int(c)): (float(theta), Decimal(float(w))) for r, c, theta, w in strokes}
+    if len(held) < len(strokes):
+        raise ValueError("strokes")
+    return held
 
 
 class Field:
@@ -654,7 +676,7 @@ class Field:
 
     def energy(self, norm: int, jumps: Iterable[Jump]) -> Decimal:
         """The energy with squares (2) or absolute values (1):
-        2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
+        2 sum (A, B) + w_strokes sum w R + w_beta sum beta, R of both strokes where two meet.
         """
 
         def size(value: Decimal) -> Decimal:
@@ -667,6 +689,8 @@ class Field:
             skew += size(beta)
             if pixel.stroke is not None:
                 strokes += pixel.stroke[1] * size(alpha + beta - pixel.stroke[0])
+            if pixel.second is not None:
+                strokes += pixel.second[1] * size(alpha - beta + PI / 2 - pixel.second[0])
         return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
 
     def violations(self) -> dict[str, Place]:

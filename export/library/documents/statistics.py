@@ -12,11 +12,23 @@ import numpy as np
 
 from ....models.formulations.problem import PlacedFamily, Problem
 from ....models.instance.grid import Floats
+from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical
 from ...writing.curvature import NEGLIGIBLE, of_objective, of_rows
 
 MOST_EIGEN: Final = 600
 """Variables in the quadratic objective up to which eigenvalues are computed."""
+
+
+def sizes(instance: Instance) -> dict[str, int]:
+    """Numbers of pixels, stroke pixels, crossings where there are any, and pairs."""
+    crossings = {"crossings": len(instance.crossings)} if len(instance.crossings) else {}
+    return {
+        "pixels": instance.grid.size,
+        "strokes": len(instance.theta),
+        **crossings,
+        "pairs": len(instance.grid.first),
+    }
 
 
 def counts(problem: Problem) -> dict[str, int]:
