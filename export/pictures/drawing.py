@@ -1,0 +1,108 @@
+"""The drawing that a field is laid over: what a reader found in a file, never the file itself.
+
+Of a vector drawing these are its curves, of a bitmap its ink. So no script, link, font or entity of a file can
+reach a picture, and one sees what the reader saw.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.errors import InputError, naming
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from ...models.sketch.bitmap import Picture, read_picture
+from ...models.sketch.curves import Curves, bounding_box
+from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
+from ...models.sketch.samples import SAMPLES, sample_svg
+
+Box = tuple[float, float, float, float]
+
+INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
+"""Colours of the strokes below a field; red are those that are drawn in red."""
+_LEVELS: Final = 16  # of ink
+_LOOKS_RED: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Curves or ink, in the drawing's own coordinates, y down.
+
+    page: x, y, width, height of the drawing's page, larger where strokes lie beyond it. box: left, top,
+    right, bottom of the strokes. curves: of each colour of INK the unbroken runs of cubics, each (k, 4, 2).
+    ink: uint8 [h, w] of a bitmap, numbers of colours in `ink_colours`; None for curves. scale: side of a
+    pixel of the ink.
+    """
+
+    page: Box
+    box: Box
+    curves: dict[str, list[Floats]]
+    ink: NDArray[np.uint8] | None = None
+    scale: float = 1.0
+
+    def check(self, instance: Instance) -> None:
+        """Nothing, when the instance may be one of this drawing. Raises InputError when it lies elsewhere."""
+        left, top = instance.origin
+        right = left + instance.pixel_size * instance.grid.width
+        bottom = top + instance.pixel_size * instance.grid.height
+        if left < self.box[2] and top < self.box[3] and right > self.box[0] and bottom > self.box[1]:
+            return
+        raise InputError(
+            f"the field of {instance.name} lies elsewhere (x {left:g} to {right:g}, y {top:g} to {bottom:g}), "
+            "not on this drawing; give the one that its instance was read from"
+        )
+
+
+def read_drawing(what: str | Path) -> Drawing:
+    """The drawing of a file (SVG, bitmap, .scap) or of a built-in sample.
+
+    Raises InputError, with the file, for what `read_sketch` could not read, and for a computed sample.
+    """
+    path = Path(what)
+    if not path.is_file() and str(what) in SAMPLES:
+        return _drawing(sample_svg(str(what)).encode(), ".svg")
+    data = bytes_of(path)
+    with naming(path):
+        return _drawing(data, path.suffix.lower())
+
+
+def _drawing(data: bytes, suffix: str) -> Drawing:
+    curves = curves_in(data, suffix)
+    return _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves)
+
+
+def _of_curves(curves: Curves) -> Drawing:
+    left, top, right, bottom = box = bounding_box(curves.points)
+    x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
+    left, top = min(left, x), min(top, y)
+    page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
+    ends = np.flatnonzero(np.diff(curves.curve) | (curves.points[1:, 0] != curves.points[:-1, 3]).any(axis=1))
+    drawn = np.split(curves.points, ends + 1)
+    red = curves.red[np.concatenate([[0], ends + 1])]
+    runs = {
+        name: [run for run, is_red in zip(drawn, red, strict=True) if is_red == (name == "red")]
+        for name in INK
+    }
+    return Drawing(page, box, runs)
+
+
+def _of_ink(picture: Picture) -> Drawing:
+    level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
+    numbers = level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)
+    page = (0.0, 0.0, float(picture.width), float(picture.height))
+    return Drawing(page, picture.box, {}, numbers.astype(np.uint8), float(picture.reduced))
+
+
+def ink_colours() -> Any:
+    """Red, green, blue and opacity of the numbers in `Drawing.ink`, uint8 (2 * levels, 4)."""
+    opacity = np.round(np.linspace(0, 255, _LEVELS)).astype(np.uint8)
+    tables = [
+        np.column_stack([np.tile(np.frombuffer(bytes.fromhex(ink[1:]), np.uint8), (_LEVELS, 1)), opacity])
+        for ink in (INK["black"], INK["red"])
+    ]
+    return np.concatenate(tables)

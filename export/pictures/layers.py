@@ -1,0 +1,181 @@
+"""A field as layers in the coordinates of its drawing, so that it fits when it is laid over it.
+
+Lengths are in units of the drawing, x to the right and y down; widths and distances follow the longer side of
+the grid, so that fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, few nodes each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from .combing import combed
+from .cubics import fitted
+from .drawing import INK, Box, Drawing
+from .panels import FAMILIES, NEGATIVE, POSITIVE, runs
+from .streamlines import streamlines
+
+UNITS: Final = 400.0
+"""Parts of the longer side of the grid in which the lengths below are given."""
+_SPACING: Final = 7.6  # of streamlines of one family
+_LINE: Final = 0.95
+_CROSS: Final = 0.7
+_BELOW: Final = 1.7  # strokes under a field
+_DOT: Final = 3.2
+_RIM: Final = 0.8
+_TOLERANCE: Final = 0.08  # of a smooth curve
+_MOST_CROSSES: Final = 64  # along a side; of more, one in several
+_STROKES: Final = "#4a4a4a"
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one colour and width: each (m, 4, 2) cubics or (m, 2, 2) straight pieces, end to end.
+
+    single: whether each is a thing of its own that a designer may want to pick, or all are one.
+    """
+
+    colour: str
+    width: float
+    lines: list[Floats]
+    single: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Discs of one colour with a white rim: centres (k, 2) and radii (k,)."""
+
+    colour: str
+    centres: Floats
+    radii: Floats
+    rim: float
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A named layer. shown: whether it is visible at first."""
+
+    name: str
+    parts: tuple[Lines | Dots, ...]
+    shown: bool = True
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Layers on a page (x, y, width, height), the lowest first; drawing: what lies below them, or None."""
+
+    page: Box
+    layers: tuple[Layer, ...]
+    drawing: Drawing | None
+
+
+def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
+    """The layers of a field, over its drawing where that is given; crosses are there but not shown.
+
+    Raises InputError for a drawing that lies elsewhere.
+    """
+    place = Place(field.instance)
+    if drawing is not None:
+        drawing.check(field.instance)
+    layers = (
+        *(() if drawing is None else (_drawn(drawing, place),)),
+        Layer("strokes", (_strokes(place),), shown=drawing is None, opacity=0.45),
+        Layer("crosses", _crosses(field, place), shown=False),
+        *_streamlines(field, place),
+        Layer("singularities", _singularities(field, place)),
+    )
+    return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the pixels of an instance lie on its drawing."""
+
+    instance: Instance
+
+    @property
+    def unit(self) -> float:
+        """Length of a unit of the pictures."""
+        return self.instance.pixel_size * max(self.instance.mask.shape) / UNITS
+
+    def on_drawing(self, points: Floats) -> Floats:
+        """Points (..., 2) of the field's plane, y up and pixel centres at whole numbers, on the drawing."""
+        inside: Floats = points * np.array([1.0, -1.0]) + 0.5
+        return np.array(self.instance.origin) + self.instance.pixel_size * inside
+
+    @property
+    def page(self) -> Box:
+        """The page where no drawing tells it: from zero, where pages begin, to the far sides of the mask.
+
+        A mask that reaches more than a pixel beyond zero is the page itself.
+        """
+        rows, columns = np.nonzero(self.instance.mask)
+        size = self.instance.pixel_size
+        low = np.array(self.instance.origin) + size * np.array([columns.min(), rows.min()])
+        high = np.array(self.instance.origin) + size * (np.array([columns.max(), rows.max()]) + 1)
+        if (low >= -size).all():
+            low = np.zeros(2)
+        (x, y), (width, height) = low.tolist(), (high - low).tolist()
+        return x, y, width, height
+
+
+def _drawn(drawing: Drawing, place: Place) -> Layer:
+    lines = (Lines(INK[name], _BELOW * place.unit, found) for name, found in drawing.curves.items() if found)
+    return Layer("drawing", tuple(lines))
+
+
+def _strokes(place: Place) -> Lines:
+    """A piece of line at each pixel that has a direction."""
+    instance = place.instance
+    row, column = instance.stroke_pixels.T
+    arm = 0.5 * np.stack([np.cos(instance.theta), np.sin(instance.theta)], axis=1)
+    return Lines(_STROKES, _BELOW * place.unit, _pieces(place, np.stack([column, -row], axis=1), arm))
+
+
+def _crosses(field: CrossField, place: Place) -> tuple[Lines, ...]:
+    """A cross on each pixel, on large grids one in several."""
+    field = combed(field)
+    grid = field.instance.grid
+    every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
+    chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
+    centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
+    return tuple(
+        Lines(colour, _CROSS * place.unit, _pieces(place, centre, 0.42 * every * vectors[chosen]))
+        for vectors, colour in zip((field.u, field.v), FAMILIES, strict=True)
+    )
+
+
+def _pieces(place: Place, centre: Floats, arm: Floats) -> list[Floats]:
+    return list(place.on_drawing(np.stack([centre - arm, centre + arm], axis=1))[:, None])
+
+
+def _streamlines(field: CrossField, place: Place) -> list[Layer]:
+    """Evenly spaced lines, a layer for each family; u is above."""
+    side = max(field.instance.mask.shape)
+    found = streamlines(field, _SPACING / UNITS * side)
+    layers = []
+    for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
+        lines = [fitted(run, _TOLERANCE / UNITS * side) for line in found for run in runs(line, family)]
+        on_drawing = [place.on_drawing(line) for line in lines if len(line)]
+        layers.append(
+            Layer(name, (Lines(FAMILIES[family], _LINE * place.unit, on_drawing, single=True),))
+        )
+    return layers
+
+
+def _singularities(field: CrossField, place: Place) -> tuple[Dots, ...]:
+    """Red (+) and blue (-) dots, larger from an index of 1/2 on."""
+    found = field.singularities
+    centre = place.on_drawing(np.stack([found.column + 0.5, -found.row - 0.5], axis=1))
+    crowd = float(np.clip(7 / np.sqrt(max(len(found.index), 1)), 0.45, 1.0))
+    radius = np.where(np.abs(found.index) < 0.5, _DOT, 1.4 * _DOT) * crowd * place.unit
+    return tuple(
+        Dots(colour, centre[some], radius[some], _RIM * crowd * place.unit)
+        for colour, some in ((POSITIVE, found.index > 0), (NEGATIVE, found.index < 0))
+    )
