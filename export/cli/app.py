@@ -18,7 +18,7 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import known, load, options_of
+from .inputs import drawing_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
@@ -137,6 +137,7 @@ def run_command(
             limits=limits,
             options={"facet": facet},
             dialects=_dialects(gams_layout, nl_form),
+            drawing=drawing_of(sketch),
             jobs=jobs,
             progress=show,
         )
@@ -334,7 +335,8 @@ def draw_command(
         typer.Option(
             "--kind",
             metavar="NAME",
-            help="{pictures}; by default instance, layers for a field as SVG or --over a drawing, else field.",
+            help="{pictures}; by default layers for a field as SVG or --over a drawing, else what the file"
+            " holds.",
         ),
     ] = None,
     over: Annotated[

@@ -45,7 +45,8 @@ def _tangents(points: Floats) -> Floats:
     else:  # of the parabola through three points
         tangents[0] = 2 * (points[1] - points[0]) - tangents[1]
         tangents[-1] = 2 * (points[-1] - points[-2]) - tangents[-2]
-    return tangents / np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+    unit: Floats = tangents / np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def _piece(points: Floats, start: Floats, end: Floats, tolerance: float) -> tuple[Floats, int]:

@@ -152,9 +152,7 @@ def _layers(field: CrossField, suffix: str, over: str | Path | None, title: str 
         return _saved(page_of(layers), suffix, title=title)
 
 
-def _panels(
-    what: CrossField | Instance, kind: Kind, sketch: Sequence[ArrayLike], title: str | None
-) -> Any:
+def _panels(what: CrossField | Instance, kind: Kind, sketch: Sequence[ArrayLike], title: str | None) -> Any:
     instance, field = (what, None) if isinstance(what, Instance) else (what.instance, what)
     return _page(panels.Picture(instance, field, _on_grid(sketch, instance), kind.size), kind, title)
 

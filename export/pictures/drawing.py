@@ -1,7 +1,7 @@
 """The drawing that a field is laid over: what a reader found in a file, never the file itself.
 
-Of a vector drawing these are its curves, of a bitmap its ink. So no script, link, font or entity of a file can
-reach a picture, and one sees what the reader saw.
+Of a vector drawing these are its curves, of a bitmap its ink. So no script, link, font or entity of a file
+can reach a picture, and one sees what the reader saw.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ...models.errors import InputError, naming
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Picture, read_picture
-from ...models.sketch.curves import Curves, bounding_box
+from ...models.sketch.curves import Curves, bounding_box, lines_as_cubics
 from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
 from ...models.sketch.samples import SAMPLES, sample_svg
 
@@ -34,7 +34,8 @@ class Drawing:
     """Curves or ink, in the drawing's own coordinates, y down.
 
     page: x, y, width, height of the drawing's page, larger where strokes lie beyond it. box: left, top,
-    right, bottom of the strokes. curves: of each colour of INK the unbroken runs of cubics, each (k, 4, 2).
+    right, bottom of the strokes. curves: of each colour of INK the unbroken runs, each (k, 4, 2) cubics or
+    (k, 2, 2) straight pieces.
     ink: uint8 [h, w] of a bitmap, numbers of colours in `ink_colours`; None for curves. scale: side of a
     pixel of the ink.
     """
@@ -53,8 +54,8 @@ class Drawing:
         if left < self.box[2] and top < self.box[3] and right > self.box[0] and bottom > self.box[1]:
             return
         raise InputError(
-            f"the field of {instance.name} lies elsewhere (x {left:g} to {right:g}, y {top:g} to {bottom:g}), "
-            "not on this drawing; give the one that its instance was read from"
+            f"the drawing lies elsewhere than the field of {instance.name}, which is at x {left:g} to "
+            f"{right:g}, y {top:g} to {bottom:g}; give the one that its instance was read from"
         )
 
 
@@ -82,13 +83,19 @@ def _of_curves(curves: Curves) -> Drawing:
     left, top = min(left, x), min(top, y)
     page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
     ends = np.flatnonzero(np.diff(curves.curve) | (curves.points[1:, 0] != curves.points[:-1, 3]).any(axis=1))
-    drawn = np.split(curves.points, ends + 1)
+    drawn = [_plain(run) for run in np.split(curves.points, ends + 1)]
     red = curves.red[np.concatenate([[0], ends + 1])]
     runs = {
         name: [run for run, is_red in zip(drawn, red, strict=True) if is_red == (name == "red")]
         for name in INK
     }
     return Drawing(page, box, runs)
+
+
+def _plain(run: Floats) -> Floats:
+    """The run without the inner control points where all its cubics are straight lines."""
+    straight = lines_as_cubics(run[:, 0], run[:, 3])
+    return run[:, [0, 3]] if np.allclose(run, straight, rtol=1e-9, atol=0) else run
 
 
 def _of_ink(picture: Picture) -> Drawing:

@@ -29,6 +29,11 @@ _BELOW: Final = 1.7  # strokes under a field
 _DOT: Final = 3.2
 _RIM: Final = 0.8
 _TOLERANCE: Final = 0.08  # of a smooth curve
+_LEAST: Final = 5.0  # length of a streamline
+_MUCH: Final = 12.0  # sides of the grid that strokes are long before they are drawn thinner
+_BLUR: Final = 1.0  # pixels by which the stairs of the mask are smoothed
+_BORDER: Final = 0.5  # of the blurred mask at a straight border
+_DRAWN_BORDER: Final = 0.15  # more where strokes are the border: they run through the middle of its pixels
 _MOST_CROSSES: Final = 64  # along a side; of more, one in several
 _STROKES: Final = "#4a4a4a"
 
@@ -102,7 +107,7 @@ class Place:
     @property
     def unit(self) -> float:
         """Length of a unit of the pictures."""
-        return self.instance.pixel_size * max(self.instance.mask.shape) / UNITS
+        return float(self.instance.pixel_size * max(self.instance.mask.shape) / UNITS)
 
     def on_drawing(self, points: Floats) -> Floats:
         """Points (..., 2) of the field's plane, y up and pixel centres at whole numbers, on the drawing."""
@@ -126,8 +131,14 @@ class Place:
 
 
 def _drawn(drawing: Drawing, place: Place) -> Layer:
-    lines = (Lines(INK[name], _BELOW * place.unit, found) for name, found in drawing.curves.items() if found)
-    return Layer("drawing", tuple(lines))
+    """The curves of a drawing; many over each other are drawn thinner."""
+    every = [piece for found in drawing.curves.values() for piece in found]
+    length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
+    width = _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
+    return Layer(
+        "drawing",
+        tuple(Lines(INK[name], width, found) for name, found in drawing.curves.items() if found),
+    )
 
 
 def _strokes(place: Place) -> Lines:
@@ -157,16 +168,44 @@ def _pieces(place: Place, centre: Floats, arm: Floats) -> list[Floats]:
 
 def _streamlines(field: CrossField, place: Place) -> list[Layer]:
     """Evenly spaced lines, a layer for each family; u is above."""
-    side = max(field.instance.mask.shape)
-    found = streamlines(field, _SPACING / UNITS * side)
+    scale = max(field.instance.mask.shape) / UNITS
+    found = streamlines(field, _SPACING * scale)
+    depth = _depth(field.instance)
     layers = []
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
-        lines = [fitted(run, _TOLERANCE / UNITS * side) for line in found for run in runs(line, family)]
-        on_drawing = [place.on_drawing(line) for line in lines if len(line)]
-        layers.append(
-            Layer(name, (Lines(FAMILIES[family], _LINE * place.unit, on_drawing, single=True),))
-        )
+        inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
+        smooth = [fitted(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
+        lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.on_drawing, smooth)), single=True)
+        layers.append(Layer(name, (lines,)))
     return layers
+
+
+def _depth(instance: Instance) -> Floats:
+    """The blurred mask less its level at a smooth border, [height + 2, width + 2] with a rim of a pixel."""
+    from scipy import ndimage
+
+    mask = np.pad(instance.mask, 1)
+    border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
+    drawn = float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
+    blurred: Floats = ndimage.gaussian_filter(mask.astype(np.float64), _BLUR)
+    return blurred - _BORDER - _DRAWN_BORDER * drawn
+
+
+def trimmed(line: Floats, depth: Floats) -> list[Floats]:
+    """The parts of a line (k, 2), y up, where the depth is positive: they end on a smooth border."""
+    from scipy import ndimage
+
+    at = ndimage.map_coordinates(depth, [1 - line[:, 1], 1 + line[:, 0]], order=1, mode="nearest")
+    cut = np.flatnonzero((at[1:] > 0) != (at[:-1] > 0))
+    share = (at[cut] / (at[cut] - at[cut + 1]))[:, None]
+    ends = line[cut] + share * (line[cut + 1] - line[cut])
+    points = np.insert(line, np.repeat(cut + 1, 2), np.repeat(ends, 2, axis=0), axis=0)
+    parts = np.split(points, cut + 1 + 2 * np.arange(len(cut)) + 1)
+    return parts[0 if at[0] > 0 else 1 :: 2]
+
+
+def _length(line: Floats) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _singularities(field: CrossField, place: Place) -> tuple[Dots, ...]:

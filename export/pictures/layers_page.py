@@ -36,7 +36,7 @@ def page_of(sheet: Sheet) -> Any:
 
 
 def _ink(axes: Any, sheet: Sheet) -> None:
-    """The ink of a bitmap; every block of its pixels counts."""
+    """The ink of a bitmap, smooth at any size."""
     if sheet.drawing is None or sheet.drawing.ink is None:
         return
     ink, side = sheet.drawing.ink, sheet.drawing.scale
@@ -44,7 +44,7 @@ def _ink(axes: Any, sheet: Sheet) -> None:
     axes.imshow(
         ink_colours()[ink],
         extent=(0.0, side * wide, side * high, 0.0),
-        interpolation="antialiased",
+        interpolation="hanning",
         interpolation_stage="rgba",
     )
     axes.set_aspect("auto")
@@ -59,8 +59,8 @@ def _lines(axes: Any, part: Lines, scale: float, opacity: float) -> None:
     vertices, codes = [], []
     for line in part.lines:
         vertices += [line[0, :1], line[:, 1:].reshape(-1, 2)]
-        curve = Path.LINETO if line.shape[1] == 2 else Path.CURVE4  # noqa: PLR2004 - the ends alone
-        codes += [[Path.MOVETO], np.full(len(vertices[-1]), curve)]
+        curve = Path.LINETO if line.shape[1] == 2 else Path.CURVE4
+        codes += [np.array([Path.MOVETO]), np.full(len(vertices[-1]), curve)]
     path = Path(np.concatenate(vertices), np.concatenate(codes))
     axes.add_patch(
         PathPatch(

@@ -13,6 +13,7 @@ from html import escape
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
 from .drawing import Drawing, ink_colours
@@ -46,28 +47,28 @@ def _group(layer: Layer, drawing: Drawing | None, step: float) -> Iterator[str]:
         f'style="display:{"inline" if layer.shown else "none"}"{opacity}>'
     )
     if drawing is not None and drawing.ink is not None:
-        yield _image(drawing)
+        yield _image(drawing.ink, drawing.scale)
     for part in layer.parts:
         yield from _lines(part, step) if isinstance(part, Lines) else _dots(part, step)
     yield "</g>"
 
 
-def _image(drawing: Drawing) -> str:
+def _image(ink: NDArray[np.uint8], scale: float) -> str:
     """The ink of a bitmap on nothing, as PNG inside the file."""
-    high, wide = (drawing.scale * side for side in np.shape(drawing.ink))
-    data = base64.b64encode(png_of(drawing)).decode()
+    high, wide = (scale * side for side in ink.shape)
+    data = base64.b64encode(_png(ink)).decode()
     return (
         f'<image x="0" y="0" width="{wide:g}" height="{high:g}" preserveAspectRatio="none" '
         f'xlink:href="data:image/png;base64,{data}"/>'
     )
 
 
-def png_of(drawing: Drawing) -> bytes:
+def _png(ink: NDArray[np.uint8]) -> bytes:
     """The ink of a bitmap as a PNG with a palette."""
     from PIL import Image
 
     colours = ink_colours()
-    image = Image.fromarray(np.asarray(drawing.ink))
+    image = Image.fromarray(ink)
     image.putpalette(colours[:, :3].tobytes())
     stream = io.BytesIO()
     image.save(stream, "PNG", transparency=colours[:, 3].tobytes(), optimize=True)
@@ -89,7 +90,7 @@ def _path(line: Floats, step: float) -> str:
     """Path data of pieces that are end to end: rounded first, then told by their differences."""
     whole = np.round(line / step) + 0.0
     moves = (whole[:, 1:] - whole[:, :1]).reshape(-1) * step
-    letter = "l" if line.shape[1] == 2 else "c"  # noqa: PLR2004 - the ends alone
+    letter = "l" if line.shape[1] == 2 else "c"
     return f"M{_numbers(whole[0, 0] * step)}{letter}{_numbers(moves)}"
 
 

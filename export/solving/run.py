@@ -25,6 +25,8 @@ from .proven import Proven, certified
 from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
+OVERLAY: Final = ("overlay.svg", "overlay.png")
+"""The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 REPORT: Final = "report.json"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
@@ -131,6 +133,7 @@ def run(
     limits: Limits | None = None,
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
+    drawing: str | Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Report:
@@ -140,14 +143,16 @@ def run(
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/overlay.svg, .png   the best field in the coordinates of the sketch, over it where it is given
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
-    options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
-    method that searches; `progress` is first told what that makes in all. A method that fails is noted in the
-    report; the fields that were found stand. Ctrl-C ends the present method with its best field and the run
-    with it: no further method is tried and nothing drawn. Before the solver files are there it goes on as
-    KeyboardInterrupt. Raises OutputError.
+    options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. drawing: the file or
+    sample that the instance was read from, for the overlay. limits: for each method that searches; `progress`
+    is first told what that makes in all. A method that fails is noted in the report; the fields that were
+    found stand. Ctrl-C ends the present method with its best field and the run with it: no further method is
+    tried and nothing drawn. Before the solver files are there it goes on as KeyboardInterrupt.
+    Raises OutputError, and InputError for a drawing of something else, when the report is written.
     """
     folder, limits = make_folder(folder), limits or Limits()
     _clear(folder)
@@ -178,7 +183,7 @@ def run(
         write_field(report.best.field, folder / f"field{suffix}")
     watch.lap("fields")
     if not report.interrupted:
-        report = _drawn(report, folder, progress)
+        report = _drawn(report, folder, drawing, progress)
         watch.lap("pictures")
     report = replace(report, stages=watch.stages)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
@@ -187,7 +192,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 
@@ -236,15 +241,18 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
     return None
 
 
-def _drawn(report: Report, folder: Path, progress: Progress) -> Report:
+def _drawn(report: Report, folder: Path, drawing: str | Path | None, progress: Progress) -> Report:
     """The report, its pictures drawn, or marked where Ctrl-C ended that."""
-    from ..pictures.draw import draw
+    from ..pictures.draw import LAYERS, draw
 
     try:
         for kind in PICTURES:
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.best.field
             draw(subject, folder / _picture(kind), kind=kind)
+        for name in OVERLAY:
+            progress(f"drawing {name}")
+            draw(report.best.field, folder / name, kind=LAYERS, over=drawing)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
     return report

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from ..errors import InstanceError
+from ..previews import Pictured
 from .angles import wrap
 from .grid import Bools, Floats, Grid, Ints
 
@@ -56,7 +57,7 @@ def _in_digits(value: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Instance:
+class Instance(Pictured):
     """A mask with stroke directions on some of its pixels, and the weights of the energy.
 
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
@@ -107,6 +108,9 @@ class Instance:
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
         self._freeze("theta", np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta))
         self._freeze("w", np.where(self.w > _FINE, np.round(self.w, _DECIMALS), self.w))
+
+    def __repr__(self) -> str:
+        return f"<Instance {self.summary}>"
 
     def _freeze(self, name: str, value: Any) -> None:
         value = value.copy()
