@@ -38,21 +38,23 @@ def fitted(points: Floats, tolerance: float) -> Floats:
 
 
 def _tangents(points: Floats) -> Floats:
-    """Unit tangents (k, 2); of a closed line the same at both ends."""
-    tangents = np.gradient(points, axis=0)
-    if (points[0] == points[-1]).all():
-        tangents[[0, -1]] = points[1] - points[-2]
-    else:  # of the parabola through three points
-        tangents[0] = 2 * (points[1] - points[0]) - tangents[1]
-        tangents[-1] = 2 * (points[-1] - points[-2]) - tangents[-2]
+    """Unit tangents (k, 2): those of parabolas through three points, on closed lines across the end."""
+    closed = bool((points[0] == points[-1]).all())
+    around = np.concatenate([points[-2:-1], points, points[1:2]]) if closed else points
+    tangents = np.gradient(around, _along(around), axis=0, edge_order=2)[int(closed) :][: len(points)]
     unit: Floats = tangents / np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
     return unit
 
 
+def _along(points: Floats) -> Floats:
+    """Length of the way to each point (k,)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
 def _piece(points: Floats, start: Floats, end: Floats, tolerance: float) -> tuple[Floats, int]:
     """The cubic (4, 2) of some points with these end tangents, and where to cut it, 0 where it fits."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    t = along / along[-1]
+    t = _along(points)
+    t /= t[-1]
     for _ in range(_ROUNDS):
         cubic = _least_squares(points, t, start, end)
         off = np.linalg.norm(_at(cubic, t) - points, axis=1)
