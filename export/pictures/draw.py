@@ -24,7 +24,7 @@ from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from . import panels
-from .drawing import read_drawing
+from .drawing import Drawing, read_drawing
 from .layers import sheet
 from .layers_page import page_of
 from .layers_svg import svg_of
@@ -102,7 +102,7 @@ def draw(
     *,
     kind: str | None = None,
     sketch: Sequence[ArrayLike] | None = None,
-    over: str | Path | None = None,
+    over: str | Path | Drawing | None = None,
     title: str | None = None,
 ) -> Path:
     """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
@@ -118,7 +118,7 @@ def draw(
     """
     path = Path(path)
     suffix = _suffix(path)
-    kind = kind or _fitting(what, suffix, over)
+    kind = kind or _fitting(what, suffix, over=over is not None)
     chosen = _kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
         if sketch:
@@ -137,15 +137,16 @@ def preview(what: CrossField | Instance) -> bytes:
         return _saved(_panels(what, kind, (), None), ".png", dots=_PREVIEW_DOTS)
 
 
-def _fitting(what: CrossField | Instance, suffix: str, over: str | Path | None) -> str:
+def _fitting(what: CrossField | Instance, suffix: str, *, over: bool) -> str:
     """The kind of picture where none is asked for."""
     if isinstance(what, Instance):
         return "instance"
-    return LAYERS if suffix == ".svg" or over is not None else "field"
+    return LAYERS if suffix == ".svg" or over else "field"
 
 
-def _layers(field: CrossField, suffix: str, over: str | Path | None, title: str | None) -> bytes:
-    layers = sheet(field, None if over is None else read_drawing(over))
+def _layers(field: CrossField, suffix: str, over: str | Path | Drawing | None, title: str | None) -> bytes:
+    below = over if over is None or isinstance(over, Drawing) else read_drawing(over, on=field.instance)
+    layers = sheet(field, below)
     if suffix == ".svg":
         return svg_of(layers, title)
     with _settings():

@@ -59,22 +59,20 @@ class Drawing:
         )
 
 
-def read_drawing(what: str | Path) -> Drawing:
-    """The drawing of a file (SVG, bitmap, .scap) or of a built-in sample.
+def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
+    """The drawing of an instance: that of a file (SVG, bitmap, .scap) or of a built-in sample.
 
-    Raises InputError, with the file, for what `read_sketch` could not read, and for a computed sample.
+    Raises InputError, with the file, for what `read_sketch` could not read, for a computed sample, and for a
+    drawing that lies elsewhere.
     """
     path = Path(what)
-    if not path.is_file() and str(what) in SAMPLES:
-        return _drawing(sample_svg(str(what)).encode(), ".svg")
-    data = bytes_of(path)
+    sampled = not path.is_file() and str(what) in SAMPLES
+    data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
     with naming(path):
-        return _drawing(data, path.suffix.lower())
-
-
-def _drawing(data: bytes, suffix: str) -> Drawing:
-    curves = curves_in(data, suffix)
-    return _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves)
+        curves = curves_in(data, ".svg" if sampled else path.suffix.lower())
+        drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves)
+        drawing.check(on)
+    return drawing
 
 
 def _of_curves(curves: Curves) -> Drawing:

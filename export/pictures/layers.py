@@ -81,13 +81,8 @@ class Sheet:
 
 
 def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
-    """The layers of a field, over its drawing where that is given; crosses are there but not shown.
-
-    Raises InputError for a drawing that lies elsewhere.
-    """
+    """The layers of a field, over its drawing where that is given; crosses are there but not shown."""
     place = Place(field.instance)
-    if drawing is not None:
-        drawing.check(field.instance)
     layers = (
         *(() if drawing is None else (_drawn(drawing, place),)),
         Layer("strokes", (_strokes(place),), shown=drawing is None, opacity=0.45),

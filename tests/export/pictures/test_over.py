@@ -9,6 +9,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.pictures.draw import draw
 from crossfield.export.pictures.drawing import INK, read_drawing
+from crossfield.export.solving.run import run
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.sketch.read import read_sketch
@@ -106,8 +107,9 @@ def test_pen_strokes_may_lie_beyond_their_page(tmp_path):
             "{\n#2 2\n0 0 1\n60 0 1\n}")  # fmt: skip
     path = tmp_path / "a.scap"
     path.write_text("#80 30\n@1\n" + "\n".join(rows) + "\n")
-    assert read_drawing(path).page == (0, -20, 80, 50)
-    root, layers = layers_of(draw(field_of(path), tmp_path / "over.svg", over=path))
+    field = field_of(path)
+    assert read_drawing(path, on=field.instance).page == (0, -20, 80, 50)
+    root, layers = layers_of(draw(field, tmp_path / "over.svg", over=path))
     assert numbers(root.get("viewBox")).tolist() == [0, -20, 80, 50]
     assert lines_in(layers["drawing"])[0].tolist() == [[0, -20], [60, -20], [60, 20]]
 
@@ -120,6 +122,9 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
     assert "give the one that its instance was read from" in str(caught.value)
     with pytest.raises(InputError, match="use kind layers"):
         draw(field, tmp_path / "over.png", kind="crosses", over=tmp_path / "a.svg")
+    with pytest.raises(InputError, match="lies elsewhere"):  # before anything is searched for
+        run(field.instance, tmp_path / "run", drawing=tmp_path / "far.svg")
+    assert not (tmp_path / "run").exists()
     with pytest.raises(InputError, match="computed, not drawn"):
         draw(field, tmp_path / "over.png", over="wave_sheet")
 
@@ -138,7 +143,7 @@ def test_the_command_lays_a_field_over_a_sample(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_run_lays_its_best_field_over_the_drawing(tmp_path):
     drawing = svg(tmp_path / "a.svg")
-    arguments = ["run", str(drawing), "--size", "5", "--time-limit", "0.1", "-q", "-o", str(tmp_path / "run")]
+    arguments = ["run", str(drawing), "--size", "9", "--time-limit", "0.1", "-q", "-o", str(tmp_path / "run")]
     assert invoke(arguments) == 0
     root, layers = layers_of(tmp_path / "run" / "overlay.svg")
     assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
