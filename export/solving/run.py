@@ -178,9 +178,7 @@ def run(
         found = _tried_in_turn(request, start, watch)
     proven = _certified(found, folder / CERTIFICATE, limits, progress)
     watch.lap("certificate")
-    report = Report(
-        instance, tuple(found.ranked), tuple(manifests), found.failures, found.interrupted, proven
-    )
+    report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
     watch.lap("fields")
@@ -207,9 +205,9 @@ class _Found:
     interrupted: str = ""
 
     @property
-    def ranked(self) -> list[Candidate]:
+    def ranked(self) -> tuple[Candidate, ...]:
         """The lowest 2-norm energy first; of those equal but for rounding the one that was found first."""
-        return sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
+        return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
 def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
