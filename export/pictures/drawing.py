@@ -6,9 +6,12 @@ can reach a picture, and one sees what the reader saw.
 
 from __future__ import annotations
 
+import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +29,7 @@ Box = tuple[float, float, float, float]
 INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
 """Colours of the strokes below a field; red are those that are drawn in red."""
 _LEVELS: Final = 16  # of ink
+_LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
 _LOOKS_RED: Final = 0.5
 
 
@@ -36,6 +40,7 @@ class Drawing:
     page: x, y, width, height of the drawing's page, larger where strokes lie beyond it. box: left, top,
     right, bottom of the strokes. curves: of each colour of INK the unbroken runs, each (k, 4, 2) cubics or
     (k, 2, 2) straight pieces.
+    size: width and height of the page with the units that the drawing declares, as `210mm`.
     ink: uint8 [h, w] of a bitmap, numbers of colours in `ink_colours`; None for curves. scale: side of a
     pixel of the ink.
     """
@@ -43,6 +48,7 @@ class Drawing:
     page: Box
     box: Box
     curves: dict[str, list[Floats]]
+    size: tuple[str, str]
     ink: NDArray[np.uint8] | None = None
     scale: float = 1.0
 
@@ -70,12 +76,12 @@ def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
     with naming(path):
         curves = curves_in(data, ".svg" if sampled else path.suffix.lower())
-        drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves)
+        drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
         drawing.check(on)
     return drawing
 
 
-def _of_curves(curves: Curves) -> Drawing:
+def _of_curves(curves: Curves, data: bytes) -> Drawing:
     left, top, right, bottom = box = bounding_box(curves.points)
     x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
     left, top = min(left, x), min(top, y)
@@ -87,7 +93,32 @@ def _of_curves(curves: Curves) -> Drawing:
         name: [run for run, is_red in zip(drawn, red, strict=True) if is_red == (name == "red")]
         for name in INK
     }
-    return Drawing(page, box, runs)
+    return Drawing(page, box, runs, _size(data, curves.canvas, page))
+
+
+def size_in_units(page: Box) -> tuple[str, str]:
+    """Width and height of a page that declares no others."""
+    return f"{page[2]:.12g}", f"{page[3]:.12g}"
+
+
+def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
+    """Width and height of the page, as many millimetres a unit as an SVG declares, if it does.
+
+    data: of a sketch that was read.
+    """
+    from defusedxml.ElementTree import iterparse
+
+    try:
+        _, root = next(iterparse(io.BytesIO(data), ("start",), forbid_entities=True, forbid_external=True))
+    except ParseError:  # pen strokes
+        return size_in_units(page)
+    width, height = (_LENGTH.fullmatch(root.get(side, "").strip()) for side in ("width", "height"))
+    if not (canvas and width and height and float(width[1]) and float(height[1])):
+        return size_in_units(page)
+    return (
+        f"{float(width[1]) * page[2] / canvas[2]:.12g}{width[2] or ''}",
+        f"{float(height[1]) * page[3] / canvas[3]:.12g}{height[2] or ''}",
+    )
 
 
 def _plain(run: Floats) -> Floats:
@@ -100,7 +131,8 @@ def _of_ink(picture: Picture) -> Drawing:
     level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
     numbers = level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
-    return Drawing(page, picture.box, {}, numbers.astype(np.uint8), float(picture.reduced))
+    ink = numbers.astype(np.uint8)
+    return Drawing(page, picture.box, {}, size_in_units(page), ink, float(picture.reduced))
 
 
 def ink_colours() -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
-from .drawing import Drawing, ink_colours
+from .drawing import Drawing, ink_colours, size_in_units
 from .layers import Dots, Layer, Lines, Sheet
 
 _FINENESS: Final = 20_000.0  # steps of coordinates along the longer side of the page, at least
@@ -29,10 +29,11 @@ _SPACES: Final = (
 def svg_of(sheet: Sheet, title: str | None = None) -> bytes:
     """The file of some layers."""
     step = 10.0 ** -np.ceil(np.log10(_FINENESS / max(sheet.page[2:])))
-    x, y, width, height = (f"{value:.12g}" for value in sheet.page)
+    box = " ".join(f"{value:.12g}" for value in sheet.page)
+    width, height = size_in_units(sheet.page) if sheet.drawing is None else sheet.drawing.size
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<svg {_SPACES} viewBox="{x} {y} {width} {height}" width="{width}" height="{height}">',
+        f'<svg {_SPACES} viewBox="{box}" width="{width}" height="{height}">',
         *([] if title is None else [f"<title>{escape(title)}</title>"]),
     ]
     for layer in sheet.layers:

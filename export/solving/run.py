@@ -143,8 +143,7 @@ def run(
     The folder then holds instance, solver files, the best field, pictures and report.json.
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
-        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ..., and overlay.svg, .png, the best
-                       field in the coordinates of its drawing, over it where that is given
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 

@@ -60,6 +60,30 @@ def test_the_drawing_is_the_lowest_layer_on_its_own_page(tmp_path):
         assert (lines <= (121, 91)).all()
 
 
+def test_the_page_has_the_size_that_the_drawing_declares(tmp_path):
+    drawing = svg(tmp_path / "a.svg")
+    field = field_of(drawing)
+    declared = {
+        'width="75mm" height="55mm"': ["75mm", "55mm"],
+        'width="15.5cm" height="110"': ["15.5cm", "110"],
+        'width="100%"': ["150", "110"],
+        'width="1&quot;&gt;" height="javascript:1"': ["150", "110"],
+    }
+    for size, expected in declared.items():
+        (tmp_path / "b.svg").write_text(drawing.read_text().replace("viewBox", f"{size} viewBox"))
+        root, _ = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "b.svg"))
+        assert [root.get("width"), root.get("height")] == expected
+    beyond = (
+        drawing.read_text()
+        .replace("0 0 150 110", "0 0 100 80")
+        .replace("<svg", '<svg width="5in" height="4in"')
+    )
+    (tmp_path / "b.svg").write_text(beyond)
+    root, _ = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "b.svg"))
+    assert root.get("viewBox") == "0 0 120 90"
+    assert [root.get("width"), root.get("height")] == ["6in", "4.5in"]
+
+
 def test_nothing_of_a_hostile_drawing_but_its_strokes_comes_out(tmp_path):
     (tmp_path / "evil.svg").write_text(HOSTILE)
     field = field_of(tmp_path / "evil.svg")
