@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .export.formats.pyomo_model import to_pyomo as to_pyomo
     from .export.formats.registry import write as write
     from .export.pictures.draw import draw as draw
+    from .export.pictures.draw import preview as preview
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
@@ -70,6 +71,7 @@ _HOME: Final = {
     "improved": ".models.search.improvement",
     "polyvector_field": ".models.smooth.polyvector",
     "power_field": ".models.smooth.power_field",
+    "preview": ".export.pictures.draw",
     "prove": ".models.proof.prove",
     "read_certificate": ".models.proof.certificate",
     "read_field": ".models.field.file",

@@ -18,7 +18,7 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import known, load, options_of
+from .inputs import drawing_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
@@ -137,6 +137,7 @@ def run_command(
             limits=limits,
             options={"facet": facet},
             dialects=_dialects(gams_layout, nl_form),
+            drawing=drawing_of(sketch),
             jobs=jobs,
             progress=show,
         )
@@ -330,13 +331,30 @@ def draw_command(
         typer.Option("--on", metavar="INSTANCE", help="The instance (.npz, .json) of a .rawfield."),
     ] = None,
     kind: Annotated[
-        str | None, typer.Option("--kind", metavar="NAME", help="{pictures}; by default what the file holds.")
+        str | None,
+        typer.Option(
+            "--kind",
+            metavar="NAME",
+            help="{pictures}; by default layers for a field as SVG or --over a drawing, else what the file"
+            " holds.",
+        ),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="DRAWING|SAMPLE",
+            help="What the instance was read from (SVG, bitmap, .scap, sample): its strokes below the field.",
+        ),
     ] = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Draw a field or an instance as PNG, SVG or PDF."""
-    from ...models.field.field import CrossField
+    """Draw a field or an instance as PNG, SVG or PDF.
+
+    A field as SVG has a layer for each of its parts, in the coordinates of the drawing: opened on top of it,
+    it fits.
+    """
     from ..pictures.draw import SUFFIXES, draw
 
     _require_suffix(output, tuple(SUFFIXES))
@@ -344,12 +362,7 @@ def draw_command(
         show("reading")
         subject = _field_or_instance(what, on)
         show("drawing")
-        draw(
-            subject,
-            output,
-            kind=kind or ("field" if isinstance(subject, CrossField) else "instance"),
-            title=title,
-        )
+        draw(subject, output, kind=kind, over=over, title=title)
     if not quiet:
         say(str(output))
 

@@ -60,6 +60,16 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) 
     return instance if gauge is None else instance.with_gauge(gauge)
 
 
+def drawing_of(what: str) -> str | None:
+    """What can be drawn below a field of a sketch, sample or instance as the user names it; None: nothing."""
+    from ...models.sketch.samples import SAMPLES
+
+    path = Path(what)
+    if path.is_file():
+        return None if path.suffix.lower() in {".json", ".npz"} else what
+    return what if what in SAMPLES and SAMPLES[what].kind == "sketch" else None
+
+
 def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[str]:
     """The names, each of which is in the table; all of the table when there are none."""
     for name in names or ():

@@ -164,6 +164,7 @@ def show_report(report: Report, folder: Path) -> None:
         say(f"  no field has less 2-norm energy than {bound}; certificate: {report.proven.certificate}")
     if not report.interrupted:
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
+        say(f"  layers that fit on the drawing: {folder / 'overlay.svg'}")
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
     say(

@@ -1,12 +1,16 @@
 """Pictures of instances and cross fields as PNG, SVG or PDF: same input, same bytes.
 
+Most kinds are panels with words round them; `layers` is the bare field in the coordinates of its drawing.
+
 The Agg, SVG and PDF writers of matplotlib are used directly; pyplot and the user's matplotlib settings play
 no part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import io
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,8 +22,12 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
-from ...models.storage import replacing
+from ...models.storage import write_bytes
 from . import panels
+from .drawing import Drawing, read_drawing
+from .layers import sheet
+from .layers_page import page_of
+from .layers_svg import svg_of
 
 Panel = Callable[[Any, panels.Picture], None]
 
@@ -27,6 +35,8 @@ Panel = Callable[[Any, panels.Picture], None]
 @dataclass(frozen=True)
 class Kind:
     """A kind of picture: one line of description, its panels with their headings, and what stands round them.
+
+    A kind without panels is the layers of the field on the page of its drawing.
 
     size: points of the longer side of a panel. bar: points to the right for a colour bar. legend: keys below.
     """
@@ -38,6 +48,8 @@ class Kind:
     legend: bool = False
     needs_field: bool = True
 
+
+LAYERS: Final = "layers"
 
 KINDS: Final = {
     "instance": Kind("mask and strokes of an instance", (("", panels.draw_instance),), needs_field=False),
@@ -63,6 +75,7 @@ KINDS: Final = {
         bar=50.0,
         legend=True,
     ),
+    LAYERS: Kind("the field in the coordinates of its drawing, over it where --over names it", ()),
 }
 """Every kind of picture, by the name under which it is asked for."""
 
@@ -74,6 +87,7 @@ SUFFIXES: Final = {
 """File suffixes, and the metadata that would name a clock or a version."""
 
 _DOTS: Final = 220  # dots per inch of a PNG
+_PREVIEW_DOTS: Final = 96
 _POINTS: Final = 72.0
 _EDGE: Final = 9.0
 _GAP: Final = 14.0
@@ -86,23 +100,67 @@ def draw(
     what: CrossField | Instance,
     path: str | Path,
     *,
-    kind: str = "field",
+    kind: str | None = None,
     sketch: Sequence[ArrayLike] | None = None,
+    over: str | Path | Drawing | None = None,
     title: str | None = None,
 ) -> Path:
     """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
 
-    kind: a name in KINDS; for an Instance only `instance` makes sense. sketch: polylines (k, 2) in the
+    kind: a name in KINDS; for an Instance only `instance` makes sense. By default `instance` for an Instance,
+    `layers` for a field as SVG or over a drawing, else `field`. sketch: polylines (k, 2) in the
     coordinates of the sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to
-    the grid. Raises InputError for an unknown kind or suffix, a kind that needs a field, or a malformed
-    sketch, and OutputError when the file cannot be written.
+    the grid; not of `layers`. over: the drawing (SVG, bitmap, .scap) or sample that the instance was read
+    from, the bottom of `layers`: its strokes as they were found, nothing else of the file. title: above the
+    picture; of `layers` among the facts of the file.
+    Raises InputError for an unknown kind or suffix, a kind that needs a field, a malformed sketch, and a
+    drawing that cannot be read or lies elsewhere, and OutputError when the file cannot be written.
     """
     path = Path(path)
     suffix = _suffix(path)
+    kind = kind or _fitting(what, suffix, over=over is not None)
     chosen = _kind(kind, what)
-    instance, field = (what, None) if isinstance(what, Instance) else (what.instance, what)
-    picture = panels.Picture(instance, field, _on_grid(sketch or (), instance), chosen.size)
+    if kind == LAYERS and isinstance(what, CrossField):
+        if sketch:
+            raise InputError("layers lie over the drawing itself; give the drawing as over, no polylines")
+        return write_bytes(path, _layers(what, suffix, over, title))
+    if over is not None:
+        raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
+    with _settings():
+        return write_bytes(path, _saved(_panels(what, chosen, sketch or (), title), suffix))
 
+
+def preview(what: CrossField | Instance) -> bytes:
+    """A small picture for notebooks, as PNG."""
+    kind = KINDS["instance" if isinstance(what, Instance) else "field"]
+    with _settings():
+        return _saved(_panels(what, kind, (), None), ".png", dots=_PREVIEW_DOTS)
+
+
+def _fitting(what: CrossField | Instance, suffix: str, *, over: bool) -> str:
+    """The kind of picture where none is asked for."""
+    if isinstance(what, Instance):
+        return "instance"
+    return LAYERS if suffix == ".svg" or over else "field"
+
+
+def _layers(field: CrossField, suffix: str, over: str | Path | Drawing | None, title: str | None) -> bytes:
+    below = over if over is None or isinstance(over, Drawing) else read_drawing(over, on=field.instance)
+    layers = sheet(field, below)
+    if suffix == ".svg":
+        return svg_of(layers, title)
+    with _settings():
+        return _saved(page_of(layers), suffix, title=title)
+
+
+def _panels(what: CrossField | Instance, kind: Kind, sketch: Sequence[ArrayLike], title: str | None) -> Any:
+    instance, field = (what, None) if isinstance(what, Instance) else (what.instance, what)
+    return _page(panels.Picture(instance, field, _on_grid(sketch, instance), kind.size), kind, title)
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
+    """Settings of matplotlib that are always the same."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -112,10 +170,15 @@ def draw(
         mpl.rcParams.update(
             {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
         )
-        figure = _page(picture, chosen, title)
-        with replacing(path) as stream:
-            figure.savefig(stream, format=suffix[1:], dpi=_DOTS, metadata=SUFFIXES[suffix])
-    return path
+        yield
+
+
+def _saved(figure: Any, suffix: str, *, dots: int = _DOTS, title: str | None = None) -> bytes:
+    """The bytes of a figure."""
+    metadata = SUFFIXES[suffix] | ({} if title is None else {"Title": title})
+    stream = io.BytesIO()
+    figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=metadata)
+    return stream.getvalue()
 
 
 def _suffix(path: Path) -> str:

@@ -18,6 +18,7 @@ from ...models.errors import SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, lifted
 from ...models.instance.grid import Floats
+from ...models.previews import table_of
 from ..formats.registry import FORMATS, carried
 from ..writing.canonical import Canonical
 from .contradictions import TOLERANCE, Claims, contradictions
@@ -57,6 +58,32 @@ class Solution:
     interrupted: bool = False
     start_returned: bool | None = None
     tolerance: float = TOLERANCE
+
+    def __repr__(self) -> str:
+        numbers = {"objective": self.objective, "bound": self.bound, "gap": self.gap}
+        told = "".join(f", {name} {value:.6g}" for name, value in numbers.items() if value is not None)
+        return f"<Solution of {self.problem.name} on {self.problem.instance.name}: {self.status}{told}>"
+
+    def _repr_html_(self) -> str:
+        """A table of what is claimed and what is so, with the field, for notebooks."""
+        facts = {
+            "problem": self.problem.summary,
+            "status": self.status,
+            "objective": self.objective,
+            "bound": self.bound,
+            "gap": self.gap,
+            "worst violation": self.violation and self.violation.worst,
+            "doubt": self.doubt or None,
+            "message": self.message or None,
+            "seconds": self.seconds,
+        }
+        known = {
+            name: f"{value:.6g}" if isinstance(value, float) else value
+            for name, value in facts.items()
+            if value is not None
+        }
+        picture = None if self.point is None else self.field._repr_png_()
+        return table_of(f"Solution by {self.reader}", known, picture)
 
     @cached_property
     def contradictions(self) -> tuple[str, ...]:

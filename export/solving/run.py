@@ -17,6 +17,7 @@ from ...models.search.improvement import first_field
 from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
+from ..pictures.drawing import Drawing, read_drawing
 from ..solutions.solution import Solution
 from .compiling import compiling
 from .job import Limits
@@ -25,6 +26,8 @@ from .proven import Proven, certified
 from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
+OVERLAY: Final = ("overlay.svg", "overlay.png")
+"""The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 REPORT: Final = "report.json"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
@@ -133,6 +136,7 @@ def run(
     limits: Limits | None = None,
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
+    drawing: str | Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Report:
@@ -141,16 +145,18 @@ def run(
     The folder then holds instance, solver files, the best field, pictures and report.json.
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
-        DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
-    options: of the formulations, as for `formulate`; dialects, jobs: as for `write_all`. limits: for each
-    method that searches; `progress` is first told what that makes in all. A method that fails is noted in the
-    report; the fields that were found stand. Ctrl-C ends the present method with its best field and the run
-    with it: no further method is tried and nothing drawn. Before the solver files are there it goes on as
-    KeyboardInterrupt. Raises OutputError.
+    options: as for `formulate`; dialects, jobs: as for `write_all`. drawing: file or sample that the instance
+    was read from, read first. limits: for each method that searches; `progress` is first told what that makes
+    in all. A method that fails is noted in the report; the fields that were found stand. Ctrl-C ends the
+    present method with its best field and the run with it: no further method is tried and nothing drawn.
+    Before the solver files are there it goes on as KeyboardInterrupt. Raises OutputError, and InputError for
+    a drawing that is unreadable or lies elsewhere.
     """
+    below = None if drawing is None else read_drawing(drawing, on=instance)
     folder, limits = make_folder(folder), limits or Limits()
     _clear(folder)
     progress(plan(limits))
@@ -171,16 +177,14 @@ def run(
         watch.lap("models")
         request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
         found = _tried_in_turn(request, start, watch)
-    # Equal but for rounding: the one that was found first.
-    ranked = sorted(found.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}"))
     proven = _certified(found, folder / CERTIFICATE, limits, progress)
     watch.lap("certificate")
-    report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted, proven)
+    report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
     watch.lap("fields")
     if not report.interrupted:
-        report = _drawn(report, folder, progress)
+        report = _drawn(report, folder, below, progress)
         watch.lap("pictures")
     report = replace(report, stages=watch.stages)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
@@ -189,7 +193,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 
@@ -200,6 +204,11 @@ class _Found:
     candidates: list[Candidate] = field(default_factory=list)
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
+
+    @property
+    def ranked(self) -> tuple[Candidate, ...]:
+        """The lowest 2-norm energy first; of those equal but for rounding the one that was found first."""
+        return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
 def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
@@ -238,15 +247,18 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
     return None
 
 
-def _drawn(report: Report, folder: Path, progress: Progress) -> Report:
+def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress) -> Report:
     """The report, its pictures drawn, or marked where Ctrl-C ended that."""
-    from ..pictures.draw import draw
+    from ..pictures.draw import LAYERS, draw
 
     try:
         for kind in PICTURES:
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.best.field
             draw(subject, folder / _picture(kind), kind=kind)
+        for name in OVERLAY:
+            progress(f"drawing {name}")
+            draw(report.best.field, folder / name, kind=LAYERS, over=below)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
     return report

@@ -17,6 +17,7 @@ from ..errors import InstanceError
 from ..instance.angles import line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
+from ..previews import Pictured
 from .jumps import best_jumps, label_of, parity_sign, stepped
 
 Norm = Literal[1, 2]
@@ -79,7 +80,7 @@ class Singularities:
 
 
 @dataclass(frozen=True, eq=False)
-class CrossField:
+class CrossField(Pictured):
     """Angles alpha, beta (n,) in radians and integer jumps p (m,) on the grid of an instance.
 
     n pixels and m pairs in the order of `instance.grid`. Line u is at alpha + beta, line v at alpha + pi/2 -
@@ -110,6 +111,12 @@ class CrossField:
                 raise InstanceError(f"{name} holds a value that is not finite")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        return (
+            f"<CrossField on {self.instance.summary}: energy {self.energy().total:.6g}, "
+            f"singularities {len(self.singularities.index)}>"
+        )
 
     @classmethod
     def from_lines(cls, instance: Instance, u: Floats, v: Floats) -> CrossField:

@@ -20,6 +20,7 @@ from ..errors import FormulationError
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
+from ..previews import table_of
 from .catalogue import AT_JUMPS, TWO_NORM, declare
 from .declaration import FORMULATIONS, Family, Formulation
 from .lifting import lift_products
@@ -228,6 +229,31 @@ class Problem:
             )
         if self.windows is not None:
             self.windows.check(self.instance)
+
+    def __repr__(self) -> str:
+        return f"<Problem {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        """A table of its columns and rows, for notebooks."""
+        facts = {
+            "formulation": f"{self.name}: {self.formulation.summary}",
+            "class": self.problem_class + (", convex" if self.convex else ""),
+            "instance": self.instance.summary,
+            "columns": ", ".join(
+                f"{block.count} {block.name}{' (integer)' * block.integer}" for block in self.blocks.values()
+            ),
+            "rows": ", ".join(f"{family.count} {family.family.tag}" for family in self.rows) or "none",
+        }
+        return table_of(f"Problem {self.summary}", facts)
+
+    @property
+    def summary(self) -> str:
+        """Formulation, class, instance, and how many columns and rows."""
+        whole = f" ({count} integer)" if (count := int(self.integer.sum())) else ""
+        return (
+            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.columns} columns{whole}, "
+            f"{self.row_count} rows"
+        )
 
     @property
     def name(self) -> str:

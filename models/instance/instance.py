@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from ..errors import InstanceError
+from ..previews import Pictured
 from .angles import line_difference, wrap
 from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
@@ -101,7 +102,7 @@ def _reliabilities(w: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Instance:
+class Instance(Pictured):
     """A mask with stroke directions on some of its pixels, and the weights of the energy.
 
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
@@ -166,6 +167,9 @@ class Instance:
         self._freeze("theta_cross", _second_directions(self.theta_cross, first[0]))
         w = _reliabilities(self.w_cross)
         self._freeze("w_cross", np.where(np.abs(w - first[1]) < _FLAT, first[1], w))
+
+    def __repr__(self) -> str:
+        return f"<Instance {self.summary}>"
 
     def _freeze(self, name: str, value: Any) -> None:
         value = value.copy()

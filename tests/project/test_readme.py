@@ -38,6 +38,7 @@ def run_line_by_line(block, folder):
 def test_tour_runs_line_by_line(tmp_path):
     run_line_by_line(blocks("sh")[2], tmp_path)
     assert (tmp_path / "field.png").stat().st_size > 10_000
+    assert b'id="drawing"' in (tmp_path / "field.svg").read_bytes()
 
 
 @pytest.mark.slow

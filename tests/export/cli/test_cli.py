@@ -113,6 +113,7 @@ def test_the_tour_of_the_verbs(tmp_path, crossfield):
 RUN_FILES = {
     "field.json", "field.npz", "field.obj", "field.rawfield", "report.json",
     "angle.png", "crosses.png", "field.png", "instance.png", "overview.png",
+    "overlay.png", "overlay.svg",
 }  # fmt: skip
 
 

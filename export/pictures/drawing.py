@@ -1,0 +1,145 @@
+"""The drawing that a field is laid over: what a reader found in a file, never the file itself.
+
+Of a vector drawing these are its curves, of a bitmap its ink. So no script, link, font or entity of a file
+can reach a picture, and one sees what the reader saw.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+from xml.etree.ElementTree import ParseError
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.errors import InputError, naming
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from ...models.sketch.bitmap import Picture, read_picture
+from ...models.sketch.curves import Curves, bounding_box, lines_as_cubics
+from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
+from ...models.sketch.samples import SAMPLES, sample_svg
+
+Box = tuple[float, float, float, float]
+
+INK: Final = {"black": "#4a4a4a", "red": "#c23b33"}
+"""Colours of the strokes below a field; red are those that are drawn in red."""
+_LEVELS: Final = 16  # of ink
+_LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
+_LOOKS_RED: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Curves or ink, in the drawing's own coordinates, y down.
+
+    page: x, y, width, height of the drawing's page, larger where strokes lie beyond it. box: left, top,
+    right, bottom of the strokes. curves: of each colour of INK the unbroken runs, each (k, 4, 2) cubics or
+    (k, 2, 2) straight pieces.
+    size: width and height of the page with the units that the drawing declares, as `210mm`.
+    ink: uint8 [h, w] of a bitmap, numbers of colours in `ink_colours`; None for curves. scale: side of a
+    pixel of the ink.
+    """
+
+    page: Box
+    box: Box
+    curves: dict[str, list[Floats]]
+    size: tuple[str, str]
+    ink: NDArray[np.uint8] | None = None
+    scale: float = 1.0
+
+    def check(self, instance: Instance) -> None:
+        """Nothing, when the instance may be one of this drawing. Raises InputError when it lies elsewhere."""
+        left, top = instance.origin
+        right = left + instance.pixel_size * instance.grid.width
+        bottom = top + instance.pixel_size * instance.grid.height
+        if left < self.box[2] and top < self.box[3] and right > self.box[0] and bottom > self.box[1]:
+            return
+        raise InputError(
+            f"the drawing lies elsewhere than the field of {instance.name}, which is at x {left:g} to "
+            f"{right:g}, y {top:g} to {bottom:g}; give the one that its instance was read from"
+        )
+
+
+def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
+    """The drawing of an instance: that of a file (SVG, bitmap, .scap) or of a built-in sample.
+
+    Raises InputError, with the file, for what `read_sketch` could not read, for a computed sample, and for a
+    drawing that lies elsewhere.
+    """
+    path = Path(what)
+    sampled = not path.is_file() and str(what) in SAMPLES
+    data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
+    with naming(path):
+        curves = curves_in(data, ".svg" if sampled else path.suffix.lower())
+        drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
+        drawing.check(on)
+    return drawing
+
+
+def _of_curves(curves: Curves, data: bytes) -> Drawing:
+    left, top, right, bottom = box = bounding_box(curves.points)
+    x, y, width, height = curves.canvas or (0.0, 0.0, 0.0, 0.0)
+    left, top = min(left, x), min(top, y)
+    page = (left, top, max(right, x + width) - left, max(bottom, y + height) - top)
+    ends = np.flatnonzero(np.diff(curves.curve) | (curves.points[1:, 0] != curves.points[:-1, 3]).any(axis=1))
+    drawn = [_plain(run) for run in np.split(curves.points, ends + 1)]
+    red = curves.red[np.concatenate([[0], ends + 1])]
+    runs = {
+        name: [run for run, is_red in zip(drawn, red, strict=True) if is_red == (name == "red")]
+        for name in INK
+    }
+    return Drawing(page, box, runs, _size(data, curves.canvas, page))
+
+
+def size_in_units(page: Box) -> tuple[str, str]:
+    """Width and height of a page that declares no others."""
+    return f"{page[2]:.12g}", f"{page[3]:.12g}"
+
+
+def _size(data: bytes, canvas: Box | None, page: Box) -> tuple[str, str]:
+    """Width and height of the page, as many millimetres a unit as an SVG declares, if it does.
+
+    data: of a sketch that was read.
+    """
+    from defusedxml.ElementTree import iterparse
+
+    try:
+        _, root = next(iterparse(io.BytesIO(data), ("start",), forbid_entities=True, forbid_external=True))
+    except ParseError:  # pen strokes
+        return size_in_units(page)
+    width, height = (_LENGTH.fullmatch(root.get(side, "").strip()) for side in ("width", "height"))
+    if not (canvas and width and height and float(width[1]) and float(height[1])):
+        return size_in_units(page)
+    return (
+        f"{float(width[1]) * page[2] / canvas[2]:.12g}{width[2] or ''}",
+        f"{float(height[1]) * page[3] / canvas[3]:.12g}{height[2] or ''}",
+    )
+
+
+def _plain(run: Floats) -> Floats:
+    """The run without the inner control points where all its cubics are straight lines."""
+    straight = lines_as_cubics(run[:, 0], run[:, 3])
+    return run[:, [0, 3]] if np.allclose(run, straight, rtol=1e-9, atol=0) else run
+
+
+def _of_ink(picture: Picture) -> Drawing:
+    level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
+    numbers = level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)
+    page = (0.0, 0.0, float(picture.width), float(picture.height))
+    ink = numbers.astype(np.uint8)
+    return Drawing(page, picture.box, {}, size_in_units(page), ink, float(picture.reduced))
+
+
+def ink_colours() -> Any:
+    """Red, green, blue and opacity of the numbers in `Drawing.ink`, uint8 (2 * levels, 4)."""
+    opacity = np.round(np.linspace(0, 255, _LEVELS)).astype(np.uint8)
+    tables = [
+        np.column_stack([np.tile(np.frombuffer(bytes.fromhex(ink[1:]), np.uint8), (_LEVELS, 1)), opacity])
+        for ink in (INK["black"], INK["red"])
+    ]
+    return np.concatenate(tables)

@@ -1,0 +1,215 @@
+"""A field as layers in the coordinates of its drawing, so that it fits when it is laid over it.
+
+Lengths are in units of the drawing, x to the right and y down; widths and distances follow the longer side of
+the grid, so that fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, few nodes each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
+from .combing import combed
+from .cubics import fitted
+from .drawing import INK, Box, Drawing
+from .panels import FAMILIES, NEGATIVE, POSITIVE, runs
+from .streamlines import streamlines
+
+UNITS: Final = 400.0
+"""Parts of the longer side of the grid in which the lengths below are given."""
+_SPACING: Final = 7.6  # of streamlines of one family
+_LINE: Final = 0.95
+_CROSS: Final = 0.7
+_BELOW: Final = 1.7  # strokes under a field
+_DOT: Final = 3.2
+_RIM: Final = 0.8
+_TOLERANCE: Final = 0.12  # of a smooth curve
+_LEAST: Final = 5.0  # length of a streamline
+_MUCH: Final = 12.0  # sides of the grid that strokes are long before they are drawn thinner
+_BLUR: Final = 1.0  # pixels by which the stairs of the mask are smoothed
+_BORDER: Final = 0.5  # of the blurred mask at a straight border
+_DRAWN_BORDER: Final = 0.15  # more where strokes are the border: they run through the middle of its pixels
+_MOST_CROSSES: Final = 64  # along a side; of more, one in several
+_STROKES: Final = "#4a4a4a"
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one colour and width: each (m, 4, 2) cubics or (m, 2, 2) straight pieces, end to end.
+
+    single: whether each is a thing of its own that a designer may want to pick, or all are one.
+    """
+
+    colour: str
+    width: float
+    lines: list[Floats]
+    single: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Discs of one colour with a white rim: centres (k, 2) and radii (k,)."""
+
+    colour: str
+    centres: Floats
+    radii: Floats
+    rim: float
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A named layer. shown: whether it is visible at first."""
+
+    name: str
+    parts: tuple[Lines | Dots, ...]
+    shown: bool = True
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Layers on a page (x, y, width, height), the lowest first; drawing: what lies below them, or None."""
+
+    page: Box
+    layers: tuple[Layer, ...]
+    drawing: Drawing | None
+
+
+def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
+    """The layers of a field, over its drawing where that is given; crosses are there but not shown."""
+    place = Place(field.instance)
+    layers = (
+        *(() if drawing is None else (_drawn(drawing, place),)),
+        Layer("strokes", (_strokes(place),), shown=drawing is None, opacity=0.45),
+        Layer("crosses", _crosses(field, place), shown=False),
+        *_streamlines(field, place),
+        Layer("singularities", _singularities(field, place)),
+    )
+    return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the pixels of an instance lie on its drawing."""
+
+    instance: Instance
+
+    @property
+    def unit(self) -> float:
+        """Length of a unit of the pictures."""
+        return float(self.instance.pixel_size * max(self.instance.mask.shape) / UNITS)
+
+    def on_drawing(self, points: Floats) -> Floats:
+        """Points (..., 2) of the field's plane, y up and pixel centres at whole numbers, on the drawing."""
+        inside: Floats = points * np.array([1.0, -1.0]) + 0.5
+        return np.array(self.instance.origin) + self.instance.pixel_size * inside
+
+    @property
+    def page(self) -> Box:
+        """The page where no drawing tells it: from zero, where pages begin, to the far sides of the mask.
+
+        A mask that reaches more than a pixel beyond zero is the page itself.
+        """
+        rows, columns = np.nonzero(self.instance.mask)
+        size = self.instance.pixel_size
+        low = np.array(self.instance.origin) + size * np.array([columns.min(), rows.min()])
+        high = np.array(self.instance.origin) + size * (np.array([columns.max(), rows.max()]) + 1)
+        if (low >= -size).all():
+            low = np.zeros(2)
+        (x, y), (width, height) = low.tolist(), (high - low).tolist()
+        return x, y, width, height
+
+
+def _drawn(drawing: Drawing, place: Place) -> Layer:
+    """The curves of a drawing; many over each other are drawn thinner."""
+    every = [piece for found in drawing.curves.values() for piece in found]
+    length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
+    width = _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
+    return Layer(
+        "drawing",
+        tuple(Lines(INK[name], width, found) for name, found in drawing.curves.items() if found),
+    )
+
+
+def _strokes(place: Place) -> Lines:
+    """A piece of line at each pixel that has a direction."""
+    instance = place.instance
+    row, column = instance.stroke_pixels.T
+    arm = 0.5 * np.stack([np.cos(instance.theta), np.sin(instance.theta)], axis=1)
+    return Lines(_STROKES, _BELOW * place.unit, _pieces(place, np.stack([column, -row], axis=1), arm))
+
+
+def _crosses(field: CrossField, place: Place) -> tuple[Lines, ...]:
+    """A cross on each pixel, on large grids one in several."""
+    field = combed(field)
+    grid = field.instance.grid
+    every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
+    chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
+    centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
+    return tuple(
+        Lines(colour, _CROSS * place.unit, _pieces(place, centre, 0.42 * every * vectors[chosen]))
+        for vectors, colour in zip((field.u, field.v), FAMILIES, strict=True)
+    )
+
+
+def _pieces(place: Place, centre: Floats, arm: Floats) -> list[Floats]:
+    return list(place.on_drawing(np.stack([centre - arm, centre + arm], axis=1))[:, None])
+
+
+def _streamlines(field: CrossField, place: Place) -> list[Layer]:
+    """Evenly spaced lines, a layer for each family; u is above."""
+    scale = max(field.instance.mask.shape) / UNITS
+    found = streamlines(field, _SPACING * scale)
+    depth = _depth(field.instance)
+    layers = []
+    for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
+        inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
+        smooth = [fitted(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
+        lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.on_drawing, smooth)), single=True)
+        layers.append(Layer(name, (lines,)))
+    return layers
+
+
+def _depth(instance: Instance) -> Floats:
+    """The blurred mask less its level at a smooth border, [height + 2, width + 2] with a rim of a pixel."""
+    from scipy import ndimage
+
+    mask = np.pad(instance.mask, 1)
+    border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
+    drawn = float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
+    blurred: Floats = ndimage.gaussian_filter(mask.astype(np.float64), _BLUR)
+    return blurred - _BORDER - _DRAWN_BORDER * drawn
+
+
+def trimmed(line: Floats, depth: Floats) -> list[Floats]:
+    """The parts of a line (k, 2), y up, where the depth is positive: they end on a smooth border."""
+    from scipy import ndimage
+
+    at = ndimage.map_coordinates(depth, [1 - line[:, 1], 1 + line[:, 0]], order=1, mode="nearest")
+    cut = np.flatnonzero((at[1:] > 0) != (at[:-1] > 0))
+    share = (at[cut] / (at[cut] - at[cut + 1]))[:, None]
+    ends = line[cut] + share * (line[cut + 1] - line[cut])
+    points = np.insert(line, np.repeat(cut + 1, 2), np.repeat(ends, 2, axis=0), axis=0)
+    parts = np.split(points, cut + 1 + 2 * np.arange(len(cut)) + 1)
+    return parts[0 if at[0] > 0 else 1 :: 2]
+
+
+def _length(line: Floats) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _singularities(field: CrossField, place: Place) -> tuple[Dots, ...]:
+    """Red (+) and blue (-) dots, larger from an index of 1/2 on."""
+    found = field.singularities
+    centre = place.on_drawing(np.stack([found.column + 0.5, -found.row - 0.5], axis=1))
+    crowd = float(np.clip(7 / np.sqrt(max(len(found.index), 1)), 0.45, 1.0))
+    radius = np.where(np.abs(found.index) < 0.5, _DOT, 1.4 * _DOT) * crowd * place.unit
+    return tuple(
+        Dots(colour, centre[some], radius[some], _RIM * crowd * place.unit)
+        for colour, some in ((POSITIVE, found.index > 0), (NEGATIVE, found.index < 0))
+    )

@@ -1,0 +1,176 @@
+"""Fields over their drawings: SVG, bitmap, .scap and samples, and nothing but strokes of any of them."""
+
+import base64
+import io
+import json
+
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.pictures.draw import draw
+from crossfield.export.pictures.drawing import INK, read_drawing
+from crossfield.export.solving.run import run
+from crossfield.models.errors import InputError
+from crossfield.models.field.file import write_field
+from crossfield.models.sketch.read import read_sketch
+from crossfield.models.sketch.samples import sample
+from crossfield.models.smooth.power_field import power_field
+from defusedxml import ElementTree
+from layered import SVG, layers_of, lines_in, numbers
+from PIL import Image, ImageDraw
+
+BOXES = """<g fill="none" stroke="#000" stroke-width="2"><path d="M20 30H120V90H20Z"/>
+<path d="M20 60H120" stroke="#e00000"/><path d="M70 30V90" stroke="#e00000"/></g>"""
+HOSTILE = f"""<?xml version="1.0"?>
+<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 150 110"
+ onload="alert('loaded')"><title>secret title</title>
+<script>alert('script')</script><script href="http://evil.example/x.js"/>
+<style>@import url(http://evil.example/style.css); path {{ filter: url(http://evil.example/f#x) }}</style>
+<image xlink:href="http://evil.example/track.png" width="150" height="110"/>
+<use xlink:href="http://evil.example/other.svg#a"/><a xlink:href="javascript:alert(1)">{BOXES}</a>
+<foreignObject><iframe xmlns="http://www.w3.org/1999/xhtml" src="http://evil.example"/></foreignObject>
+<path id="&quot;&gt;&lt;script&gt;" onclick="alert('clicked')" d="M30 40H40" stroke="#000"/>
+<text>http://evil.example</text><animate href="#a" attributeName="d"/></svg>"""
+
+
+def svg(path, body=BOXES):
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 150 110">{body}</svg>')
+    return path
+
+
+def field_of(path):
+    return power_field(read_sketch(path, size=12))
+
+
+def test_the_drawing_is_the_lowest_layer_on_its_own_page(tmp_path):
+    drawing = svg(tmp_path / "a.svg")
+    root, layers = layers_of(draw(field_of(drawing), tmp_path / "over.svg", over=drawing))
+    assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
+    assert next(iter(layers)) == "drawing"
+    assert layers["strokes"].get("style") == "display:none"
+    black, red = layers["drawing"]
+    assert [black.get("stroke"), red.get("stroke")] == [INK["black"], INK["red"]]
+    (box,), (level, upright) = lines_in(black), lines_in(red)
+    assert box.tolist() == [[20, 30], [120, 30], [120, 90], [20, 90], [20, 30]]
+    assert level.tolist() == [[20, 60], [120, 60]]
+    assert upright.tolist() == [[70, 30], [70, 90]]
+    for name in ("streamlines-u", "streamlines-v"):
+        lines = np.concatenate(lines_in(layers[name]))
+        assert (lines >= (19, 29)).all()
+        assert (lines <= (121, 91)).all()
+
+
+def test_the_page_has_the_size_that_the_drawing_declares(tmp_path):
+    drawing = svg(tmp_path / "a.svg")
+    field = field_of(drawing)
+    declared = {
+        'width="75mm" height="55mm"': ["75mm", "55mm"],
+        'width="15.5cm" height="110"': ["15.5cm", "110"],
+        'width="100%"': ["150", "110"],
+        'width="1&quot;&gt;" height="javascript:1"': ["150", "110"],
+    }
+    for size, expected in declared.items():
+        (tmp_path / "b.svg").write_text(drawing.read_text().replace("viewBox", f"{size} viewBox"))
+        root, _ = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "b.svg"))
+        assert [root.get("width"), root.get("height")] == expected
+    beyond = (
+        drawing.read_text()
+        .replace("0 0 150 110", "0 0 100 80")
+        .replace("<svg", '<svg width="5in" height="4in"')
+    )
+    (tmp_path / "b.svg").write_text(beyond)
+    root, _ = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "b.svg"))
+    assert root.get("viewBox") == "0 0 120 90"
+    assert [root.get("width"), root.get("height")] == ["6in", "4.5in"]
+
+
+def test_nothing_of_a_hostile_drawing_but_its_strokes_comes_out(tmp_path):
+    (tmp_path / "evil.svg").write_text(HOSTILE)
+    field = field_of(tmp_path / "evil.svg")
+    path = draw(field, tmp_path / "over.svg", over=tmp_path / "evil.svg")
+    text = path.read_text().lower()
+    for word in ("evil", "script", "alert", "secret", "onload", "onclick", "image", "use", "iframe", "style>",
+                 "url(", "href=", "<text", "animate", "entity", "doctype"):  # fmt: skip
+        assert word not in text, word
+    tags = {element.tag for element in ElementTree.fromstring(path.read_bytes()).iter()}
+    assert tags <= {f"{SVG}{name}" for name in ("svg", "g", "path", "circle")}
+    entity = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>' + svg(tmp_path / "b.svg").read_text()
+    (tmp_path / "entity.svg").write_text(entity.replace("</svg>", "<text>&x;</text></svg>"))
+    with pytest.raises(InputError, match="entities"):
+        draw(field, tmp_path / "never.svg", over=tmp_path / "entity.svg")
+    assert not (tmp_path / "never.svg").exists()
+
+
+def test_a_bitmap_is_embedded_as_its_ink_alone(tmp_path):
+    image = Image.new("RGB", (150, 110), "#f4efe4")
+    for line in ((20, 30, 120, 30), (120, 30, 120, 90), (120, 90, 20, 90), (20, 90, 20, 30)):
+        ImageDraw.Draw(image).line(line, fill="#222222", width=3)
+    ImageDraw.Draw(image).line((20, 60, 120, 60), fill="#d00000", width=3)
+    image.save(tmp_path / "a.jpg", comment=b"secret", quality=95)
+    field = field_of(tmp_path / "a.jpg")
+    root, layers = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "a.jpg"))
+    assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
+    (element,) = layers["drawing"]
+    assert (element.get("width"), element.get("height")) == ("150", "110")
+    kind, data = element.get("{http://www.w3.org/1999/xlink}href").split(",")
+    assert kind == "data:image/png;base64"
+    found = Image.open(io.BytesIO(base64.b64decode(data)))
+    pixels = np.asarray(found.convert("RGBA"))
+    assert found.info.keys() <= {"transparency"}
+    assert pixels[5, 5, 3] == 0
+    assert pixels[60, 70].tolist() == [*bytes.fromhex(INK["red"][1:]), 255]
+    assert pixels[30, 70].tolist() == [*bytes.fromhex(INK["black"][1:]), 255]
+    picture = Image.open(draw(field, tmp_path / "over.png", over=tmp_path / "a.jpg")).convert("L")
+    dark = np.asarray(picture.resize((150, 110), Image.Resampling.BOX)) < 140
+    assert dark[30, 25:115].mean() > 0.9
+    assert not dark[:25].any()
+
+
+def test_pen_strokes_may_lie_beyond_their_page(tmp_path):
+    rows = ("{\n#0 0\n0 -20 1\n60 -20 1\n60 20 1\n}", "{\n#1 1\n60 20 1\n0 20 1\n0 -20 1\n}",
+            "{\n#2 2\n0 0 1\n60 0 1\n}")  # fmt: skip
+    path = tmp_path / "a.scap"
+    path.write_text("#80 30\n@1\n" + "\n".join(rows) + "\n")
+    field = field_of(path)
+    assert read_drawing(path, on=field.instance).page == (0, -20, 80, 50)
+    root, layers = layers_of(draw(field, tmp_path / "over.svg", over=path))
+    assert numbers(root.get("viewBox")).tolist() == [0, -20, 80, 50]
+    assert lines_in(layers["drawing"])[0].tolist() == [[0, -20], [60, -20], [60, 20]]
+
+
+def test_another_drawing_and_another_kind_are_refused(tmp_path):
+    field = field_of(svg(tmp_path / "a.svg"))
+    far = BOXES.replace("<g ", '<g transform="translate(900 900)" ')
+    with pytest.raises(InputError, match="lies elsewhere") as caught:
+        draw(field, tmp_path / "over.svg", over=svg(tmp_path / "far.svg", far))
+    assert "give the one that its instance was read from" in str(caught.value)
+    with pytest.raises(InputError, match="use kind layers"):
+        draw(field, tmp_path / "over.png", kind="crosses", over=tmp_path / "a.svg")
+    with pytest.raises(InputError, match="lies elsewhere"):  # before anything is searched for
+        run(field.instance, tmp_path / "run", drawing=tmp_path / "far.svg")
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(InputError, match="computed, not drawn"):
+        draw(field, tmp_path / "over.png", over="wave_sheet")
+
+
+def test_the_command_lays_a_field_over_a_sample(tmp_path, capsys):
+    write_field(power_field(sample("ring", 10)), tmp_path / "f.npz")
+    for suffix, head in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
+        path = tmp_path / f"over{suffix}"
+        assert invoke(["draw", str(tmp_path / "f.npz"), "--over", "ring", "-o", str(path), "-q"]) == 0
+        assert path.read_bytes().startswith(head)
+    assert "drawing" in layers_of(tmp_path / "over.svg")[1]
+    assert invoke(["draw", str(tmp_path / "f.npz"), "--over", "no.svg", "-o", str(tmp_path / "o.svg")]) == 1
+    assert "no.svg: cannot be read" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_run_lays_its_best_field_over_the_drawing(tmp_path):
+    drawing = svg(tmp_path / "a.svg")
+    arguments = ["run", str(drawing), "--size", "9", "--time-limit", "0.1", "-q", "-o", str(tmp_path / "run")]
+    assert invoke(arguments) == 0
+    root, layers = layers_of(tmp_path / "run" / "overlay.svg")
+    assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
+    assert "drawing" in layers
+    assert (tmp_path / "run" / "overlay.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((tmp_path / "run" / "report.json").read_text())["interrupted"] is None

@@ -1,0 +1,92 @@
+"""What notebooks show: pictures, tables that load nothing, and one line of each."""
+
+import base64
+import io
+import re
+import subprocess
+import sys
+
+import crossfield as cf
+import numpy as np
+import pytest
+from defusedxml import ElementTree
+from PIL import Image
+
+
+@pytest.fixture(scope="module")
+def instance():
+    return cf.sample("skew", 6)
+
+
+@pytest.fixture(scope="module")
+def field(instance):
+    return cf.power_field(instance)
+
+
+@pytest.fixture(scope="module")
+def problem(instance):
+    return cf.formulate(instance, "milp-mccormick")
+
+
+@pytest.fixture(scope="module")
+def solution(instance, field):
+    return cf.solve(cf.formulate(instance, "qp-fixed", p=field.p))
+
+
+def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, solution):
+    told = [repr(each) for each in (instance, field, problem, solution)]
+    for line, name in zip(told, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
+        assert re.fullmatch(rf"<{name} .*>", line)
+        assert len(line) < 130
+    assert instance.summary in told[0]
+    assert f"{field.energy().total:.6g}" in told[1]
+    assert f"{problem.columns} columns" in told[2]
+    assert f"{problem.row_count} rows" in told[2]
+    assert f"objective {solution.objective:.6g}" in told[3]
+    assert "optimal" in told[3]
+
+
+def test_instances_and_fields_are_pictures(instance, field):
+    for shown in (instance, field):
+        data = shown._repr_png_()
+        picture = Image.open(io.BytesIO(data))
+        picture.load()
+        assert picture.format == "PNG"
+        assert 200 < max(picture.size) < 700
+        assert np.ptp(np.asarray(picture.convert("L"))) > 100
+        assert shown._repr_png_() == data
+
+
+def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
+    for shown in (problem, solution):
+        html = shown._repr_html_()
+        root = ElementTree.fromstring(html)
+        tags = {element.tag for element in root.iter()}
+        assert tags <= {"div", "table", "caption", "tbody", "tr", "th", "td", "img"}
+        assert not re.search(r"https?:|url\(|<script", html)
+        for image in root.iter("img"):
+            kind, data = image.get("src").split(",")
+            assert kind == "data:image/png;base64"
+            assert base64.b64decode(data).startswith(b"\x89PNG")
+    facts = {row[0].text: row[1].text for row in ElementTree.fromstring(problem._repr_html_()).iter("tr")}
+    assert facts["class"] == "MILP, convex"
+    assert f"{problem.instance.grid.size} alpha" in facts["columns"]
+    assert len(list(ElementTree.fromstring(solution._repr_html_()).iter("img"))) == 1
+
+
+def test_a_solution_without_a_point_is_told(problem):
+    from crossfield.export.solutions.readers.text import Status
+
+    empty = cf.Solution(problem, None, Status.INFEASIBLE, "<no> & never", "highs")
+    assert repr(empty) == "<Solution of milp-mccormick on skew: infeasible>"
+    assert "<img" not in empty._repr_html_()
+    assert "&lt;no&gt; &amp; never" in empty._repr_html_()
+
+
+def test_a_module_alone_shows_pictures_too():
+    """The face of the package says who draws before any of its modules is there."""
+    code = (
+        "from crossfield.models.sketch.samples import sample; import sys; i = sample('skew', 4); "
+        "assert 'matplotlib' not in sys.modules; sys.exit(not i._repr_png_().startswith(b'\\x89PNG'))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
