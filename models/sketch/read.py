@@ -2,14 +2,15 @@
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
 field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
+A Choice says otherwise.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -22,12 +23,14 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
+from .choice import Choice, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .outline import inside_outline, parts_with
+from .outline import along_outline, inside_outline, parts_with
 from .scap import read_scap
 from .svg import read_svg
 
+AS_DRAWN: Final = Choice()
 DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
@@ -50,11 +53,13 @@ class _Sketch:
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
     covers: the cover of a frame by curvature lines and by other strokes.
+    stroke_width: as drawn in a picture, 0 for the lines without width of a vector sketch.
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
+    stroke_width: float = 0.0
 
 
 def read_sketch(
@@ -66,6 +71,8 @@ def read_sketch(
     name: str | None = None,
     w_strokes: float | None = None,
     w_beta: float | None = None,
+    silhouette: Silhouette = "none",
+    curvature: Iterable[str] = (),
 ) -> Instance:
     """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
 
@@ -77,6 +84,9 @@ def read_sketch(
     from half its area on.
     gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
     weights of the stroke and the skew term, as in Instance; None: those of an Instance without any.
+    silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
+    (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
+    colour=, class=, id=, layer= (SVG), cluster= (.scap).
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
@@ -85,27 +95,39 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
+    choice = Choice(silhouette, tuple(curvature))
     with_mask = None if mask is None else Path(mask)
     data = bytes_of(path)
     try:
         with naming(path):
             name = name or name_from(path.stem)
-            read = instance_of(data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name)
+            read = instance_of(
+                data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name, choice=choice
+            )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
     return read.with_weights(w_strokes, w_beta)
 
 
 def instance_of(
-    data: bytes, *, size: int, name: str, source: str, mask: Path | None = None, gauge: Gauge = "strokes"
+    data: bytes,
+    *,
+    size: int,
+    name: str,
+    source: str,
+    mask: Path | None = None,
+    gauge: Gauge = "strokes",
+    choice: Choice = AS_DRAWN,
 ) -> Instance:
     """The instance of a sketch given as the bytes of a file, as read_sketch. Raises InputError."""
-    sketch = _sketch(data, size, Path(source).suffix.lower())
+    sketch = _sketch(data, size, Path(source).suffix.lower(), choice)
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
     else:
         frame, given = _masked(mask, sketch.page, size)
     lines, others = sketch.covers(frame)
+    if choice.silhouette == "outer":
+        lines = _without_outline(lines, others, given, sketch.stroke_width / frame.pixel)
     solve = _solve_mask(lines, others, given)
     weight = np.where(solve, lines.weight, 0.0)
     stroke = weight >= LEAST_WEIGHT
@@ -169,30 +191,32 @@ def bytes_of(path: Path) -> bytes:
     return data
 
 
-def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
+def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
     """The sketch that bytes hold, by content first and suffix second."""
-    curves = curves_in(data, suffix)
+    curves = curves_in(data, suffix, choice)
     if curves is not None:
         return _of_curves(curves)
     picture = read_picture(data, size)
-    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
+    page = (0.0, 0.0, picture.width, picture.height)
+    return _Sketch(picture.box, page, picture.covers, picture.stroke_width * picture.reduced)
 
 
-def curves_in(data: bytes, suffix: str) -> Curves | None:
+def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
     """The curves of a vector sketch, None for a picture. Raises InputError.
 
-    suffix: of the file, for content that does not tell.
+    suffix: of the file, for content that does not tell. choice: of curvature lines.
     """
     start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
-    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return read_svg(data)
     drawn = _PICTURE.match(data) is None
+    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return read_svg(data, choice.chooser)
     if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
-        return read_scap(data)
+        return read_scap(data, choice.chooser)
     if suffix == ".svg" and drawn:
-        return read_svg(data)
+        return read_svg(data, choice.chooser)
+    choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
     return None
 
 
@@ -207,9 +231,7 @@ def _of_curves(curves: Curves) -> _Sketch:
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
     """Segments (m, 2, 2), the number (m,) of each one's curve, and which (m,) are curvature lines."""
     segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
-    mixed = curves.red.any() and not curves.red.all()
-    line = curves.red[owner] if mixed else np.ones(len(owner), dtype=bool)
-    return segments, curves.curve[owner], line
+    return segments, curves.curve[owner], curves.line[owner]
 
 
 def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
@@ -250,16 +272,35 @@ def _mask_on_grid(
     return frame, share >= 0.5 - 1e-6
 
 
+def _without_outline(lines: Cover, others: Cover, given: Bools | None, width: float) -> Cover:
+    """The curvature lines without directions where they run along the outline; InputError if none is left.
+
+    given: the mask, if there is one; its border then is the outline. width: of a stroke, in pixels.
+    """
+    inside = inside_outline(_walls(lines, others)) if given is None else given
+    along = along_outline(inside, lines.direction, width)
+    left = replace(lines, direction=np.where(along[..., None], 0.0, lines.direction))
+    if (lines.weight >= LEAST_WEIGHT).any() and not (left.weight >= LEAST_WEIGHT).any():
+        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
+    return left
+
+
+def _walls(lines: Cover, others: Cover) -> Bools:
+    """The pixels that strokes bound the field by. Raises InputError when there is none."""
+    walls = (lines.amount >= LEAST_WEIGHT) | (others.amount >= CUT)
+    if not walls.any():
+        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
+    return walls
+
+
 def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
     """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
     cut = others.amount >= CUT
     if given is not None:
         return given & ~cut
-    walls = (lines.amount >= LEAST_WEIGHT) | cut
-    if not walls.any():
-        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
     solve = parts_with(
-        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
+        inside_outline(_walls(lines, others)) & ~cut,
+        np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0),
     )
     if not solve.any():
         raise InputError(

@@ -8,7 +8,8 @@ from typing import Final, Literal
 
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
-from .read import DEFAULT_SIZE, check_size, instance_of
+from .choice import Choice, Silhouette
+from .read import AS_DRAWN, DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
 Kind = Literal["sketch", "analytic"]
@@ -68,19 +69,23 @@ def sample(
     *,
     w_strokes: float | None = None,
     w_beta: float | None = None,
+    silhouette: Silhouette = "none",
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
     name: of one in `samples()`; size: 1..4096; gauge, w_strokes, w_beta: as in Instance, its weights where
-    None. For the exact answer of an analytic one see `analytic`. Raises InputError for an unknown name or
-    size, InstanceError for a weight that cannot be.
+    None; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an analytic one see
+    `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight that cannot be.
     """
     check_size(size)
+    choice = Choice(silhouette)
     if _known(name).kind == "analytic":
+        if choice != AS_DRAWN:
+            raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
         found = analytic(name, size, gauge).instance
     else:
         svg = sample_svg(name).encode()
-        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge)
+        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge, choice=choice)
     return found.with_weights(w_strokes, w_beta)
 
 

@@ -16,18 +16,20 @@ import numpy as np
 
 from ..errors import InputError
 from ..input_limits import LEAST_LENGTH, MAX_LINES
-from ..instance.grid import Floats, Ints
+from ..instance.grid import Bools, Floats, Ints
+from .choice import Chooser
 from .curves import Curves, lines_as_cubics
 
 _GREATEST: Final = 1e9
 
 
-def read_scap(data: bytes) -> Curves:
-    """The strokes of a .scap file. Raises InputError with the number of the line that breaks the layout."""
-    if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
-        raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
-    text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
-    lines = re.split(r"\r\n?|\n", text)
+def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
+    """The strokes of a .scap file.
+
+    chooser: looks for the clusters of curvature lines, cluster=NAME; None: all strokes are. Raises InputError
+    with the number of the line that breaks the layout, and for clusters that are not there.
+    """
+    lines = lines_of(data)
     canvas = _canvas(lines[0] if lines else "")
     strokes: list[list[tuple[float, float]]] = []
     clusters: list[str] = []
@@ -52,24 +54,63 @@ def read_scap(data: bytes) -> Curves:
                 raise InputError(
                     f"line {number}: a sample stands outside of any stroke; put it between {{ and }}"
                 )
-            samples.append(_sample(line, number))
+            x, y = numbers_in(line, number, "x y pressure", 2)
+            samples.append((x, y))
     if opened:
         raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
-    return _curves(strokes, clusters, canvas)
+    return _curves(strokes, clusters, canvas, chooser)
+
+
+def lines_of(data: bytes) -> list[str]:
+    """The lines of a text of strokes. Raises InputError when there are more than MAX_LINES."""
+    if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
+        raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
+    text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
+    return re.split(r"\r\n?|\n", text)
+
+
+def numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
+    """The first `count` coordinates in a line, whose number and layout an InputError names."""
+    fields = line.split(maxsplit=count)[:count]
+    try:
+        found = [float(field) for field in fields]
+    except ValueError:
+        found = []
+    if len(found) < count:
+        raise InputError(f"line {number}: expected {layout!r}, found {line[:30]!r}")
+    if not all(abs(each) <= _GREATEST for each in found):
+        raise InputError(f"line {number}: a coordinate is not a finite number below {_GREATEST:g}")
+    return found
+
+
+def polylines(
+    strokes: list[Floats], curve: Ints, canvas: tuple[float, float, float, float], taken: Bools | None = None
+) -> Curves:
+    """The curves of pen strokes, each of two or more samples (n, 2).
+
+    curve: int (s,), the number of each stroke's curve; taken: bool (s,), which were chosen, None: none.
+    """
+    count = [len(stroke) - 1 for stroke in strokes]
+    points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
+    chosen = None if taken is None else np.repeat(taken, count)
+    return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), canvas, chosen)
 
 
 def _curves(
     strokes: list[list[tuple[float, float]]],
     clusters: list[str],
     canvas: tuple[float, float, float, float],
+    chooser: Chooser | None,
 ) -> Curves:
     drawn = [number for number, stroke in enumerate(strokes) if len(stroke) > 1]
-    paths: list[Floats] = [np.array(strokes[number]) for number in drawn]
-    if not paths:
+    if not drawn:
         raise InputError("holds no stroke of two or more samples")
-    curve = np.repeat(_numbers([clusters[number] for number in drawn]), [len(path) - 1 for path in paths])
-    points = np.concatenate([lines_as_cubics(path[:-1], path[1:]) for path in paths])
-    return Curves(points, curve, np.zeros(len(points), dtype=bool), canvas)
+    names = [clusters[number] for number in drawn]
+    taken = None
+    if chooser is not None:
+        taken = np.array([chooser.takes([f"cluster={name}"] if " " not in name else []) for name in names])
+        chooser.check(taken=bool(taken.any()))
+    return polylines([np.array(strokes[number]) for number in drawn], _numbers(names), canvas, taken)
 
 
 def _cluster(line: str, stroke: int) -> str:
@@ -98,14 +139,3 @@ def _canvas(line: str) -> tuple[float, float, float, float]:
             f"{_GREATEST:g}"
         )
     return 0.0, 0.0, width, height
-
-
-def _sample(line: str, number: int) -> tuple[float, float]:
-    fields = line.split(maxsplit=2)
-    try:
-        x, y = (float(field) for field in fields[:2])
-    except ValueError as error:
-        raise InputError(f"line {number}: expected 'x y pressure', found {line[:30]!r}") from error
-    if not (abs(x) <= _GREATEST and abs(y) <= _GREATEST):
-        raise InputError(f"line {number}: a coordinate is not a finite number below {_GREATEST:g}")
-    return x, y
