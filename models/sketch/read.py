@@ -1,4 +1,4 @@
-"""From a sketch to an instance: SVG, bitmap or .scap, with or without a mask.
+"""From a sketch to an instance: SVG, bitmap, .scap or .curves, with or without a mask.
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
 field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
@@ -26,6 +26,7 @@ from .bitmap import read_picture, read_white
 from .choice import Choice, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
+from .curves_file import START, read_curves
 from .outline import along_outline, inside_outline, parts_with
 from .scap import read_scap
 from .svg import read_svg
@@ -73,8 +74,9 @@ def read_sketch(
     w_beta: float | None = None,
     silhouette: Silhouette = "none",
     curvature: Iterable[str] = (),
+    view: str | None = None,
 ) -> Instance:
-    """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
+    """The instance of a sketch: an SVG drawing, a bitmap, a .scap or .curves file, told apart by content.
 
     size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
     of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
@@ -86,7 +88,7 @@ def read_sketch(
     weights of the stroke and the skew term, as in Instance; None: those of an Instance without any.
     silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
     (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
-    colour=, class=, id=, layer= (SVG), cluster= (.scap).
+    colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
@@ -95,7 +97,7 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
-    choice = Choice(silhouette, tuple(curvature))
+    choice = Choice(silhouette, tuple(curvature), view)
     with_mask = None if mask is None else Path(mask)
     data = bytes_of(path)
     try:
@@ -184,7 +186,7 @@ def check_size(size: int) -> None:
 def bytes_of(path: Path) -> bytes:
     """The content of a regular file of bearable length, at least one byte."""
     if path.exists() and not path.is_file():
-        raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
+        raise InputError("is not a file; give a sketch as SVG, picture, .scap or .curves", file=path)
     data = read_bytes(path, MAX_BYTES, "simplify the sketch")
     if not data:
         raise InputError("is empty; save the sketch again", file=path)
@@ -204,12 +206,16 @@ def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
 def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
     """The curves of a vector sketch, None for a picture. Raises InputError.
 
-    suffix: of the file, for content that does not tell. choice: of curvature lines.
+    suffix: of the file, for content that does not tell. choice: of curvature lines and of the view.
     """
     start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     drawn = _PICTURE.match(data) is None
+    if START.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
+        choice.refuse_labels("is a .curves file, whose strokes have no labels")
+        return read_curves(data, choice.view)
+    choice.refuse_view()
     if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return read_svg(data, choice.chooser)
     if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
