@@ -18,10 +18,11 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import known, load, options_of
+from .inputs import choice_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
+    Curvature,
     Facet,
     Folder,
     Formats,
@@ -33,6 +34,7 @@ from .options import (
     Mask,
     Names,
     NlForm,
+    Outline,
     Output,
     Quiet,
     Relax,
@@ -43,6 +45,7 @@ from .options import (
     StrokeNorm,
     StrokeWeight,
     Threads,
+    View,
     What,
 )
 from .output import (
@@ -103,6 +106,9 @@ def run_command(
     *,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -127,7 +133,15 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        instance = load(
+            sketch,
+            size,
+            mask,
+            gauge,
+            w_strokes=w_strokes,
+            w_beta=w_beta,
+            choice=choice_of(silhouette, curvature, view),
+        )
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -155,6 +169,9 @@ def instance_command(
     *,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -166,7 +183,15 @@ def instance_command(
     _require_suffix(output, (".json", ".npz"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        instance = load(
+            sketch,
+            size,
+            mask,
+            gauge,
+            w_strokes=w_strokes,
+            w_beta=w_beta,
+            choice=choice_of(silhouette, curvature, view),
+        )
         write_instance(instance, output)
     if not quiet:
         say(f"{output}: {instance.summary}")
@@ -181,6 +206,9 @@ def export_command(
     file_format: Formats = None,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -223,7 +251,15 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        loaded = load(
+            instance,
+            size,
+            mask,
+            gauge,
+            w_strokes=w_strokes,
+            w_beta=w_beta,
+            choice=choice_of(silhouette, curvature, view),
+        )
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

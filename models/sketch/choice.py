@@ -57,6 +57,10 @@ class Choice:
             raise InputError("is flat: only a .curves file can be seen from elsewhere; leave the view out")
 
 
+AS_DRAWN: Final = Choice()
+"""All that is drawn in red, or in the only colour there is."""
+
+
 @dataclass(eq=False)
 class Chooser:
     """A look-out for labels while a drawing is read.

@@ -23,7 +23,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
-from .choice import Choice, Silhouette
+from .choice import AS_DRAWN, Choice, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .curves_file import START, read_curves
@@ -31,7 +31,6 @@ from .outline import along_outline, inside_outline, parts_with
 from .scap import read_scap
 from .svg import read_svg
 
-AS_DRAWN: Final = Choice()
 DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000

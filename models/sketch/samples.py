@@ -8,8 +8,8 @@ from typing import Final, Literal
 
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
-from .choice import Choice, Silhouette
-from .read import AS_DRAWN, DEFAULT_SIZE, check_size, instance_of
+from .choice import AS_DRAWN, Choice, Silhouette
+from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
 Kind = Literal["sketch", "analytic"]

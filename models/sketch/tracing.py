@@ -21,10 +21,10 @@ from ..instance.angles import line_difference
 from ..instance.elementary import arctangent
 from ..instance.grid import Ints
 from ..instance.instance import Instance
-from .choice import Choice
+from .choice import AS_DRAWN, Choice
 from .cover import Frame, Indices, covering_curves
 from .curves import Curves
-from .read import AS_DRAWN, LEAST_WEIGHT, bytes_of, curves_in, segments_of
+from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
 from .samples import SAMPLES, sample_svg
 
 REACH: Final = 2

@@ -1,11 +1,13 @@
 """What in a drawing is a curvature line: strokes chosen by label, and silhouettes that are none."""
 
 import io
+import json
 
 import crossfield as cf
 import numpy as np
 import places
 import pytest
+from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.choice import Choice, label_of
@@ -257,3 +259,24 @@ def test_a_cluster_of_a_shared_sketch_can_be_chosen():
     file = places.SHARED / "sketches" / "strokestrip_mouse7c_SA_cluster.scap"
     chosen = cf.read_sketch(file, size=32, curvature=["cluster=1", "cluster=2", "cluster=4"])
     assert len(chosen.theta) < len(cf.read_sketch(file, size=32).theta)
+
+
+def test_commands_read_what_python_reads(tmp_path, capsys):
+    file, instance = str(tmp_path / "a.svg"), str(tmp_path / "a.json")
+    (tmp_path / "a.svg").write_bytes(lines('class="flow"'))
+    options = ["--curvature", "class=flow", "--curvature", "id=a", "--silhouette", "outer"]
+    assert invoke(["instance", file, *options, "-o", instance]) == 1
+    assert "has no stroke of id=a; it has colour=#000000" in capsys.readouterr().err
+    options = ["--curvature", "class=flow", "--silhouette", "outer"]
+    assert invoke(["instance", file, *options, "--size", "20", "-o", instance, "-q"]) == 0
+    expected = cf.read_sketch(file, size=20, curvature=["class=flow"], silhouette="outer")
+    assert cf.read_instance(instance).sha256 == expected.sha256
+    assert invoke(["evaluate", file, *options, "--size", "20", "-m", "polyvector", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["curves_of"] == "sketch"
+    assert [curve["curve"] for curve in found["curves"]] == [1, 2]
+    for wrong in (options, ["--view", "top"]):
+        for what, reason in ((instance, "has its own curvature lines"), ("ring", "leave --curvature and")):
+            assert invoke(["instance", what, *wrong, "-o", str(tmp_path / "b.json")]) == 1
+            assert reason in capsys.readouterr().err
+    assert not (tmp_path / "b.json").exists()
