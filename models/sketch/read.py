@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -26,9 +26,8 @@ from .bitmap import read_picture, read_white
 from .choice import AS_DRAWN, Choice, Silhouette
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .curves_file import START, read_curves
 from .outline import along_outline, inside_outline, parts_with
-from .scap import read_scap
+from .pen_strokes import SPATIAL, read_curves, read_scap
 from .svg import read_svg
 
 DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
@@ -127,10 +126,12 @@ def instance_of(
     else:
         frame, given = _masked(mask, sketch.page, size)
     lines, others = sketch.covers(frame)
-    if choice.silhouette == "outer":
-        lines = _without_outline(lines, others, given, sketch.stroke_width / frame.pixel)
     solve = _solve_mask(lines, others, given)
     weight = np.where(solve, lines.weight, 0.0)
+    if choice.silhouette == "outer":
+        region = solve | (others.amount >= CUT) if given is None else given
+        weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
+        solve = _with_lines(solve, weight) if given is None else solve
     stroke = weight >= LEAST_WEIGHT
     if not stroke.any():
         raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
@@ -211,7 +212,7 @@ def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | N
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     drawn = _PICTURE.match(data) is None
-    if START.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
+    if SPATIAL.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
         choice.refuse_labels("is a .curves file, whose strokes have no labels")
         return read_curves(data, choice.view)
     choice.refuse_view()
@@ -277,38 +278,27 @@ def _mask_on_grid(
     return frame, share >= 0.5 - 1e-6
 
 
-def _without_outline(lines: Cover, others: Cover, given: Bools | None, width: float) -> Cover:
-    """The curvature lines without directions where they run along the outline; InputError if none is left.
-
-    given: the mask, if there is one; its border then is the outline. width: of a stroke, in pixels.
-    """
-    inside = inside_outline(_walls(lines, others)) if given is None else given
-    along = along_outline(inside, lines.direction, width)
-    left = replace(lines, direction=np.where(along[..., None], 0.0, lines.direction))
-    if (lines.weight >= LEAST_WEIGHT).any() and not (left.weight >= LEAST_WEIGHT).any():
-        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
-    return left
-
-
-def _walls(lines: Cover, others: Cover) -> Bools:
-    """The pixels that strokes bound the field by. Raises InputError when there is none."""
-    walls = (lines.amount >= LEAST_WEIGHT) | (others.amount >= CUT)
-    if not walls.any():
-        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
-    return walls
-
-
 def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
     """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
     cut = others.amount >= CUT
     if given is not None:
         return given & ~cut
+    walls = (lines.amount >= LEAST_WEIGHT) | cut
+    if not walls.any():
+        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
     solve = parts_with(
-        inside_outline(_walls(lines, others)) & ~cut,
-        np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0),
+        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
     )
     if not solve.any():
         raise InputError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
     return solve
+
+
+def _with_lines(solve: Bools, weight: Floats) -> Bools:
+    """The parts of a mask that have curvature lines besides their outline. Raises InputError without any."""
+    held = np.where(weight >= LEAST_WEIGHT, weight, 0.0)
+    if not held.any():
+        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
+    return parts_with(solve, held)

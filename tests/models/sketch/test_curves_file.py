@@ -8,7 +8,7 @@ from crossfield.models import input_limits
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.sketch.choice import Choice
 from crossfield.models.sketch.curves import bounding_box
-from crossfield.models.sketch.curves_file import axes_of, read_curves
+from crossfield.models.sketch.pen_strokes import axes_of, read_curves
 from crossfield.models.sketch.read import curves_in, instance_of
 from crossfield.models.sketch.tracing import curves_of
 from hypothesis import given, settings
