@@ -131,8 +131,8 @@ def instance_of(
     if choice.silhouette == "outer":
         region = solve | (others.amount >= CUT) if given is None else given
         weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
-        solve = _with_lines(solve, weight) if given is None else solve
-    stroke = weight >= LEAST_WEIGHT
+        solve = _left(solve, weight) if given is None else solve
+    stroke = solve & (weight >= LEAST_WEIGHT)
     if not stroke.any():
         raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
     return Instance(
@@ -296,7 +296,7 @@ def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
     return solve
 
 
-def _with_lines(solve: Bools, weight: Floats) -> Bools:
+def _left(solve: Bools, weight: Floats) -> Bools:
     """The parts of a mask that have curvature lines besides their outline. Raises InputError without any."""
     held = np.where(weight >= LEAST_WEIGHT, weight, 0.0)
     if not held.any():

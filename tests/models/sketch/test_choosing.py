@@ -204,6 +204,14 @@ def test_an_open_drawing_has_no_silhouette():
     assert read(svg(strokes), silhouette="outer").sha256 == read(svg(strokes)).sha256
 
 
+def test_a_part_that_has_nothing_but_its_outline_is_left_out():
+    two = f'{CIRCLE}<g fill="none" stroke="black"><circle cx="120" cy="50" r="20"/><path d="M119 50h2"/></g>'
+    whole, inner = read(svg(two), 60), read(svg(two), 60, silhouette="outer")
+    assert whole.grid.parts == 2
+    assert inner.grid.parts == 1
+    assert radius(inner).max() < 32
+
+
 def test_the_border_of_a_given_mask_is_the_outline(tmp_path):
     file, mask = tmp_path / "a.svg", tmp_path / "mask.png"
     file.write_bytes(svg('<g fill="none" stroke="black"><path d="M10 30H90M10 50H90M10 70H90"/></g>'))
