@@ -133,15 +133,8 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -183,15 +176,8 @@ def instance_command(
     _require_suffix(output, (".json", ".npz"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         write_instance(instance, output)
     if not quiet:
         say(f"{output}: {instance.summary}")
@@ -251,15 +237,8 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(
-            instance,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

@@ -80,15 +80,8 @@ def evaluate_command(
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         found = evaluate(
             instance,
             sketch=sketch,

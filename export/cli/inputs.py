@@ -18,10 +18,10 @@ def load(
     size: int | None,
     mask: Path | None,
     gauge: Gauge | None,
+    choice: Choice = AS_DRAWN,
     *,
     w_strokes: float | None = None,
     w_beta: float | None = None,
-    choice: Choice = AS_DRAWN,
 ) -> Instance:
     """The instance, of a size that can be written, under the weights that are given, a file's too.
 

@@ -103,15 +103,8 @@ def prove_command(
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(
-            instance,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

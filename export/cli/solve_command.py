@@ -99,15 +99,8 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(
-            instance,
-            size,
-            mask,
-            gauge,
-            w_strokes=w_strokes,
-            w_beta=w_beta,
-            choice=choice_of(silhouette, curvature, view),
-        )
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         request = Request(
             loaded,
             output,
