@@ -134,7 +134,7 @@ def picture(root: Path) -> str:
         *bars(root),
         *(box(root, folder) for folder in PLACES),
         *(arrow(*step) for step in FLOW),
-        outside("a sketch: SVG, bitmap, .scap", 270, down=True),
+        outside("a sketch: SVG, bitmap, .scap, .curves", 270, down=True),
         outside("pictures, report", 662, down=False),
         "</svg>",
     ]

@@ -18,10 +18,11 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import drawing_of, known, load, options_of
+from .inputs import choice_of, drawing_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
+    Curvature,
     Facet,
     Folder,
     Formats,
@@ -33,6 +34,7 @@ from .options import (
     Mask,
     Names,
     NlForm,
+    Outline,
     Output,
     Quiet,
     Relax,
@@ -43,6 +45,7 @@ from .options import (
     StrokeNorm,
     StrokeWeight,
     Threads,
+    View,
     What,
 )
 from .output import (
@@ -103,6 +106,9 @@ def run_command(
     *,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -127,7 +133,8 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -156,6 +163,9 @@ def instance_command(
     *,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -167,7 +177,8 @@ def instance_command(
     _require_suffix(output, (".json", ".npz"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         write_instance(instance, output)
     if not quiet:
         say(f"{output}: {instance.summary}")
@@ -182,6 +193,9 @@ def export_command(
     file_format: Formats = None,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -224,7 +238,8 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

@@ -8,8 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .inputs import known, load
-from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, StrokeWeight, What
+from .inputs import choice_of, known, load
+from .options import (
+    Curvature,
+    GaugeName,
+    Json,
+    Mask,
+    Outline,
+    Quiet,
+    Size,
+    SkewWeight,
+    StrokeWeight,
+    View,
+    What,
+)
 from .output import complain, progress, say, say_json, show_table
 
 if TYPE_CHECKING:
@@ -38,6 +50,9 @@ def evaluate_command(
     ] = 8,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -65,10 +80,13 @@ def evaluate_command(
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         found = evaluate(
             instance,
             sketch=sketch,
+            curvature=curvature or (),
+            view=view,
             methods=methods,
             curves=curves,
             limits=Limits(time_limit),

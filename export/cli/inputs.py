@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...models.errors import InputError
+from ...models.sketch.choice import AS_DRAWN, Choice, Silhouette
 
 if TYPE_CHECKING:
     from ...models.instance.instance import Gauge, Instance
@@ -17,6 +18,7 @@ def load(
     size: int | None,
     mask: Path | None,
     gauge: Gauge | None,
+    choice: Choice = AS_DRAWN,
     *,
     w_strokes: float | None = None,
     w_beta: float | None = None,
@@ -29,12 +31,17 @@ def load(
 
     from ...models.sketch.read import available_memory, check_memory
 
-    instance = _found(what, size, mask, gauge).with_weights(w_strokes, w_beta)
+    instance = _found(what, size, mask, gauge, choice).with_weights(w_strokes, w_beta)
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())
     return instance
 
 
-def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) -> Instance:
+def choice_of(silhouette: Silhouette, curvature: list[str] | None, view: str | None) -> Choice:
+    """What of a drawing is a curvature line, as the user says it. Raises InputError."""
+    return Choice(silhouette, tuple(curvature or ()), view)
+
+
+def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, choice: Choice) -> Instance:
     """The instance of an instance file, a sketch file or a built-in sample, in this order."""
     from ...models.instance.file import read_instance
     from ...models.sketch.read import DEFAULT_SIZE, read_sketch
@@ -45,16 +52,34 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None) 
     if not path.is_file() and what in SAMPLES:
         if mask is not None:
             raise InputError(f"the sample {what} has its own mask; leave --mask out")
-        return sample(what, pixels, gauge or "strokes")
+        if choice.curvature or choice.view:
+            raise InputError(
+                f"the sample {what} has its own curvature lines; leave --curvature and --view out"
+            )
+        return sample(what, pixels, gauge or "strokes", silhouette=choice.silhouette)
     if not path.exists():
         raise InputError(
             "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
         )
     if path.suffix.lower() not in {".json", ".npz"}:
-        return read_sketch(path, size=pixels, mask=mask, gauge=gauge or "strokes")
+        return read_sketch(
+            path,
+            size=pixels,
+            mask=mask,
+            gauge=gauge or "strokes",
+            silhouette=choice.silhouette,
+            curvature=choice.curvature,
+            view=choice.view,
+        )
     if size is not None or mask is not None:
         raise InputError(
             "is an instance, which has its own grid and mask; leave --size and --mask out", file=what
+        )
+    if choice != AS_DRAWN:
+        raise InputError(
+            "is an instance, which has its own curvature lines; "
+            "leave --silhouette, --curvature and --view out",
+            file=what,
         )
     instance = read_instance(path)
     return instance if gauge is None else instance.with_gauge(gauge)

@@ -31,7 +31,8 @@ What = Annotated[
     str,
     typer.Argument(
         metavar="SKETCH|SAMPLE|INSTANCE",
-        help="A drawing (SVG, .scap) or bitmap; a built-in sample: {samples}; or a file of `instance`.",
+        help="A drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or a file of"
+        " `instance`.",
     ),
 ]
 Folder = Annotated[
@@ -48,6 +49,32 @@ Mask = Annotated[
     Path | None,
     typer.Option(
         "--mask", metavar="FILE", help="Picture as large as the sketch, white where the field is wanted."
+    ),
+]
+Outline = Annotated[
+    Literal["none", "outer"],
+    typer.Option(
+        "--silhouette",
+        help="What runs along the outline of the drawing carries no direction (outer), or all curvature lines"
+        " do (none).",
+    ),
+]
+Curvature = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--curvature",
+        metavar="LABEL",
+        help="Strokes that are curvature lines, such as colour=red, class=flow, id=group2, layer=Flow (SVG)"
+        " or cluster=3 (.scap); the others cut the field. May be repeated; red ones among others by default.",
+    ),
+]
+View = Annotated[
+    str | None,
+    typer.Option(
+        "--view",
+        metavar="VIEW",
+        help="From where a .curves file is seen: front, side, top, or azimuth and elevation in degrees as in"
+        " 30,25; by default where the strokes reach farthest.",
     ),
 ]
 GaugeName = Annotated[

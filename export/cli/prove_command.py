@@ -8,8 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from .inputs import load
-from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, Start, StrokeWeight
+from .inputs import choice_of, load
+from .options import (
+    Curvature,
+    GaugeName,
+    Json,
+    Mask,
+    Outline,
+    Quiet,
+    Size,
+    SkewWeight,
+    Start,
+    StrokeWeight,
+    View,
+)
 from .output import complain, progress, say, say_json, show_facts
 
 if TYPE_CHECKING:
@@ -23,7 +35,8 @@ def prove_command(
         str | None,
         typer.Argument(
             metavar="[SKETCH|SAMPLE|INSTANCE]",
-            help="A drawing (SVG, .scap) or bitmap; a built-in sample: {samples}; or a file of `instance`.",
+            help="A drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or a file of"
+            " `instance`.",
         ),
     ] = None,
     output: Annotated[
@@ -42,6 +55,9 @@ def prove_command(
     ] = 2,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -87,7 +103,8 @@ def prove_command(
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

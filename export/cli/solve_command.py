@@ -9,15 +9,17 @@ import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
-from .inputs import known, load, options_of
+from .inputs import choice_of, known, load, options_of
 from .options import (
     BetaNorm,
+    Curvature,
     Facet,
     Folder,
     Gap,
     GaugeName,
     Json,
     Mask,
+    Outline,
     Quiet,
     Relax,
     SecondsInAll,
@@ -27,6 +29,7 @@ from .options import (
     StrokeNorm,
     StrokeWeight,
     Threads,
+    View,
     What,
 )
 from .output import complain, progress, say, say_json, show_facts, show_solution
@@ -64,6 +67,9 @@ def solve_command(
     ] = None,
     size: Size = None,
     mask: Mask = None,
+    silhouette: Outline = "none",
+    curvature: Curvature = None,
+    view: View = None,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -93,7 +99,8 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
         request = Request(
             loaded,
             output,

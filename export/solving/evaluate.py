@@ -15,6 +15,7 @@ from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_c
 from ...models.instance.instance import Instance
 from ...models.processes.interruption import interruptible
 from ...models.processes.progress import Progress, silent
+from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
 from .job import Limits
@@ -101,6 +102,8 @@ def evaluate(
     curves: int = CURVES,
     limits: Limits | None = None,
     progress: Progress = silent,
+    curvature: Iterable[str] = (),
+    view: str | None = None,
 ) -> Evaluation:
     """How far the fields of methods are from curves that they were not shown.
 
@@ -110,22 +113,23 @@ def evaluate(
 
     sketch: the file that the instance was read from, or the name of its sample, for what is a curve there;
     without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
-    methods. limits: of each field, 5 seconds by default. Ctrl-C ends it with the curves done so far, or,
-    before there is one, as KeyboardInterrupt. Raises InputError for unknown methods, and when no curve can be
-    hidden.
+    methods. limits: of each field, 5 seconds by default. curvature, view: those with which the sketch was
+    read. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
+    Raises InputError for unknown methods, and when no curve can be hidden.
     """
     methods, limits = tuple(dict.fromkeys(methods)), limits or Limits(SECONDS)
     for name in methods:
         if name not in METHODS:
             raise InputError(f"there is no method {name!r}; choose one of {', '.join(METHODS)}")
-    hidden = hidden_curves(instance, curves_of(instance, sketch), curves)
+    choice = Choice(curvature=tuple(curvature), view=view)
+    hidden = hidden_curves(instance, curves_of(instance, sketch, choice), curves)
     if not hidden:
         raise InputError(
             f"{instance.name} has no curve of {SHORTEST} pixels or more beside others that could be hidden; "
             "choose a larger size, or a drawing of more curves"
         )
     done, interrupted = _in_turn(hidden, methods, limits, progress)
-    return Evaluation(instance, methods, limits, tuple(done), has_curves(sketch), interrupted)
+    return Evaluation(instance, methods, limits, tuple(done), has_curves(sketch, choice), interrupted)
 
 
 def _in_turn(

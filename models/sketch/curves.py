@@ -23,12 +23,22 @@ class Curves:
     curve: int (k,), number of the curve that each of them is a piece of, from 0 in the order of the file.
     red: bool (k,), True where a stroke is drawn in red.
     canvas: x, y, width and height of the page, or None when the file does not say.
+    chosen: bool (k,), True where a stroke was chosen as a curvature line, or None when nothing was chosen.
     """
 
     points: Floats
     curve: Ints
     red: Bools
     canvas: tuple[float, float, float, float] | None
+    chosen: Bools | None = None
+
+    @property
+    def line(self) -> Bools:
+        """Which (k,) are curvature lines: those chosen, else red ones among others, else all."""
+        if self.chosen is not None:
+            return self.chosen
+        mixed = self.red.any() and not self.red.all()
+        return self.red if mixed else np.ones(len(self.red), dtype=bool)
 
 
 def lines_as_cubics(start: Floats, end: Floats) -> Floats:

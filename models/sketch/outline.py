@@ -6,6 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from ..instance.angles import line_of
+from ..instance.elementary import cosine, sine
 from ..instance.grid import Bools, Floats
 
 GAPS: Final = (0.03, 0.06, 0.12)
@@ -16,6 +18,14 @@ CRUMB: Final = 0.01
 """Least share of a region for a part of its own: a stroke that grazes the outline leaves less."""
 HELD: Final = 2.0
 """Least stroke length, in pixel sides, for a part of its own: a stroke's loose end has less."""
+
+STEP: Final = 3.0
+"""How far a stroke is followed, in pixels, to see whether it runs along the outline."""
+
+THICKER: Final = 1.25
+"""Width of the strokes of a picture that are thicker than most."""
+
+_NUDGE: Final = 1e-9  # of a pixel: what runs at exactly 30 degrees does so on every processor
 
 
 def inside_outline(strokes: Bools) -> Bools:
@@ -49,6 +59,39 @@ def parts_with(region: Bools, weight: Floats) -> Bools:
     kept[0] = False
     parts: Bools = kept[label]
     return parts
+
+
+def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
+    """The pixels [height, width] at the border of a region whose strokes run along it.
+
+    direction: float [height, width, 2], double-angle vectors (y up); width: of a typical stroke, in pixels,
+    some are THICKER. At the border is a pixel from which such a line can reach the outside: a line without
+    width covers two pixels side by side. A stroke runs along the border when, followed by STEP pixels to one
+    side at least, it comes nearer to or goes farther from the outside by half of that at most: 30 degrees. A
+    region without an outside, that of an open drawing, has no border.
+    """
+    from scipy import ndimage
+
+    if region.all():
+        return np.zeros_like(region)
+    pad = int(STEP) + 1
+    padded = np.pad(region, pad)
+    # Half a pixel from the centres of the pixels to the edges between inside and outside.
+    depth = np.where(
+        padded,
+        ndimage.distance_transform_edt(padded) - 0.5,
+        0.5 - ndimage.distance_transform_edt(~padded),
+    )
+    at = np.argwhere(region & (depth[pad:-pad, pad:-pad] <= 1.5 + THICKER * width))
+    theta = line_of(direction[tuple(at.T)])
+    way = STEP * np.stack([-sine(theta), cosine(theta)], axis=1)
+    here = depth[tuple((at + pad).T)]
+    change = [
+        np.abs(ndimage.map_coordinates(depth, (at + pad + side * way).T, order=1) - here) for side in (-1, 1)
+    ]
+    along = np.zeros_like(region)
+    along[tuple(at.T)] = np.minimum(*change) <= STEP / 2 + _NUDGE
+    return along
 
 
 def _enclosed(strokes: Bools, radius: float) -> Bools:

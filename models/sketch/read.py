@@ -1,14 +1,15 @@
-"""From a sketch to an instance: SVG, bitmap or .scap, with or without a mask.
+"""From a sketch to an instance: SVG, bitmap, .scap or .curves, with or without a mask.
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
 field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
+A Choice says otherwise.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -23,10 +24,11 @@ from ..instance.instance import Gauge, Instance
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
+from .choice import AS_DRAWN, Choice, Silhouette
 from .cover import Cover, Frame, Meetings, block_means, cover_by_segments, fit_frame, meeting_curves
 from .curves import Curves, bounding_box, flatten
-from .outline import inside_outline, parts_with
-from .scap import read_scap
+from .outline import along_outline, inside_outline, parts_with
+from .pen_strokes import SPATIAL, read_curves, read_scap
 from .svg import read_svg
 
 DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
@@ -52,12 +54,14 @@ class _Sketch:
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
     covers: the cover of a frame by curvature lines and by other strokes. meetings: where on it curvature
     lines meet, None for a picture, which does not say.
+    stroke_width: as drawn in a picture, 0 for the lines without width of a vector sketch.
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
     meetings: Callable[[Frame], Meetings] | None = None
+    stroke_width: float = 0.0
 
 
 def read_sketch(
@@ -70,8 +74,11 @@ def read_sketch(
     w_strokes: float = STROKE_WEIGHT,
     w_beta: float = SKEW_WEIGHT,
     crossings: bool = False,
+    silhouette: Silhouette = "none",
+    curvature: Iterable[str] = (),
+    view: str | None = None,
 ) -> Instance:
-    """The instance of a sketch: an SVG drawing, a bitmap or a .scap file, told apart by content.
+    """The instance of a sketch: an SVG drawing, a bitmap, a .scap or .curves file, told apart by content.
 
     size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
     of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
@@ -84,6 +91,9 @@ def read_sketch(
     their defaults are 20 and 1e-6 (docs/weights.md).
     crossings: of a vector sketch, whether pixels in which exactly two of its curves meet at 30 degrees or
     more get both directions, as `Instance.crossings`; no proof knows these.
+    silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
+    (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
+    colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
     length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
@@ -92,13 +102,21 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
+    choice = Choice(silhouette, tuple(curvature), view)
     with_mask = None if mask is None else Path(mask)
     data = bytes_of(path)
     try:
         with naming(path):
             name = name or name_from(path.stem)
             read = instance_of(
-                data, size=size, mask=with_mask, gauge=gauge, name=name, source=path.name, crossings=crossings
+                data,
+                size=size,
+                mask=with_mask,
+                gauge=gauge,
+                name=name,
+                source=path.name,
+                choice=choice,
+                crossings=crossings,
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
@@ -113,10 +131,11 @@ def instance_of(
     source: str,
     mask: Path | None = None,
     gauge: Gauge = "strokes",
+    choice: Choice = AS_DRAWN,
     crossings: bool = False,
 ) -> Instance:
     """The instance of a sketch, given as a file's bytes, under the default weights. Raises InputError."""
-    sketch = _sketch(data, size, Path(source).suffix.lower())
+    sketch = _sketch(data, size, Path(source).suffix.lower(), choice)
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
     else:
@@ -127,7 +146,12 @@ def instance_of(
     met = sketch.meetings(frame).inside(solve) if crossings and sketch.meetings else None
     if met is not None:
         weight[met.row, met.column] = met.weight[:, 0]
-    stroke = weight >= LEAST_WEIGHT
+    if choice.silhouette == "outer":
+        region = solve | (others.amount >= CUT) if given is None else given
+        weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
+        solve = _left(solve, weight) if given is None else solve
+    stroke = solve & (weight >= LEAST_WEIGHT)
+    met = met and met.inside(stroke)
     if not stroke.any():
         raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
     read = Instance(
@@ -193,37 +217,44 @@ def check_size(size: int) -> None:
 def bytes_of(path: Path) -> bytes:
     """The content of a regular file of bearable length, at least one byte."""
     if path.exists() and not path.is_file():
-        raise InputError("is not a file; give a sketch as SVG, picture or .scap", file=path)
+        raise InputError("is not a file; give a sketch as SVG, picture, .scap or .curves", file=path)
     data = read_bytes(path, MAX_BYTES, "simplify the sketch")
     if not data:
         raise InputError("is empty; save the sketch again", file=path)
     return data
 
 
-def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
+def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
     """The sketch that bytes hold, by content first and suffix second."""
-    curves = curves_in(data, suffix)
+    curves = curves_in(data, suffix, choice)
     if curves is not None:
         return _of_curves(curves)
     picture = read_picture(data, size)
-    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
+    page = (0.0, 0.0, picture.width, picture.height)
+    width = picture.stroke_width * picture.reduced
+    return _Sketch(picture.box, page, picture.covers, stroke_width=width)
 
 
-def curves_in(data: bytes, suffix: str) -> Curves | None:
+def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
     """The curves of a vector sketch, None for a picture. Raises InputError.
 
-    suffix: of the file, for content that does not tell.
+    suffix: of the file, for content that does not tell. choice: of curvature lines and of the view.
     """
     start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
-    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return read_svg(data)
     drawn = _PICTURE.match(data) is None
+    if SPATIAL.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
+        choice.refuse_labels("is a .curves file, whose strokes have no labels")
+        return read_curves(data, choice.view)
+    choice.refuse_view()
+    if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return read_svg(data, choice.chooser)
     if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
-        return read_scap(data)
+        return read_scap(data, choice.chooser)
     if suffix == ".svg" and drawn:
-        return read_svg(data)
+        return read_svg(data, choice.chooser)
+    choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
     return None
 
 
@@ -242,9 +273,7 @@ def _of_curves(curves: Curves) -> _Sketch:
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
     """Segments (m, 2, 2), the number (m,) of each one's curve, and which (m,) are curvature lines."""
     segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
-    mixed = curves.red.any() and not curves.red.all()
-    line = curves.red[owner] if mixed else np.ones(len(owner), dtype=bool)
-    return segments, curves.curve[owner], line
+    return segments, curves.curve[owner], curves.line[owner]
 
 
 def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) -> Frame:
@@ -301,3 +330,11 @@ def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
     return solve
+
+
+def _left(solve: Bools, weight: Floats) -> Bools:
+    """The parts of a mask that have curvature lines besides their outline. Raises InputError without any."""
+    held = np.where(weight >= LEAST_WEIGHT, weight, 0.0)
+    if not held.any():
+        raise InputError("every stroke runs along the outline; choose the silhouette none, or add strokes")
+    return parts_with(solve, held)

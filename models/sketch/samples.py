@@ -9,6 +9,7 @@ from typing import Final, Literal
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from .choice import AS_DRAWN, Choice, Silhouette
 from .read import DEFAULT_SIZE, check_size, instance_of
 from .surfaces import analytic
 
@@ -69,19 +70,24 @@ def sample(
     *,
     w_strokes: float = STROKE_WEIGHT,
     w_beta: float = SKEW_WEIGHT,
+    silhouette: Silhouette = "none",
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
     name: of one in `samples()`; size: 1..4096; gauge: as in Instance; w_strokes, w_beta: as in
-    `Instance.with_weights`. For the exact answer of an analytic one see `analytic`. Raises InputError for
-    an unknown name or size, InstanceError for a weight that cannot be.
+    `Instance.with_weights`; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an
+    analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight
+    that cannot be.
     """
     check_size(size)
+    choice = Choice(silhouette)
     if _known(name).kind == "analytic":
+        if choice != AS_DRAWN:
+            raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
         found = analytic(name, size, gauge).instance
     else:
         svg = sample_svg(name).encode()
-        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge)
+        found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge, choice=choice)
     return found.with_weights(w_strokes, w_beta)
 
 

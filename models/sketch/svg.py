@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Final
 from xml.etree.ElementTree import Element, ParseError
@@ -36,6 +36,7 @@ from ..input_limits import (
 )
 from ..instance.elementary import turned
 from ..instance.grid import Floats
+from .choice import Chooser, colour_label
 from .colour import is_paper, is_red
 from .curves import Curves, runs
 from .path_data import SHAPES, outline, pixels, too_many_curves
@@ -43,6 +44,7 @@ from .style_sheet import KNOWN, PAINT, StyleSheet, style_properties, style_sheet
 
 _GREATEST: Final = 1e9
 _SVG: Final = "http://www.w3.org/2000/svg"
+_INKSCAPE: Final = "{http://www.inkscape.org/namespaces/inkscape}"
 _HREFS: Final = ("href", "{http://www.w3.org/1999/xlink}href")
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "color": "black"}
@@ -50,19 +52,23 @@ _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "co
 
 @dataclass(frozen=True)
 class _Place:
-    """An element to visit: its inherited style, its transform, and how deep in `use` it is."""
+    """An element to visit: its inherited style, its transform, and how deep in `use` it is.
+
+    chosen: whether it, or what it stands in, has a label that is chosen.
+    """
 
     element: Element
     style: Mapping[str, str]
     matrix: Any
     uses: tuple[str, ...]
+    chosen: bool = False
 
 
-def read_svg(data: bytes) -> Curves:
+def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
     """The strokes of an SVG drawing in the units of its viewBox.
 
-    Raises InputError for malformed or unsafe XML, damaged path data, too many elements, and when nothing is
-    drawn.
+    chooser: looks for the labels of curvature lines; None: colours decide. Raises InputError for malformed or
+    unsafe XML, damaged path data, too many elements, when nothing is drawn, and for labels that nothing has.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
@@ -71,16 +77,20 @@ def read_svg(data: bytes) -> Curves:
         )
     canvas = _canvas(root)
     texts = ("".join(element.itertext()) for element in root.iter() if _tag(element) == "style")
-    walk = _Walk(style_sheet(texts), canvas)
+    walk = _Walk(style_sheet(texts), canvas, chooser)
     shapes = list(walk.shapes(root))
-    if not sum(len(points) for _, points in shapes):
+    if not sum(len(points) for _, points, _ in shapes):
         raise InputError(
             "draws no stroke: no visible path, line or shape was found; export the drawing with its strokes"
         )
-    red = is_red(np.array([_paint(style) for style, _ in shapes]))
-    points = np.concatenate([points for _, points in shapes])
-    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(points) for _, points in shapes])
-    return Curves(points, runs(points, shape), red[shape], canvas)
+    paints, outlines, taken = zip(*shapes, strict=True)
+    red, points = is_red(np.array(paints)), np.concatenate(outlines)
+    shape = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(outline) for outline in outlines])
+    chosen = None
+    if chooser is not None:
+        chosen = np.array(taken)[shape]
+        chooser.check(taken=bool(chosen.any()))
+    return Curves(points, runs(points, shape), red[shape], canvas, chosen)
 
 
 def _parsed(data: bytes) -> Element:
@@ -106,15 +116,19 @@ class _Walk:
 
     sheet: StyleSheet
     canvas: tuple[float, float, float, float] | None
+    chooser: Chooser | None
     own: dict[Element, tuple[Mapping[str, str], Any]] = field(default_factory=dict)
     outlines: dict[Element, Floats] = field(default_factory=dict)
+    taken: dict[Element, bool] = field(default_factory=dict)
     visited: int = 0
     used: int = 0
     characters: int = 0
     curves: int = 0
 
-    def shapes(self, root: Element) -> Iterator[tuple[Mapping[str, str], Floats]]:
-        """Style and control points, in the root's units, of every visible shape in drawing order."""
+    def shapes(self, root: Element) -> Iterator[tuple[tuple[float, float, float], Floats, bool]]:
+        """Of every visible shape in drawing order: colour, control points in the root's units, and whether
+        it is chosen.
+        """
         from svgelements import Matrix
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
@@ -126,10 +140,12 @@ class _Walk:
             if place.style.get("display") == "none" or _number(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES and _painted(place.style):
-                yield place.style, self._placed(place)
+                paint = _paint(place.style)
+                painted = self.chooser is not None and self.chooser.takes([colour_label(paint)])
+                yield paint, self._placed(place), painted or place.chosen
             elif tag in _CONTAINERS:
                 inner = _view(place, element) if element is not root else place.matrix
-                stack += [_Place(child, place.style, inner, place.uses) for child in reversed(element)]
+                stack += [replace(place, element=child, matrix=inner) for child in reversed(element)]
             elif tag == "use":
                 stack += self._used(place, named)
 
@@ -148,7 +164,16 @@ class _Walk:
         inherited = {key: place.style[key] for key in PAINT if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
         matrix = place.matrix if transform is None else transform * place.matrix
-        return _Place(place.element, style, matrix, place.uses)
+        chosen = self._chosen(place.element) or place.chosen
+        return _Place(place.element, style, matrix, place.uses, chosen)
+
+    def _chosen(self, element: Element) -> bool:
+        """Whether an element itself has a label that is chosen; all of its labels are noted."""
+        if self.chooser is None:
+            return False
+        if element not in self.taken:
+            self.taken[element] = self.chooser.takes(_labels(element))
+        return self.taken[element]
 
     def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
         """What a `use` element stands for; nothing when it points into another file or at itself."""
@@ -169,10 +194,11 @@ class _Walk:
             )
         moved = Matrix.translate(_length(element, "x", 0.0), _length(element, "y", 0.0)) * place.matrix
         uses = (*place.uses, link)
+        used = replace(place, matrix=moved, uses=uses)
         if _tag(target) != "symbol":
-            return [_Place(target, place.style, moved, uses)]
-        inner = _view(_Place(element, place.style, moved, uses), target)
-        return [_Place(child, place.style, inner, uses) for child in reversed(target)]
+            return [replace(used, element=target)]
+        inner = _view(used, target)
+        return [replace(used, element=child, matrix=inner) for child in reversed(target)]
 
     def _placed(self, place: _Place) -> Floats:
         """Control points (k, 4, 2) of a shape in the units of the root."""
@@ -205,6 +231,16 @@ class _Walk:
             return outline(_tag(element), element.attrib, (width, height))
         except InputError as error:
             raise InputError(f"{_named(element)}: {error}") from error
+
+
+def _labels(element: Element) -> Iterator[str]:
+    """What strokes in an element can be chosen by: its id, its classes, its name as a layer of Inkscape."""
+    if identifier := element.get("id"):
+        yield f"id={identifier}"
+    for name in element.get("class", "").split():
+        yield f"class={name}"
+    if element.get(_INKSCAPE + "groupmode") == "layer":
+        yield f"layer={element.get(_INKSCAPE + 'label', '').strip()}"
 
 
 def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:

@@ -1,9 +1,9 @@
 """Which curve of a sketch each stroke pixel comes from: known beside the instance, never a part of it.
 
-In a vector sketch a curve is an unbroken run of a path (SVG), or a cluster of strokes (.scap), with the
-shorter ones that redraw it: those that have more than half of their stroke pixels in common with it. A
-picture does not say; there, and where no sketch is at hand, a curve is a chain of stroke pixels that go on in
-each other's direction. A chain ends at a corner, and may end at a crossing.
+In a vector sketch a curve is an unbroken run of a path (SVG), a cluster of strokes (.scap), or a stroke
+(.curves), with the shorter ones that redraw it: those that have more than half of their stroke pixels in
+common with it. A picture does not say; there, and where no sketch is at hand, a curve is a chain of stroke
+pixels that go on in each other's direction. A chain ends at a corner, and may end at a crossing.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ..instance.angles import line_difference, line_of
 from ..instance.elementary import arctangent
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
+from .choice import AS_DRAWN, Choice
 from .cover import Frame, Indices, covering_curves
 from .curves import Curves
 from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
@@ -42,16 +43,16 @@ SEVERAL: Final = -1
 _NONE: Final = -2
 
 
-def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
+def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
     """The number of the one curve of each stroke, int (r,), SEVERAL where more run through its pixel.
 
     Strokes are in the order of `every_stroke`: those of all stroke pixels, then the second ones of crossings.
     There each of two curves has the stroke that its direction is nearer to.
     sketch: the file that the instance was read from, or the name of a sample; None: not at hand. Pictures,
-    computed samples and instance files count as not at hand. Raises InputError for what cannot be read, and
-    for a sketch that has no curve where the instance has a stroke.
+    computed samples and instance files count as not at hand. choice: with which the sketch was read. Raises
+    InputError for what cannot be read, and for a sketch that has no curve where the instance has a stroke.
     """
-    found = None if sketch is None else _drawn(sketch)
+    found = None if sketch is None else _drawn(sketch, choice)
     if found is None:
         return chains(instance)
     x, y = instance.origin
@@ -72,9 +73,9 @@ def curves_of(instance: Instance, sketch: str | Path | None = None) -> Ints:
     return np.concatenate([only, second])
 
 
-def has_curves(sketch: str | Path | None) -> bool:
+def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
     """Whether a sketch is at hand and says what its curves are; else chains are taken for them."""
-    return sketch is not None and _drawn(sketch) is not None
+    return sketch is not None and _drawn(sketch, choice) is not None
 
 
 def _only(owner: Indices, stroke: Indices, theta: Floats, instance: Instance) -> tuple[Ints, Ints]:
@@ -150,13 +151,13 @@ def chains(instance: Instance) -> Ints:
     return numbers
 
 
-def _drawn(sketch: str | Path) -> Curves | None:
+def _drawn(sketch: str | Path, choice: Choice) -> Curves | None:
     """The curves of a vector sketch, in a file or a sample; None of anything else."""
     path = Path(sketch)
     if not path.is_file() and str(sketch) in SAMPLES:
         analytic = SAMPLES[str(sketch)].kind == "analytic"
-        return None if analytic else curves_in(sample_svg(str(sketch)).encode(), ".svg")
+        return None if analytic else curves_in(sample_svg(str(sketch)).encode(), ".svg", choice)
     if path.suffix.lower() in {".json", ".npz"}:
         return None
     with naming(path):
-        return curves_in(bytes_of(path), path.suffix.lower())
+        return curves_in(bytes_of(path), path.suffix.lower(), choice)

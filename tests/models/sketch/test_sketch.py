@@ -14,8 +14,8 @@ from crossfield.models.sketch.bitmap import read_picture
 from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
 from crossfield.models.sketch.curves import bounding_box, flatten
 from crossfield.models.sketch.outline import inside_outline
+from crossfield.models.sketch.pen_strokes import read_scap
 from crossfield.models.sketch.read import LEAST_WEIGHT, check_memory, instance_of, name_from, read_sketch
-from crossfield.models.sketch.scap import read_scap
 from crossfield.models.sketch.svg import read_svg
 from hypothesis import given, settings
 from hypothesis import strategies as st

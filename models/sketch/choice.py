@@ -1,0 +1,122 @@
+"""What of a drawing is a curvature line, where more is known than its colours say.
+
+Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. What
+stands in a group has the labels of the group too. The strokes that are not chosen cut the field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final, Literal, get_args
+
+from ..errors import InputError, shortened
+
+Silhouette = Literal["none", "outer"]
+KINDS: Final = ("colour", "class", "id", "layer", "cluster")
+"""What strokes can be chosen by."""
+_FEW: Final = 4  # labels of each kind that an error lists
+_LONGEST: Final = 40  # characters of each of them there
+_EXAMPLES: Final = "colour=red, class=flow, id=group2, layer=Flow or cluster=3"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which strokes of a drawing are curvature lines, and from where a drawing in space is seen.
+
+    silhouette: "outer": what runs along the outline of the drawing carries no direction; "none": all
+    curvature lines count. curvature: labels such as "class=flow", of which each curvature line has one; none:
+    the drawing's colours decide. view: of a .curves file, as in `read_curves`; None: by its principal axes.
+    Raises InputError for what is none of these.
+    """
+
+    silhouette: Silhouette = "none"
+    curvature: tuple[str, ...] = ()
+    view: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check what can be checked without a drawing."""
+        if self.silhouette not in get_args(Silhouette):
+            known = " or ".join(get_args(Silhouette))
+            raise InputError(f"there is no silhouette {shortened(self.silhouette)!r}; choose {known}")
+        object.__setattr__(self, "curvature", tuple(label_of(each) for each in self.curvature))
+
+    @property
+    def chooser(self) -> Chooser | None:
+        """A fresh look-out for the chosen labels, None when the drawing's colours decide."""
+        return Chooser(frozenset(self.curvature)) if self.curvature else None
+
+    def refuse_labels(self, what: str) -> None:
+        """Nothing, or InputError when strokes are chosen in something that has no labels."""
+        if self.curvature:
+            raise InputError(f"{what}; leave the choice of {self.curvature[0]} out")
+
+    def refuse_view(self) -> None:
+        """Nothing, or InputError when a view is chosen of something flat."""
+        if self.view is not None:
+            raise InputError("is flat: only a .curves file can be seen from elsewhere; leave the view out")
+
+
+AS_DRAWN: Final = Choice()
+"""All that is drawn in red, or in the only colour there is."""
+
+
+@dataclass(eq=False)
+class Chooser:
+    """A look-out for labels while a drawing is read.
+
+    wanted: the labels of curvature lines. found: those of them that the drawing has; seen: a few of all.
+    """
+
+    wanted: frozenset[str]
+    found: set[str] = field(default_factory=set)
+    seen: dict[str, list[str]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
+
+    def takes(self, labels: Iterable[str]) -> bool:
+        """Whether one of the labels is wanted; all of them are noted."""
+        taken = False
+        for label in labels:
+            some = self.seen[label.partition("=")[0]]
+            if len(some) < _FEW and label not in some:
+                some.append(label)
+            if label in self.wanted:
+                self.found.add(label)
+                taken = True
+        return taken
+
+    def check(self, *, taken: bool) -> None:
+        """Nothing, or InputError when a wanted label is nowhere, or on nothing that is drawn.
+
+        taken: whether a stroke was chosen.
+        """
+        if missing := sorted(self.wanted - self.found):
+            there = [shortened(label, _LONGEST) for some in self.seen.values() for label in some]
+            listed = f"it has {', '.join(there)}" if there else "its strokes have no labels at all"
+            raise InputError(f"has no stroke of {shortened(missing[0])}; {listed}")
+        if not taken:
+            raise InputError(f"draws nothing of {shortened(', '.join(sorted(self.wanted)))}; choose others")
+
+
+def label_of(selector: str) -> str:
+    """The label that a selector such as "colour=red" names; colours as #rrggbb. Raises InputError."""
+    kind, _, value = (part.strip() for part in selector.partition("="))
+    kind = "colour" if kind == "color" else kind
+    if kind not in KINDS or not value:
+        raise InputError(f"{shortened(selector)!r} chooses no strokes; write {_EXAMPLES}")
+    return _of_colour(value) if kind == "colour" else f"{kind}={value}"
+
+
+def colour_label(rgb: tuple[float, float, float]) -> str:
+    """The label of a colour given as red, green, blue in [0, 1]."""
+    return "colour=#" + "".join(f"{round(255 * channel):02x}" for channel in rgb)
+
+
+def _of_colour(colour: str) -> str:
+    """The label of a colour that has a name or is written as in CSS. Raises InputError for what is none."""
+    from PIL import ImageColor
+
+    try:
+        red, green, blue = (min(channel, 255) / 255 for channel in ImageColor.getrgb(colour)[:3])
+    except ValueError as error:
+        raise InputError(f"{shortened(colour)!r} is no colour; write a name or #rrggbb") from error
+    return colour_label((red, green, blue))

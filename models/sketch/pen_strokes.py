@@ -1,0 +1,246 @@
+"""Reading pen strokes as text: .scap, drawn on paper, and .curves, drawn in space.
+
+.scap is the format of StrokeStrip and StripMaker for over-sketched drawings. Line 1 `#width height`, then
+optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally `@thickness`, one sample
+`x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards. The declared size need not
+bound the samples. Strokes of one cluster are meant as one curve, and are one here when a curve is asked for
+by its number; their directions count one by one. A file that has all strokes in one cluster says nothing of
+curves: there each stroke is one.
+
+.curves is the format of CASSIE: for each stroke a line `v N` and N lines `x y z`, y upwards. The strokes are
+projected at right angles to a plane; those at the back are drawn too. CASSIE: E. Yu, R. Arora, T. Stanko, J.
+A. Baerentzen, K. Singh, A. Bousseau, *CASSIE: Curve and Surface Sketching in Immersive Environments*, 2021.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError, shortened
+from ..input_limits import LEAST_LENGTH, MAX_LINES
+from ..instance.elementary import cosine, sine, turned
+from ..instance.grid import Bools, Floats, Ints
+from .choice import Chooser
+from .curves import Curves, lines_as_cubics
+
+_GREATEST: Final = 1e9
+SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
+"""How a .curves file begins; a mesh, whose vertices begin with v as well, has three numbers there."""
+SIDE: Final = 1000.0
+"""Longer side of the projected drawing, in the units of its page."""
+BORDER: Final = 40.0
+"""Empty border of the page round it."""
+VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
+"""Where views are from: azimuth, from z towards x, and elevation, in degrees."""
+
+
+def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
+    """The strokes of a .scap file.
+
+    chooser: looks for the clusters of curvature lines, cluster=NAME; None: all strokes are. Raises InputError
+    with the number of the line that breaks the layout, and for clusters that are not there.
+    """
+    lines = _lines(data)
+    canvas = _canvas(lines[0] if lines else "")
+    strokes: list[list[tuple[float, float]]] = []
+    clusters: list[str] = []
+    samples: list[tuple[float, float]] = []
+    opened = 0
+    for number, line in enumerate(map(str.strip, lines[1:]), start=2):
+        if line == "{":
+            if opened:
+                raise InputError(
+                    f"line {number}: a stroke starts inside the stroke of line {opened}; "
+                    "close that one with }"
+                )
+            samples, opened = [], number
+        elif line == "}":
+            if not opened:
+                raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
+            clusters.append(_cluster(lines[opened], len(strokes)))
+            strokes.append(samples)
+            opened = 0
+        elif line and line[0] not in "#@":
+            if not opened:
+                raise InputError(
+                    f"line {number}: a sample stands outside of any stroke; put it between {{ and }}"
+                )
+            x, y = _numbers_in(line, number, "x y pressure", 2)
+            samples.append((x, y))
+    if opened:
+        raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
+    return _curves(strokes, clusters, canvas, chooser)
+
+
+def read_curves(data: bytes, view: str | None = None) -> Curves:
+    """The strokes of a .curves file as they are seen from somewhere, on a page of their own.
+
+    view: "front", "side", "top", or azimuth and elevation in degrees as in "30,25"; None: along the third of
+    the strokes' principal axes. The longer side of the drawing becomes SIDE, and the page, in whole units,
+    leaves BORDER round it. Raises InputError with the number of the line that breaks the layout, and for a
+    view that is none.
+    """
+    strokes = _spatial(data)
+    axes = _principal(strokes) if view is None else axes_of(view)
+    flat = [turned(stroke, axes) for stroke in strokes]
+    ends = np.concatenate(flat)
+    least, most = ends.min(axis=0), ends.max(axis=0)
+    longer = float((most - least).max())
+    if longer == 0:
+        raise InputError("draws no stroke: everything is one point, seen from there")
+    placed = [BORDER + SIDE * ((stroke - least) / longer) for stroke in flat]
+    width, height = np.ceil(SIDE * ((most - least) / longer)) + 2 * BORDER
+    return _polylines(placed, np.arange(len(placed), dtype=np.int32), (0.0, 0.0, float(width), float(height)))
+
+
+def axes_of(view: str) -> Floats:
+    """The directions (2, 3) in space that point to the right and down in a view. Raises InputError."""
+    try:
+        azimuth, elevation = np.radians(VIEWS.get(view) or [float(part) for part in view.split(",")])
+    except ValueError:
+        azimuth = elevation = np.nan
+    if not (abs(azimuth) <= 2 * np.pi and abs(elevation) <= np.pi / 2):
+        raise InputError(
+            f"there is no view {shortened(view)!r}; choose {', '.join(VIEWS)}, or azimuth (-360 to 360) and"
+            " elevation (-90 to 90) in degrees as in 30,25"
+        )
+    angles = np.array([azimuth, elevation])
+    (across, rise), (along, level) = sine(angles), cosine(angles)
+    return np.array([[along, 0.0, -across], [rise * across, -level, rise * along]])
+
+
+def _principal(strokes: list[Floats]) -> Floats:
+    """The two principal axes (2, 3) along which strokes reach farthest, as in `axes_of`.
+
+    The one nearer to the vertical of space points up. A piece of a stroke counts by its length, however many
+    samples it has.
+    """
+    starts = np.concatenate([stroke[:-1] for stroke in strokes])
+    ends = np.concatenate([stroke[1:] for stroke in strokes])
+    scale = 2 * (max(np.abs(starts).max(), np.abs(ends).max()) or 1.0)
+    middle, half = starts / scale + ends / scale, ends / scale - starts / scale
+    length = np.sqrt((half**2).sum(axis=1, keepdims=True))
+    middle -= (length * middle).sum(axis=0) / (length.sum() or 1.0)
+    spread = (length * middle).T @ middle + (length * half).T @ half / 3
+    # Processors differ in the last digits: those are cut off.
+    axes = np.linalg.eigh(spread)[1].T[1:].round(9)
+    across, up = sorted(axes, key=lambda axis: (abs(axis[1]), *axis))
+    return np.stack([_forward(across), -(np.sign(up[1]) * up if up[1] else _forward(up))])
+
+
+def _forward(axis: Floats) -> Floats:
+    """The axis or its opposite, whichever has its largest part positive."""
+    return axis if axis[np.argmax(np.abs(axis))] > 0 else -axis
+
+
+def _spatial(data: bytes) -> list[Floats]:
+    """The strokes (n, 3) of two or more samples."""
+    lines = [(number, line.strip()) for number, line in enumerate(_lines(data), start=1) if line.strip()]
+    strokes: list[Floats] = []
+    place = 0
+    while place < len(lines):
+        number, line = lines[place]
+        count = _announced(line, number)
+        samples = [_numbers_in(text, at, "x y z", 3) for at, text in lines[place + 1 : place + 1 + count]]
+        if len(samples) < count:
+            raise InputError(
+                f"line {number}: this stroke announces {count} points, and {len(samples)} follow; "
+                "the file is cut off"
+            )
+        if count > 1:
+            strokes.append(np.array(samples))
+        place += 1 + count
+    if not strokes:
+        raise InputError("holds no stroke of two or more samples")
+    return strokes
+
+
+def _announced(line: str, number: int) -> int:
+    """The number of points that the first line of a stroke announces."""
+    match = re.fullmatch(r"v\s+([0-9]{1,9})", line)
+    if match is None:
+        raise InputError(f"line {number}: expected 'v N', found {line[:30]!r}")
+    return int(match[1])
+
+
+def _lines(data: bytes) -> list[str]:
+    """The lines of a text of strokes. Raises InputError when there are more than MAX_LINES."""
+    if sum(data.count(end) for end in (b"\n", b"\r")) > MAX_LINES:
+        raise InputError(f"has more than {MAX_LINES} lines; simplify the drawing")
+    text = data.decode("utf-8", errors="replace").lstrip("\ufeff")
+    return re.split(r"\r\n?|\n", text)
+
+
+def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
+    """The first `count` coordinates in a line, whose number and layout an InputError names."""
+    fields = line.split(maxsplit=count)[:count]
+    try:
+        found = [float(field) for field in fields]
+    except ValueError:
+        found = []
+    if len(found) < count:
+        raise InputError(f"line {number}: expected {layout!r}, found {line[:30]!r}")
+    if not all(abs(each) <= _GREATEST for each in found):
+        raise InputError(f"line {number}: a coordinate is not a finite number below {_GREATEST:g}")
+    return found
+
+
+def _polylines(
+    strokes: list[Floats], curve: Ints, canvas: tuple[float, float, float, float], taken: Bools | None = None
+) -> Curves:
+    """The curves of pen strokes, each of two or more samples (n, 2).
+
+    curve: int (s,), the number of each stroke's curve; taken: bool (s,), which were chosen, None: none.
+    """
+    count = [len(stroke) - 1 for stroke in strokes]
+    points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
+    chosen = None if taken is None else np.repeat(taken, count)
+    return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), canvas, chosen)
+
+
+def _curves(
+    strokes: list[list[tuple[float, float]]],
+    clusters: list[str],
+    canvas: tuple[float, float, float, float],
+    chooser: Chooser | None,
+) -> Curves:
+    drawn = [number for number, stroke in enumerate(strokes) if len(stroke) > 1]
+    if not drawn:
+        raise InputError("holds no stroke of two or more samples")
+    names = [clusters[number] for number in drawn]
+    taken = None
+    if chooser is not None:
+        taken = np.array([chooser.takes([f"cluster={name}"] if " " not in name else []) for name in names])
+        chooser.check(taken=bool(taken.any()))
+    return _polylines([np.array(strokes[number]) for number in drawn], _numbers(names), canvas, taken)
+
+
+def _cluster(line: str, stroke: int) -> str:
+    """The name of the cluster in a stroke's first line, `#stroke cluster`; the stroke's own without one."""
+    fields = line.strip().removeprefix("#").split()
+    return fields[1] if len(fields) == 2 and line.strip().startswith("#") else f"stroke {stroke}"
+
+
+def _numbers(clusters: list[str]) -> Ints:
+    """The number of each stroke's curve: its cluster, or the stroke itself where there is but one cluster."""
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(clusters))}
+    return np.array(
+        [numbers[name] for name in clusters] if len(numbers) > 1 else range(len(clusters)), dtype=np.int32
+    )
+
+
+def _canvas(line: str) -> tuple[float, float, float, float]:
+    fields = line.strip().removeprefix("#").split(maxsplit=3)
+    try:
+        width, height = (float(field) for field in fields)
+    except ValueError as error:
+        raise InputError(f"line 1: expected '#width height', found {line.strip()[:30]!r}") from error
+    if not (min(width, height) >= LEAST_LENGTH and max(width, height) <= _GREATEST):
+        raise InputError(
+            f"line 1: the size {line.strip()[:30]!r} is not two positive numbers from {LEAST_LENGTH:g} to "
+            f"{_GREATEST:g}"
+        )
+    return 0.0, 0.0, width, height
