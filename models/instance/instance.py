@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InstanceError
 from .angles import wrap
 from .grid import Bools, Floats, Grid, Ints
+from .reading import Reading
 
 Gauge = Literal["strokes", "box"]
 GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
@@ -73,6 +74,7 @@ class Instance:
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
     corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is
     in [1e-100, 1e100], origin up to that.
+    reading: what the reader of its drawing has to say, warnings among it; None where it comes from elsewhere.
 
     Rounding makes instances, and so their hashes, the same where the last digit differs between processors.
     It changes nothing twice.
@@ -91,6 +93,7 @@ class Instance:
     source: str = ""
     pixel_size: float = 1.0
     origin: tuple[float, float] = field(default=(0.0, 0.0))
+    reading: Reading | None = None
 
     def __post_init__(self) -> None:
         """Take over read-only copies in the documented types, then check every rule."""
@@ -260,7 +263,7 @@ class Instance:
 
     def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
-        return replace(self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order])
+        return replace(self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order], reading=None)
 
     @property
     def summary(self) -> str:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, shortened
 from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
+from .bridges import ink_ends
 from .colour import REDDISH, ink_of, redness
 from .cover import Cover, Frame, block_means
 
@@ -82,6 +83,10 @@ class Picture:
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
             return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
+
+    def ends(self) -> Floats:
+        """Where thin strokes end, in pixels of the file: points and ways out (n, 2, 2), as (x, y)."""
+        return self.reduced * ink_ends(self.ink, self.stroke_width)
 
     def _cover(self, ink: Ink, frame: Frame) -> Cover:
         rows, columns = (edges / self.reduced for edges in frame.edges)

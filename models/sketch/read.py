@@ -20,11 +20,13 @@ from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
+from ..instance.reading import Reading
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
+from .bridges import as_points, closing, curve_ends, opened
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .outline import inside_outline, parts_with
+from .outline import boundless, crowded, inside_outline, parts_with
 from .scap import read_scap
 from .svg import read_svg
 
@@ -49,12 +51,14 @@ class _Sketch:
     """What every kind of sketch knows of itself, in its own units with y down.
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
-    covers: the cover of a frame by curvature lines and by other strokes.
+    covers: the cover of a frame by curvature lines and by other strokes. ends: where strokes end,
+    points and ways out (n, 2, 2).
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
+    ends: Callable[[], Floats]
 
 
 def read_sketch(
@@ -106,7 +110,7 @@ def instance_of(
     else:
         frame, given = _masked(mask, sketch.page, size)
     lines, others = sketch.covers(frame)
-    solve = _solve_mask(lines, others, given)
+    solve, found = _solve_mask(lines, others, given, sketch, frame)
     weight = np.where(solve, lines.weight, 0.0)
     stroke = weight >= LEAST_WEIGHT
     if not stroke.any():
@@ -121,6 +125,7 @@ def instance_of(
         source=" ".join(source.split()),
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
+        reading=found,
     )
 
 
@@ -175,7 +180,7 @@ def _sketch(data: bytes, size: int, suffix: str) -> _Sketch:
     if curves is not None:
         return _of_curves(curves)
     picture = read_picture(data, size)
-    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers)
+    return _Sketch(picture.box, (0.0, 0.0, picture.width, picture.height), picture.covers, picture.ends)
 
 
 def curves_in(data: bytes, suffix: str) -> Curves | None:
@@ -201,7 +206,7 @@ def _of_curves(curves: Curves) -> _Sketch:
         segments, _, line = segments_of(curves, frame)
         return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
 
-    return _Sketch(bounding_box(curves.points), curves.canvas, covers)
+    return _Sketch(bounding_box(curves.points), curves.canvas, covers, lambda: curve_ends(curves.points))
 
 
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
@@ -250,19 +255,31 @@ def _mask_on_grid(
     return frame, share >= 0.5 - 1e-6
 
 
-def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
-    """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
+def _solve_mask(
+    lines: Cover, others: Cover, given: Bools | None, sketch: _Sketch, frame: Frame
+) -> tuple[Bools, Reading]:
+    """The pixels to solve for, and what is to be said of them.
+
+    They are the mask, or the inside of the outline, its gaps bridged, less what other strokes cut out.
+    """
     cut = others.amount >= CUT
+    filled = lines.amount + others.amount >= CUT
     if given is not None:
-        return given & ~cut
+        solve = given & ~cut
+        return solve, Reading(sketch.page, crowded(filled, solve, frame))
     walls = (lines.amount >= LEAST_WEIGHT) | cut
     if not walls.any():
         raise InputError("no stroke is left on so coarse a grid; choose a larger size")
-    solve = parts_with(
-        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
-    )
+    closed, openings = closing(walls, sketch.ends(), frame)
+    region = inside_outline(closed)
+    solve = parts_with(region & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
     if not solve.any():
         raise InputError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
-    return solve
+    warnings = (
+        *opened(openings),
+        *boundless(region),
+        *crowded(filled, solve, frame),
+    )
+    return solve, Reading(sketch.page, warnings, as_points(openings))
