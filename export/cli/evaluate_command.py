@@ -10,7 +10,7 @@ import typer
 
 from .inputs import known, load
 from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, StrokeWeight, What
-from .output import complain, progress, say, say_json, show_table
+from .output import complain, progress, say, say_json, show_table, warn_of
 
 if TYPE_CHECKING:
     from ..solving.evaluate import Evaluation
@@ -66,6 +66,7 @@ def evaluate_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         instance = load(sketch, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(instance, quiet=quiet)
         found = evaluate(
             instance,
             sketch=sketch,

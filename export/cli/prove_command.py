@@ -10,7 +10,7 @@ import typer
 
 from .inputs import load
 from .options import GaugeName, Json, Mask, Quiet, Size, SkewWeight, Start, StrokeWeight
-from .output import complain, progress, say, say_json, show_facts
+from .output import complain, progress, say, say_json, show_facts, warn_of
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm
@@ -88,6 +88,7 @@ def prove_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(loaded, quiet=quiet)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

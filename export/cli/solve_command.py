@@ -29,7 +29,7 @@ from .options import (
     Threads,
     What,
 )
-from .output import complain, progress, say, say_json, show_facts, show_solution
+from .output import complain, progress, say, say_json, show_facts, show_solution, warn_of
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -94,6 +94,7 @@ def solve_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         loaded = load(instance, size, mask, gauge, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(loaded, quiet=quiet)
         request = Request(
             loaded,
             output,

@@ -17,6 +17,7 @@ from ...models.search.improvement import first_field
 from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
+from ..pictures.mask import has_mask, write_mask
 from ..solutions.solution import Solution
 from .compiling import compiling
 from .job import Limits
@@ -26,6 +27,7 @@ from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 REPORT: Final = "report.json"
+MASK: Final = "mask.png"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """What the field is called that the methods of a run start from: the improved greedy field."""
@@ -99,6 +101,7 @@ class Report:
                 "w_strokes": instance.w_strokes,
                 "w_beta": instance.w_beta,
             },
+            "warnings": list(instance.reading.warnings if instance.reading else ()),
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
             "methods": [self.facts(candidate) for candidate in self.candidates],
@@ -140,6 +143,7 @@ def run(
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, field.png, ...
+        DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
@@ -176,6 +180,8 @@ def run(
     report = Report(instance, tuple(ranked), tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
+    if has_mask(instance):
+        write_mask(instance, folder / MASK)
     watch.lap("fields")
     if not report.interrupted:
         report = _drawn(report, folder, progress)
@@ -187,7 +193,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, MASK, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 

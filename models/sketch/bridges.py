@@ -21,11 +21,10 @@ Indices = NDArray[np.intp]
 
 LONGEST: Final = GAPS[-1]
 """Longest bridge, in parts of the drawing's longer side: a wider gap makes a drawing an open one."""
-WIDER: Final = 1.0
-"""Least side of the square as large as what bridges close off, in pixels that they take to do it.
+WIDER: Final = 0.7
+"""Least side of the square as large as what a bridge closes off, in pixels that the bridge takes.
 
-An outline with a gap is far wider than the gap. Ends of hatching, and of strokes that run out over the
-outline, lie side by side with less than that between them.
+A line takes up to 1 / 0.7 pixels for each that it is long: the room behind a gap is as wide as the gap.
 """
 AHEAD: Final = 0.5
 """Least cosine of the turn from a stroke into its bridge: 60 degrees, for a gap may take a corner away."""
@@ -110,7 +109,8 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
     walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge is at
-    most LONGEST, goes on where the strokes end (AHEAD), and closes off what is WIDER than the gap. Walls that enclose all the room that they can
+    most LONGEST, goes on where the strokes end (AHEAD), and closes off room as wide as the
+    gap (WIDER). Walls that enclose all the room that they can
     come back as they are.
     """
     bridges = _candidates(ends, LONGEST * max(walls.shape) * frame.pixel)
