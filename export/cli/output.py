@@ -97,7 +97,7 @@ def complain(text: str) -> None:
 
 
 def warn_of(instance: Instance, *, quiet: bool) -> None:
-    """Print the warnings of the drawing's reader on standard error, one line each, unless it shall be quiet."""
+    """Print the warnings of the drawing's reader on standard error, a line each, unless it shall be quiet."""
     reading = None if quiet else instance.reading
     for text in reading.warnings if reading else ():
         complain(f"warning: {instance.source}: {text}")

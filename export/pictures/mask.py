@@ -23,8 +23,8 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
     """The path of the PNG that now holds the mask: white where the field is solved, black elsewhere.
 
     It is as large as the bitmap that the instance was read from, or as the page of a vector sketch, rounded:
-    what read_sketch takes as `mask`. Gaps in the outline that were bridged are tinted light blue, and count as
-    white. Raises InputError for an instance that was read from no page, or from one without a mask of bearable
+    what read_sketch takes as `mask`. Gaps in the outline that were bridged are tinted light blue, and count
+    as white. Raises InputError for an instance that was read from no page, or from one without a mask of bearable
     size, and OutputError.
     """
     from PIL import Image, ImageDraw
@@ -32,19 +32,20 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
     path, page = Path(path), _page(instance)
     if page is None:
         raise InputError(
-            f"{instance.name} has no page that a mask could cover; give a sketch with a viewBox or a width and "
-            f"height, of 1 to {MAX_SIDE} units a side and {MAX_PIXELS // 10**6} million in all",
+            f"{instance.name} has no page that a mask could cover; give a sketch with a viewBox or a width "
+            f"and height, of 1 to {MAX_SIDE} units a side and {MAX_PIXELS // 10**6} million in all",
             file=path,
         )
     white = mask_on_page(instance, page)
     image = Image.fromarray(np.where(white, np.uint8(255), np.uint8(0)))
     if instance.reading is not None and instance.reading.openings:
-        tinted, line = Image.new("RGB", image.size, _TINT), Image.new("L", image.size, 0)
+        line = Image.new("L", image.size, 0)
         scale = np.array(image.size) / page[2:]
+        width = max(1, round(instance.pixel_size * float(scale.mean()) / 2))
         for ends in (np.array(instance.reading.openings) - page[:2]) * scale:
-            width = max(1, round(instance.pixel_size * float(scale.mean()) / 2))
-            ImageDraw.Draw(line).line([tuple(end) for end in ends.tolist()], fill=255, width=width)
-        image = Image.composite(tinted, image.convert("RGB"), Image.fromarray(np.where(white, line, np.uint8(0))))
+            ImageDraw.Draw(line).line(ends.ravel().tolist(), fill=255, width=width)
+        where = Image.fromarray(np.minimum(np.asarray(image), np.asarray(line)))
+        image = Image.composite(Image.new("RGB", image.size, _TINT), image.convert("RGB"), where)
     with replacing(path) as stream:
         image.save(stream, "PNG")
     return path
@@ -85,5 +86,5 @@ def _page(instance: Instance) -> Page | None:
     if page is None:
         return None
     width, height = page[2:]
-    fits = 0.5 < min(width, height) and max(width, height) <= MAX_SIDE and width * height <= MAX_PIXELS
+    fits = min(width, height) > 0.5 and max(width, height) <= MAX_SIDE and width * height <= MAX_PIXELS
     return page if fits else None

@@ -51,7 +51,11 @@ class Picture:
     def openings(self) -> tuple[Floats, ...]:
         """The bridged gaps in the outline, (2, 2) each, in pixel units."""
         reading = self.instance.reading
-        return () if reading is None else tuple(on_grid(np.array(ends), self.instance) for ends in reading.openings)
+        return (
+            ()
+            if reading is None
+            else tuple(on_grid(np.array(ends), self.instance) for ends in reading.openings)
+        )
 
     @property
     def unit(self) -> float:

@@ -263,7 +263,9 @@ class Instance:
 
     def _moved(self, mask: Bools, pixels: Ints, theta: Floats) -> Instance:
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
-        return replace(self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order], reading=None)
+        return replace(
+            self, mask=mask, stroke_pixels=pixels[order], theta=theta[order], w=self.w[order], reading=None
+        )
 
     @property
     def summary(self) -> str:

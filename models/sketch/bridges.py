@@ -33,6 +33,7 @@ _NEAREST: Final = 8  # other ends that an end may be bridged to: the work stays 
 _THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
 _SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
 _INK: Final = 0.3
+_MOST_BRIDGES: Final = 10_000  # the shortest ones: the work has a bound
 _MOST_TRIED: Final = 32  # bridges that are tried whether the others do without them
 _MOST_PLACES: Final = 5  # in one warning
 
@@ -79,8 +80,8 @@ def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
 def thinned(shape: Bools) -> Bools:
     """The shape [h, w] thinned to lines one pixel wide.
 
-    T. Y. Zhang, C. Y. Suen: A fast parallel algorithm for thinning digital patterns, Communications of the ACM
-    27 (1984).
+    T. Y. Zhang, C. Y. Suen: A fast parallel algorithm for thinning digital patterns, Communications of the
+    ACM 27 (1984).
     """
     line = np.pad(shape, 1)
     while True:
@@ -108,8 +109,8 @@ def _removable(line: Bools, *, first: bool) -> Bools:
 def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
-    walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge is at
-    most LONGEST, goes on where the strokes end (AHEAD), and closes off room as wide as the
+    walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge is
+    at most LONGEST, goes on where the strokes end (AHEAD), and closes off room as wide as the
     gap (WIDER). Walls that enclose all the room that they can
     come back as they are.
     """
@@ -132,10 +133,11 @@ def opened(openings: Floats) -> tuple[str, ...]:
     order = np.argsort(-wide, kind="stable")
     places = [f"{place(openings[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
     more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""
-    return (
+    warning = (
         f"outline open here: {', '.join(places)}{more}; it is taken as closed by a straight line, "
-        "draw it on or give a mask if that is wrong",
+        "draw it on or give a mask if that is wrong"
     )
+    return (warning,)
 
 
 def as_points(segments: Floats) -> tuple[tuple[Point, Point], ...]:
@@ -160,7 +162,8 @@ def _candidates(ends: Floats, longest: float) -> Floats:
     way = out[pairs] * np.array([1.0, -1.0])[:, None]
     length = vector_length(*np.moveaxis(way, -1, 0)) * vector_length(*line[:, 0].T)[:, None]
     ahead = ((way * line).sum(axis=-1) >= AHEAD * length).all(axis=1)
-    lines: Floats = point[pairs[ahead]]
+    shortest = np.argsort(vector_length(*line[ahead, 0].T), kind="stable")[:_MOST_BRIDGES]
+    lines: Floats = point[pairs[ahead][np.sort(shortest)]]
     return lines
 
 
@@ -186,17 +189,17 @@ def _rooms(walls: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
     mouths = drawn & ~walls & ndimage.binary_dilation(~region, eight, border_value=1)
     gained = region & ~enclosed(walls) & ~mouths
     label, count = ndimage.label(gained)
-    mouth = np.zeros(count + 1)
-    for down, right in np.argwhere(mouths).tolist():
-        mouth[np.unique(label[max(down - 1, 0) : down + 2, max(right - 1, 0) : right + 2])] += 1
+    row, column = np.nonzero(mouths)
+    near = np.pad(label, 1)
+    room = np.sort([near[row + down, column + right] for down in range(3) for right in range(3)], axis=0)
+    room[1:][np.diff(room, axis=0) == 0] = 0  # each pixel once for each room
+    mouth = np.bincount(room.ravel(), minlength=count + 1)
     wide = np.bincount(label.ravel(), minlength=count + 1) >= np.maximum(4, (WIDER * mouth) ** 2)
     wide[0] = False
     return wide[label], mouths
 
 
-def _needed(
-    walls: Bools, rooms: Bools, mouths: Bools, pixels: tuple[Indices, Indices, Indices]
-) -> Indices:
+def _needed(walls: Bools, rooms: Bools, mouths: Bools, pixels: tuple[Indices, Indices, Indices]) -> Indices:
     """The numbers of few bridges that enclose these rooms, those nearest to the outside before others."""
     from scipy import ndimage
 

@@ -80,9 +80,26 @@ def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
         return ()
     row, column = np.nonzero(label == np.argmax(size))
     middle = np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
-    return (
+    warning = (
         f"strokes fill all pixels round {place(middle)}, {size.sum() / solve.sum():.0%} of those to solve "
-        "for: dense hatching or solid ink tells no direction; choose a larger size or draw fewer lines",
+        "for: dense hatching or solid ink tells no direction; choose a larger size or draw fewer lines"
+    )
+    return (warning,)
+
+
+def off_page(solve: Bools, frame: Frame, page: tuple[float, float, float, float] | None) -> tuple[str, ...]:
+    """A warning when pixels to solve for lie off the page (x, y, width, height) of the drawing, or none."""
+    if page is None:
+        return ()
+    inside = []
+    for edges, start, side in zip(frame.edges, page[1::-1], page[:1:-1], strict=True):
+        middle = (edges[:-1] + edges[1:]) / 2
+        inside.append((middle >= start - frame.pixel) & (middle <= start + side + frame.pixel))
+    off = 1 - solve[np.ix_(*inside)].sum() / solve.sum()
+    if off == 0:
+        return ()
+    return (
+        f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page",
     )
 
 

@@ -26,7 +26,7 @@ from .bitmap import read_picture, read_white
 from .bridges import as_points, closing, curve_ends, opened
 from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
-from .outline import boundless, crowded, inside_outline, parts_with
+from .outline import boundless, crowded, inside_outline, off_page, parts_with
 from .scap import read_scap
 from .svg import read_svg
 
@@ -281,5 +281,6 @@ def _solve_mask(
         *opened(openings),
         *boundless(region),
         *crowded(filled, solve, frame),
+        *off_page(solve, frame, sketch.page),
     )
     return solve, Reading(sketch.page, warnings, as_points(openings))
