@@ -24,8 +24,8 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
 
     It is as large as the bitmap that the instance was read from, or as the page of a vector sketch, rounded:
     what read_sketch takes as `mask`. Gaps in the outline that were bridged are tinted light blue, and count
-    as white. Raises InputError for an instance that was read from no page, or from one without a mask of bearable
-    size, and OutputError.
+    as white. Raises InputError for an instance that was read from no page, or from one too small or too large
+    for a picture, and OutputError.
     """
     from PIL import Image, ImageDraw
 

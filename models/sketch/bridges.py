@@ -15,19 +15,23 @@ from ..instance.elementary import length as vector_length
 from ..instance.grid import Bools, Floats
 from ..instance.reading import Point
 from .cover import Frame, block_means, covering_curves
-from .outline import GAPS, enclosed, place
+from .outline import enclosed, place
 
 Indices = NDArray[np.intp]
 
-LONGEST: Final = GAPS[-1]
-"""Longest bridge, in parts of the drawing's longer side: a wider gap makes a drawing an open one."""
+LONGEST: Final = 0.1
+"""Longest bridge, in parts of the grid's longer side: with a wider gap a drawing is meant to be open."""
 WIDER: Final = 0.7
 """Least side of the square as large as what a bridge closes off, in pixels that the bridge takes.
 
 A line takes up to 1 / 0.7 pixels for each that it is long: the room behind a gap is as wide as the gap.
 """
 AHEAD: Final = 0.5
-"""Least cosine of the turn from a stroke into its bridge: 60 degrees, for a gap may take a corner away."""
+ASIDE: Final = -0.1
+"""Least cosines of the turns from the one stroke and from the other into the bridge: 60 and 96 degrees.
+
+A gap may take a corner away, or begin at one.
+"""
 _TAIL: Final = 11  # pixels round the end of a thinned line that tell where it would go on
 _NEAREST: Final = 8  # other ends that an end may be bridged to: the work stays linear
 _THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
@@ -70,7 +74,7 @@ def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
     # From the middle of the line near its end to the end.
     mean = [
         ndimage.uniform_filter(part * line, _TAIL, mode="constant")[row, column]
-        for part in (np.ones(line.shape), *np.indices(line.shape)[::-1])
+        for part in (np.ones(line.shape), *np.indices(line.shape, dtype=np.float64)[::-1])
     ]
     middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
     ends = np.stack([column, row], axis=1)
@@ -109,16 +113,23 @@ def _removable(line: Bools, *, first: bool) -> Bools:
 def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
-    walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge is
-    at most LONGEST, goes on where the strokes end (AHEAD), and closes off room as wide as the
-    gap (WIDER). Walls that enclose all the room that they can
-    come back as they are.
+    walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge
+    joins ends that lie at the outside. It is at most LONGEST, and no longer than the connected strokes on
+    either side reach; it goes on where they end (AHEAD, ASIDE), and closes off room as wide as the gap
+    (WIDER). Walls that enclose all the room that they can come back as they are.
     """
-    bridges = _candidates(ends, LONGEST * max(walls.shape) * frame.pixel)
+    from scipy import ndimage
+
+    outside = ~enclosed(walls)
+    place = np.floor((ends[:, 0] - (frame.x, frame.y)) / frame.pixel).astype(np.int64)
+    column, row = np.clip(place, 0, np.array(walls.shape[::-1]) - 1).T
+    open_there = ndimage.binary_dilation(outside, np.ones((3, 3), dtype=bool), border_value=1)[row, column]
+    most = np.minimum(LONGEST * max(walls.shape), _extents(walls, row, column))[open_there]
+    bridges = _candidates(ends[open_there], most * frame.pixel)
     if not len(bridges):
         return walls, bridges
     pixels = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
-    rooms, mouths = _rooms(walls, *pixels[1:])
+    rooms, mouths = _rooms(walls, outside, *pixels[1:])
     if not rooms.any():
         return walls, bridges[:0]
     kept = _needed(walls, rooms, mouths, pixels)
@@ -145,24 +156,40 @@ def as_points(segments: Floats) -> tuple[tuple[Point, Point], ...]:
     return tuple(((a, b), (c, d)) for (a, b), (c, d) in segments.tolist())
 
 
-def _candidates(ends: Floats, longest: float) -> Floats:
-    """The straight lines (m, 2, 2) from each end to those near it that lie ahead on both sides, each once."""
+def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
+    """How far (n,) the connected strokes reach that are at or beside these pixels, in pixels."""
+    from scipy import ndimage
+
+    eight = np.ones((3, 3), dtype=bool)
+    label, _ = ndimage.label(walls, eight)
+    sides = [0, *(max(part.stop - part.start for part in box) for box in ndimage.find_objects(label))]
+    extents: Floats = ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column]
+    return extents
+
+
+def _candidates(ends: Floats, longest: Floats) -> Floats:
+    """The straight lines (m, 2, 2) from each end to those near it that lie ahead, each once.
+
+    longest: (n,), what a line from each of the ends may be long.
+    """
     from scipy.spatial import KDTree
 
     if len(ends) < 2:
         return np.empty((0, 2, 2))
     point, out = ends[:, 0], ends[:, 1]
     distance, other = KDTree(point).query(
-        point, k=1 + min(_NEAREST, len(ends) - 1), distance_upper_bound=longest
+        point, k=1 + min(_NEAREST, len(ends) - 1), distance_upper_bound=longest.max()
     )
     one, place = np.nonzero(np.isfinite(distance))
     two = other[one, place]
     pairs = np.unique(np.sort(np.stack([one, two], axis=1), axis=1)[one != two], axis=0)
     line = np.diff(point[pairs], axis=1)
+    far = vector_length(*line[:, 0].T)
     way = out[pairs] * np.array([1.0, -1.0])[:, None]
-    length = vector_length(*np.moveaxis(way, -1, 0)) * vector_length(*line[:, 0].T)[:, None]
-    ahead = ((way * line).sum(axis=-1) >= AHEAD * length).all(axis=1)
-    shortest = np.argsort(vector_length(*line[ahead, 0].T), kind="stable")[:_MOST_BRIDGES]
+    length = vector_length(*np.moveaxis(way, -1, 0)) * far[:, None]
+    cosine = np.sort((way * line).sum(axis=-1) / np.maximum(length, np.finfo(float).tiny), axis=1)
+    ahead = (cosine[:, 0] >= ASIDE) & (cosine[:, 1] >= AHEAD) & (far <= longest[pairs].min(axis=1))
+    shortest = np.argsort(far[ahead], kind="stable")[:_MOST_BRIDGES]
     lines: Floats = point[pairs[ahead][np.sort(shortest)]]
     return lines
 
@@ -176,8 +203,8 @@ def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices)
     return closed
 
 
-def _rooms(walls: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
-    """The room that bridges at these pixels close off, where it is wider than the gaps to it, and those gaps.
+def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
+    """The room that bridges at these pixels close off, where it is as wide as the gaps to it, and those gaps.
 
     Both bool [height, width]; the gaps are the bridges' pixels between room and outside.
     """
@@ -187,7 +214,7 @@ def _rooms(walls: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
     drawn[row, column] = True
     region, eight = enclosed(drawn), np.ones((3, 3), dtype=bool)
     mouths = drawn & ~walls & ndimage.binary_dilation(~region, eight, border_value=1)
-    gained = region & ~enclosed(walls) & ~mouths
+    gained = region & outside & ~mouths
     label, count = ndimage.label(gained)
     row, column = np.nonzero(mouths)
     near = np.pad(label, 1)

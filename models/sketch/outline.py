@@ -81,8 +81,9 @@ def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
     row, column = np.nonzero(label == np.argmax(size))
     middle = np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
     warning = (
-        f"strokes fill all pixels round {place(middle)}, {size.sum() / solve.sum():.0%} of those to solve "
-        "for: dense hatching or solid ink tells no direction; choose a larger size or draw fewer lines"
+        f"strokes leave no room between them round {place(middle)}, all in all on "
+        f"{size.sum() / solve.sum():.0%} of the pixels to solve for, where they tell no direction; choose a "
+        "larger size, or draw fewer lines and no solid ink there"
     )
     return (warning,)
 
