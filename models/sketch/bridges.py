@@ -1,7 +1,8 @@
-"""Gaps in an outline: where strokes end, and the short bridges between ends that close one.
+"""Gaps in an outline: where strokes end, and the short bridges that close one.
 
-A drawing's outline is seldom drawn without a break. A bridge is a straight line between two ends of strokes;
-one is kept only where it closes off room that would be open without it (`closing`).
+A drawing's outline is seldom drawn without a break. A bridge is a straight line between two ends of strokes,
+or from an end on to the next stroke; it is kept only where it closes off room that would be open without it
+(`closing`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .outline import enclosed, place
 
 Indices = NDArray[np.intp]
 
-LONGEST: Final = 0.1
+LONGEST: Final = 0.08
 """Longest bridge, in parts of the grid's longer side: with a wider gap a drawing is meant to be open."""
 WIDER: Final = 0.7
 """Least side of the square as large as what a bridge closes off, in pixels that the bridge takes.
@@ -114,18 +115,13 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
     walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge
-    joins ends that lie at the outside. It is at most LONGEST, and no longer than the connected strokes on
-    either side reach; it goes on where they end (AHEAD, ASIDE), and closes off room as wide as the gap
-    (WIDER). Walls that enclose all the room that they can come back as they are.
+    leads from an end that lies at the outside to another such, or on to the next stroke. It is at most
+    LONGEST, and no longer than the connected strokes at its ends reach; it goes on where they end (AHEAD,
+    ASIDE), and closes off room as wide as the gap (WIDER). Walls that enclose all the room that they can come
+    back as they are.
     """
-    from scipy import ndimage
-
     outside = ~enclosed(walls)
-    place = np.floor((ends[:, 0] - (frame.x, frame.y)) / frame.pixel).astype(np.int64)
-    column, row = np.clip(place, 0, np.array(walls.shape[::-1]) - 1).T
-    open_there = ndimage.binary_dilation(outside, np.ones((3, 3), dtype=bool), border_value=1)[row, column]
-    most = np.minimum(LONGEST * max(walls.shape), _extents(walls, row, column))[open_there]
-    bridges = _candidates(ends[open_there], most * frame.pixel)
+    bridges = _candidates(walls, outside, ends, frame)
     if not len(bridges):
         return walls, bridges
     pixels = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
@@ -160,14 +156,29 @@ def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
     """How far (n,) the connected strokes reach that are at or beside these pixels, in pixels."""
     from scipy import ndimage
 
-    eight = np.ones((3, 3), dtype=bool)
-    label, _ = ndimage.label(walls, eight)
+    label, _ = ndimage.label(walls, np.ones((3, 3), dtype=bool))
     sides = [0, *(max(part.stop - part.start for part in box) for box in ndimage.find_objects(label))]
     extents: Floats = ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column]
     return extents
 
 
-def _candidates(ends: Floats, longest: Floats) -> Floats:
+def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Floats:
+    """The lines (m, 2, 2) from ends that lie at the outside to other such ends, or on to the next stroke."""
+    from scipy import ndimage
+
+    place = np.floor((ends[:, 0] - (frame.x, frame.y)) / frame.pixel).astype(np.int64)
+    column, row = np.clip(place, 0, np.array(walls.shape[::-1]) - 1).T
+    open_there = ndimage.binary_dilation(outside, np.ones((3, 3), dtype=bool), border_value=1)[row, column]
+    longest = np.minimum(LONGEST * max(walls.shape), _extents(walls, row, column))[open_there]
+    on_grid = (ends[open_there] - [(frame.x, frame.y), (0.0, 0.0)]) / frame.pixel
+    first = slice(_MOST_BRIDGES)
+    on = _prolonged(walls, on_grid[first], longest[first]) * frame.pixel + (frame.x, frame.y)
+    # Of two that do the same the later one is kept: that between two ends.
+    lines: Floats = np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
+    return lines
+
+
+def _between(ends: Floats, longest: Floats) -> Floats:
     """The straight lines (m, 2, 2) from each end to those near it that lie ahead, each once.
 
     longest: (n,), what a line from each of the ends may be long.
@@ -191,6 +202,27 @@ def _candidates(ends: Floats, longest: Floats) -> Floats:
     ahead = (cosine[:, 0] >= ASIDE) & (cosine[:, 1] >= AHEAD) & (far <= longest[pairs].min(axis=1))
     shortest = np.argsort(far[ahead], kind="stable")[:_MOST_BRIDGES]
     lines: Floats = point[pairs[ahead][np.sort(shortest)]]
+    return lines
+
+
+def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
+    """The straight lines (m, 2, 2) on which strokes that go on would meet another stroke, all in pixels.
+
+    ends: (n, 2, 2), points and ways out; longest: (n,), what each line may be long.
+    """
+    point, out = ends[:, 0], ends[:, 1]
+    unit = out / np.maximum(vector_length(*out.T), np.finfo(float).tiny)[:, None]
+    step = np.arange(0.0, max(longest.max(initial=0.0), 1.0), 0.5)
+    way = point[:, None] + step[:, None] * unit[:, None]
+    column, row = np.clip(np.floor(way).astype(np.int64), 0, np.array(walls.shape[::-1]) - 1).transpose(
+        2, 0, 1
+    )
+    stroke = walls[row, column]
+    left = np.cumsum(~stroke, axis=1) > 0  # beyond the pixels of the stroke itself
+    meets = stroke & left & (step <= longest[:, None])
+    ahead = meets.any(axis=1)
+    met = way[np.arange(len(way)), np.argmax(meets, axis=1)]
+    lines: Floats = np.stack([point, met], axis=1)[ahead]
     return lines
 
 
