@@ -112,7 +112,7 @@ def test_a_compartment_with_a_gap_is_kept_in_svg_and_bitmap():
     draw.line((200, 120, 200, 280), fill=0, width=4)
     stream = io.BytesIO()
     image.save(stream, "PNG")
-    bitmap = read(stream.getvalue(), source="a.png")
+    bitmap = read(stream.getvalue(), 64, "a.png")
     assert np.abs(middles(bitmap) - (348, 120)).max() < 5
     assert bitmap.mask.sum() * bitmap.pixel_size**2 == pytest.approx(324 * 164, rel=0.08)
 
