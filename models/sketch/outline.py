@@ -23,6 +23,9 @@ BLOCK: Final = 4
 CROWDED: Final = 0.1
 """Least share of the solved pixels in connected blocks that strokes fill, to be warned of."""
 
+OFF: Final = 0.01
+"""Least share of the solved pixels that lie more than a pixel off the page, to be warned of."""
+
 
 def inside_outline(strokes: Bools) -> Bools:
     """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
@@ -97,7 +100,7 @@ def off_page(solve: Bools, frame: Frame, page: tuple[float, float, float, float]
         middle = (edges[:-1] + edges[1:]) / 2
         inside.append((middle >= start - frame.pixel) & (middle <= start + side + frame.pixel))
     off = 1 - solve[np.ix_(*inside)].sum() / solve.sum()
-    if off == 0:
+    if off < OFF:
         return ()
     return (
         f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page",
