@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .export.formats.registry import write as write
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
+    from .export.pictures.mask import write_mask as write_mask
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
@@ -92,6 +93,7 @@ _HOME: Final = {
     "write_certificate": ".models.proof.certificate",
     "write_field": ".models.field.file",
     "write_instance": ".models.instance.file",
+    "write_mask": ".export.pictures.mask",
     "write_problem": ".export.bundle.manifest",
 }
 """Every public name and the module it comes from."""

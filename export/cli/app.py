@@ -59,6 +59,7 @@ from .output import (
     show_manifests,
     show_report,
     show_samples,
+    warn_of,
 )
 from .prove_command import prove_command
 from .solve_command import solve_command, tell_solution
@@ -135,6 +136,7 @@ def run_command(
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+    warn_of(instance, quiet=quiet)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -171,15 +173,20 @@ def instance_command(
     w_beta: SkewWeight = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels."""
-    from ...models.instance.file import write_instance
+    """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
 
-    _require_suffix(output, (".json", ".npz"))
+    To a .png its mask is written, white where the field is wanted: to be painted, and given back by --mask.
+    """
+    from ...models.instance.file import write_instance
+    from ..pictures.mask import write_mask
+
+    _require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-        write_instance(instance, output)
+        (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
+    warn_of(instance, quiet=quiet)
     if not quiet:
         say(f"{output}: {instance.summary}")
 
@@ -240,6 +247,7 @@ def export_command(
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(loaded, quiet=quiet)
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

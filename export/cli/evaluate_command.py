@@ -22,7 +22,7 @@ from .options import (
     View,
     What,
 )
-from .output import complain, progress, say, say_json, show_table
+from .output import complain, progress, say, say_json, show_table, warn_of
 
 if TYPE_CHECKING:
     from ..solving.evaluate import Evaluation
@@ -82,6 +82,7 @@ def evaluate_command(
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(instance, quiet=quiet)
         found = evaluate(
             instance,
             sketch=sketch,

@@ -20,6 +20,7 @@ from .telling import telling
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ...models.instance.instance import Instance
     from ..bundle.manifest import Manifest
     from ..solutions.solution import Solution
     from ..solving.run import Report
@@ -93,6 +94,13 @@ def say_json(value: object) -> None:
 def complain(text: str) -> None:
     """Print one line on standard error."""
     typer.echo(f"crossfield: {printable(text)}", err=True)
+
+
+def warn_of(instance: Instance, *, quiet: bool) -> None:
+    """Print the warnings of the drawing's reader on standard error, a line each, unless it shall be quiet."""
+    reading = None if quiet else instance.reading
+    for text in reading.warnings if reading else ():
+        complain(f"warning: {instance.source}: {text}")
 
 
 def show_table(

@@ -22,7 +22,7 @@ from .options import (
     StrokeWeight,
     View,
 )
-from .output import complain, progress, say, say_json, show_facts
+from .output import complain, progress, say, say_json, show_facts, warn_of
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm
@@ -105,6 +105,7 @@ def prove_command(
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(loaded, quiet=quiet)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

@@ -32,7 +32,7 @@ from .options import (
     View,
     What,
 )
-from .output import complain, progress, say, say_json, show_facts, show_solution
+from .output import complain, progress, say, say_json, show_facts, show_solution, warn_of
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -101,6 +101,7 @@ def solve_command(
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+        warn_of(loaded, quiet=quiet)
         request = Request(
             loaded,
             output,

@@ -216,8 +216,7 @@ def _on_grid(sketch: Sequence[ArrayLike], instance: Instance) -> tuple[Floats, .
                 f"polyline {number} of the sketch is no list of finite points (x, y); "
                 "leave it out or repair it"
             )
-        scaled = (points - instance.origin) / instance.pixel_size - 0.5
-        lines.append(scaled * np.array([1.0, -1.0]))
+        lines.append(panels.on_grid(points, instance))
     return tuple(lines)
 
 

@@ -29,6 +29,7 @@ STROKE: Final = "#b3261e"
 FAINT: Final = "#c9c9c9"
 BORDER: Final = "#9a9a9a"
 OUTSIDE: Final = "#ececec"
+OPENING: Final = "#3056d3"
 
 SPACING: Final = 6.5
 """Points between streamlines of one family in a panel of full size."""
@@ -45,6 +46,16 @@ class Picture:
     field: CrossField | None
     sketch: tuple[Floats, ...]
     size: float
+
+    @property
+    def openings(self) -> tuple[Floats, ...]:
+        """The bridged gaps in the outline, (2, 2) each, in pixel units."""
+        reading = self.instance.reading
+        return (
+            ()
+            if reading is None
+            else tuple(on_grid(np.array(ends), self.instance) for ends in reading.openings)
+        )
 
     @property
     def unit(self) -> float:
@@ -72,8 +83,14 @@ class Picture:
         return combed(self.crosses)
 
 
+def on_grid(points: Floats, instance: Instance) -> Floats:
+    """Points (k, 2) of the sketch, y down, in pixel units, y up."""
+    scaled: Floats = ((points - instance.origin) / instance.pixel_size - 0.5) * np.array([1.0, -1.0])
+    return scaled
+
+
 def draw_instance(axes: Any, picture: Picture) -> None:
-    """Mask and strokes."""
+    """Mask and strokes, and the gaps in the outline that were bridged when the drawing was read."""
     from matplotlib.colors import to_rgba
 
     mask = picture.instance.mask
@@ -82,6 +99,7 @@ def draw_instance(axes: Any, picture: Picture) -> None:
     _sketch(axes, picture)
     _strokes(axes, picture, STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6)), fade=1.0)
     _border(axes, picture)
+    _lines(axes, picture.openings, OPENING, 2.6 * picture.ink)
 
 
 def draw_crosses(axes: Any, picture: Picture) -> None:

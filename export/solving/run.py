@@ -18,6 +18,7 @@ from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..pictures.drawing import Drawing, read_drawing
+from ..pictures.mask import has_mask, write_mask
 from ..solutions.solution import Solution
 from .compiling import compiling
 from .job import Limits
@@ -29,6 +30,7 @@ PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
 """The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 REPORT: Final = "report.json"
+MASK: Final = "mask.png"
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """What the field is called that the methods of a run start from: the improved greedy field."""
@@ -104,6 +106,7 @@ class Report:
                 "stroke_weight": instance.stroke_weight,
                 "skew_weight": instance.skew_weight,
             },
+            "warnings": list(instance.reading.warnings if instance.reading else ()),
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
             "methods": [self.facts(candidate) for candidate in self.candidates],
@@ -146,6 +149,7 @@ def run(
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing
+        DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
 
@@ -182,6 +186,8 @@ def run(
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
         write_field(report.best.field, folder / f"field{suffix}")
+    if has_mask(instance):
+        write_mask(instance, folder / MASK)
     watch.lap("fields")
     if not report.interrupted:
         report = _drawn(report, folder, below, progress)
@@ -193,7 +199,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, *OVERLAY, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, MASK, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 

@@ -15,6 +15,7 @@ from ..previews import Pictured
 from .angles import line_difference, wrap
 from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
+from .reading import Reading
 from .stroke_terms import StrokeTerms
 from .weights import (
     SKEW_WEIGHT,
@@ -125,6 +126,7 @@ class Instance(Pictured):
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
     corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is
     in [1e-100, 1e100], origin up to that.
+    reading: what the reader of its drawing has to say, warnings among it; None where it comes from elsewhere.
 
     Rounding makes instances, and so their hashes, the same where the last digit differs between processors.
     It changes nothing twice.
@@ -146,6 +148,7 @@ class Instance(Pictured):
     crossings: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
     theta_cross: Floats = field(default_factory=lambda: np.zeros(0))
     w_cross: Floats = field(default_factory=lambda: np.zeros(0))
+    reading: Reading | None = None
 
     def __post_init__(self) -> None:
         """Take over read-only copies in the documented types, then check every rule."""
@@ -418,6 +421,7 @@ class Instance(Pictured):
             crossings=crossings[ascending],
             theta_cross=sense * self.theta_cross[ascending] + turn,
             w_cross=self.w_cross[ascending],
+            reading=None,
         )
 
     @property

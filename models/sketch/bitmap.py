@@ -1,8 +1,9 @@
 """Reading bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-Any paper that is lighter than the strokes will do: its level is taken from the picture. Directions are found
-at the picture's own resolution and then averaged over grid pixels by the double angle, weighted by darkness
-and coherence, so that junctions and corners drop out (docs/mathematics.md, 1).
+Any paper that is lighter than the strokes will do, and any light on it: its level is taken from the picture,
+place by place where the light is uneven. Directions are found at the picture's own resolution and then
+averaged over grid pixels by the double angle, weighted by darkness and coherence, so that junctions and
+corners drop out (docs/mathematics.md, 1).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, shortened
 from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.grid import Bools, Floats
+from .bridges import ink_ends
 from .colour import REDDISH, ink_of, redness
 from .cover import Cover, Frame, block_means
 
@@ -33,6 +35,11 @@ FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 _ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are averaged down by whole factors first
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
+_LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
+_SHADOW: Final = 0.1  # of the longer side: what is darker and wider is a shadow, not ink
+_DARKEST_SHADOW: Final = 0.25  # of the paper's level: what is darker and wide is solid ink after all
+_EVEN: Final = 1.05  # light that differs by less is even, and the picture stays what it is
+_MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
 _BAND: Final = 1 << 20  # pixels of a picture that are looked at together
@@ -83,6 +90,10 @@ class Picture:
             return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
 
+    def ends(self) -> Floats:
+        """Where thin strokes end, in pixels of the file: points and ways out (n, 2, 2), as (x, y)."""
+        return self.reduced * ink_ends(self.ink, self.stroke_width)
+
     def _cover(self, ink: Ink, frame: Frame) -> Cover:
         rows, columns = (edges / self.reduced for edges in frame.edges)
         tangent = stroke_directions(ink, self.stroke_width)
@@ -117,7 +128,7 @@ def read_picture(data: bytes, size: int) -> Picture:
     """The ink of a bitmap, fine enough for a grid of `size` pixels.
 
     Raises InputError when the bytes are no picture, are cut off, declare absurd dimensions, or show only
-    paper.
+    paper, or ink on half of it.
     """
     image = _opened(data)
     width, height = image.size
@@ -134,6 +145,12 @@ def read_picture(data: bytes, size: int) -> Picture:
     ink[_specks(ink)] = 0
     if not (ink > 0.3).any():
         raise InputError("shows no stroke but a few specks; expected dark strokes on lighter paper")
+    covered = float((ink > 0.5).mean())
+    if covered >= _MOST_INK:
+        raise InputError(
+            f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
+            "crop it to the drawing, take the picture in brighter light, or thin the strokes"
+        )
     return Picture(ink, _red_part(rgb, raw), reduced, width, height)
 
 
@@ -265,7 +282,43 @@ def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
         raise InputError("is dark all over; expected dark strokes on lighter paper, invert the picture")
     colours: Floats = pixels.astype(np.float32)
     colours /= np.maximum(paper, 1)
+    light = _light(colours)
+    if max(float(light.max()), 1 / float(light.min())) > _EVEN:
+        colours /= light[..., None]
     return np.minimum(colours, 1, out=colours)
+
+
+def _light(colours: Floats) -> Ink:
+    """The light on the paper [h, w], 1 where it is that of the whole picture.
+
+    colours: [h, w, 1 or 3] relative to the paper of the whole. The lighter surroundings close over what is
+    darker and narrower than _SHADOW, so that strokes vanish while shadows stay, be they gradual or sharp
+    (grey closing by a square: the work is linear). Light is found on blocks of pixels whose mean is taken
+    first, which takes noise away, and lies between them on straight lines.
+    """
+    from scipy import ndimage
+
+    height, width = colours.shape[:2]
+    block = max(1, max(height, width) // _LIGHT_SIDE)
+    rows, columns = (np.append(np.arange(0, side, block), side) for side in (height, width))
+    coarse = block_means(colours.mean(axis=-1), rows, columns)
+    closed = ndimage.grey_closing(coarse, size=int(_SHADOW * max(coarse.shape)) | 1, mode="nearest")
+    smooth = ndimage.gaussian_filter(np.maximum(closed, _DARKEST_SHADOW), 1.0, mode="nearest")
+    places = [
+        np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
+        for side, edges in ((height, rows), (width, columns))
+    ]
+    light: Ink = _between(_between(smooth.astype(np.float32), places[0]).T, places[1]).T
+    return light
+
+
+def _between(rows: Ink, place: Floats) -> Ink:
+    """Rows at fractional places, on straight lines between those of an array."""
+    below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
+    above = np.minimum(below + 1, len(rows) - 1)
+    part = (place - below).astype(np.float32)[:, None]
+    between: Ink = rows[below] * (1 - part) + rows[above] * part
+    return between
 
 
 def _specks(ink: Ink) -> Bools:

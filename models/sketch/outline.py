@@ -9,6 +9,7 @@ import numpy as np
 from ..instance.angles import line_of
 from ..instance.elementary import cosine, sine
 from ..instance.grid import Bools, Floats
+from .cover import Frame
 
 GAPS: Final = (0.03, 0.06, 0.12)
 """Gaps in an outline that count as closed, in parts of the grid's longer side, tried in turn."""
@@ -27,6 +28,14 @@ THICKER: Final = 1.25
 
 _NUDGE: Final = 1e-9  # of a pixel: what runs at exactly 30 degrees does so on every processor
 
+BLOCK: Final = 4
+"""Side in pixels of a block that strokes fill; no sample has one from 16 pixels on."""
+CROWDED: Final = 0.1
+"""Least share of the solved pixels in connected blocks that strokes fill, to be warned of."""
+
+OFF: Final = 0.01
+"""Least share of the solved pixels that lie more than a pixel off the page, to be warned of."""
+
 
 def inside_outline(strokes: Bools) -> Bools:
     """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
@@ -36,7 +45,7 @@ def inside_outline(strokes: Bools) -> Bools:
     """
     hull = _hull_area(strokes)
     for gap in GAPS:
-        region = _enclosed(strokes, max(1.0, gap * max(strokes.shape) / 2))
+        region = enclosed(strokes, gap)
         if _solid(region) >= ENCLOSED * hull:
             return region
     return np.ones_like(strokes)
@@ -94,10 +103,66 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
     return along
 
 
-def _enclosed(strokes: Bools, radius: float) -> Bools:
-    """What a disc of this radius cannot reach when it rolls in from outside and never touches a stroke."""
+def boundless(region: Bools) -> tuple[str, ...]:
+    """A warning when the region is the whole rectangle because the drawing encloses nothing, or none."""
+    if not region.all():
+        return ()
+    return (
+        "the strokes enclose nothing, so the whole rectangle is solved; close the outline or give a mask",
+    )
+
+
+def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
+    """A warning of the largest place where strokes leave no room between them, or none.
+
+    filled: bool [height, width], pixels that a stroke or ink covers for half and more.
+    """
     from scipy import ndimage
 
+    label, count = ndimage.label(ndimage.binary_opening(filled & solve, np.ones((BLOCK, BLOCK))))
+    size = np.bincount(label.ravel(), minlength=count + 1)
+    size[0] = 0
+    if size.max() < max(CROWDED * solve.sum(), 1):
+        return ()
+    row, column = np.nonzero(label == np.argmax(size))
+    middle = np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
+    warning = (
+        f"strokes leave no room between them round {place(middle)}, all in all on "
+        f"{size.sum() / solve.sum():.0%} of the pixels to solve for, where they tell no direction; choose a "
+        "larger size, or draw fewer lines and no solid ink there"
+    )
+    return (warning,)
+
+
+def off_page(solve: Bools, frame: Frame, page: tuple[float, float, float, float] | None) -> tuple[str, ...]:
+    """A warning when pixels to solve for lie off the page (x, y, width, height) of the drawing, or none."""
+    if page is None:
+        return ()
+    inside = []
+    for edges, start, side in zip(frame.edges, page[1::-1], page[:1:-1], strict=True):
+        middle = (edges[:-1] + edges[1:]) / 2
+        inside.append((middle >= start - frame.pixel) & (middle <= start + side + frame.pixel))
+    off = 1 - solve[np.ix_(*inside)].sum() / solve.sum()
+    if off < OFF:
+        return ()
+    return (
+        f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page",
+    )
+
+
+def place(point: Floats) -> str:
+    """A point (x, y) as text."""
+    return f"({point[0]:.4g}, {point[1]:.4g})"
+
+
+def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
+    """What a disc cannot reach when it rolls in from outside and never touches a stroke.
+
+    gap: diameter of the disc in parts of the grid's longer side; it is two pixels at least.
+    """
+    from scipy import ndimage
+
+    radius = max(1.0, gap * max(strokes.shape) / 2)
     pad = int(np.ceil(radius)) + 2
     walls = np.pad(strokes, pad)
     free = ndimage.distance_transform_edt(~walls) > radius

@@ -11,6 +11,7 @@ import os
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -21,13 +22,15 @@ from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
+from ..instance.reading import Reading
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
+from .bridges import as_points, closing, curve_ends, opened
 from .choice import AS_DRAWN, Choice, Silhouette
 from .cover import Cover, Frame, Meetings, block_means, cover_by_segments, fit_frame, meeting_curves
 from .curves import Curves, bounding_box, flatten
-from .outline import along_outline, inside_outline, parts_with
+from .outline import along_outline, boundless, crowded, inside_outline, off_page, parts_with
 from .pen_strokes import SPATIAL, read_curves, read_scap
 from .svg import read_svg
 
@@ -52,14 +55,15 @@ class _Sketch:
     """What every kind of sketch knows of itself, in its own units with y down.
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
-    covers: the cover of a frame by curvature lines and by other strokes. meetings: where on it curvature
-    lines meet, None for a picture, which does not say.
-    stroke_width: as drawn in a picture, 0 for the lines without width of a vector sketch.
+    covers: the cover of a frame by curvature lines and by other strokes. ends: where strokes end,
+    points and ways out (n, 2, 2). meetings: where on a frame curvature lines meet, None for a picture, which
+    does not say. stroke_width: as drawn in a picture, 0 for the lines without width of a vector sketch.
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
+    ends: Callable[[], Floats]
     meetings: Callable[[Frame], Meetings] | None = None
     stroke_width: float = 0.0
 
@@ -141,7 +145,7 @@ def instance_of(
     else:
         frame, given = _masked(mask, sketch.page, size)
     lines, others = sketch.covers(frame)
-    solve = _solve_mask(lines, others, given)
+    solve, found = _solve_mask(lines, others, given, sketch, frame)
     weight = np.where(solve, lines.weight, 0.0)
     met = sketch.meetings(frame).inside(solve) if crossings and sketch.meetings else None
     if met is not None:
@@ -164,6 +168,7 @@ def instance_of(
         source=" ".join(source.split()),
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
+        reading=found,
     ).with_weights(STROKE_WEIGHT, SKEW_WEIGHT)
     return read if met is None else _with_both(read, met)
 
@@ -232,7 +237,7 @@ def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
     picture = read_picture(data, size)
     page = (0.0, 0.0, picture.width, picture.height)
     width = picture.stroke_width * picture.reduced
-    return _Sketch(picture.box, page, picture.covers, stroke_width=width)
+    return _Sketch(picture.box, page, picture.covers, picture.ends, stroke_width=width)
 
 
 def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
@@ -267,7 +272,8 @@ def _of_curves(curves: Curves) -> _Sketch:
         segments, curve, line = segments_of(curves, frame)
         return meeting_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
 
-    return _Sketch(bounding_box(curves.points), curves.canvas, covers, meetings)
+    ends = partial(curve_ends, curves.points)
+    return _Sketch(bounding_box(curves.points), curves.canvas, covers, ends, meetings)
 
 
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
@@ -314,22 +320,35 @@ def _mask_on_grid(
     return frame, share >= 0.5 - 1e-6
 
 
-def _solve_mask(lines: Cover, others: Cover, given: Bools | None) -> Bools:
-    """The pixels to solve for: the mask, or the inside of the outline, less what other strokes cut out."""
+def _solve_mask(
+    lines: Cover, others: Cover, given: Bools | None, sketch: _Sketch, frame: Frame
+) -> tuple[Bools, Reading]:
+    """The pixels to solve for, and what is to be said of them.
+
+    They are the mask, or the inside of the outline, its gaps bridged, less what other strokes cut out.
+    """
     cut = others.amount >= CUT
+    filled = lines.amount + others.amount >= CUT
     if given is not None:
-        return given & ~cut
+        solve = given & ~cut
+        return solve, Reading(sketch.page, crowded(filled, solve, frame))
     walls = (lines.amount >= LEAST_WEIGHT) | cut
     if not walls.any():
         raise InputError("no stroke is left on so coarse a grid; choose a larger size")
-    solve = parts_with(
-        inside_outline(walls) & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0)
-    )
+    closed, openings = closing(walls, sketch.ends(), frame)
+    region = inside_outline(closed)
+    solve = parts_with(region & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
     if not solve.any():
         raise InputError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
-    return solve
+    warnings = (
+        *opened(openings),
+        *boundless(region),
+        *crowded(filled, solve, frame),
+        *off_page(solve, frame, sketch.page),
+    )
+    return solve, Reading(sketch.page, warnings, as_points(openings))
 
 
 def _left(solve: Bools, weight: Floats) -> Bools:

@@ -112,7 +112,7 @@ def test_the_tour_of_the_verbs(tmp_path, crossfield):
 
 RUN_FILES = {
     "field.json", "field.npz", "field.obj", "field.rawfield", "report.json",
-    "angle.png", "crosses.png", "field.png", "instance.png", "overview.png",
+    "angle.png", "crosses.png", "field.png", "instance.png", "mask.png", "overview.png",
     "overlay.png", "overlay.svg",
 }  # fmt: skip
 

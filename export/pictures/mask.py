@@ -1,0 +1,90 @@
+"""The mask of an instance as a picture of the size that `--mask` takes, to be painted and given back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.errors import InputError
+from ...models.input_limits import MAX_PIXELS, MAX_SIDE
+from ...models.instance.grid import Bools, Floats
+from ...models.instance.instance import Instance
+from ...models.storage import replacing
+
+Page = tuple[float, float, float, float]
+
+_TINT: Final = (170, 195, 255)  # of bridged gaps; as light as that, it counts as white when it is read
+
+
+def write_mask(instance: Instance, path: str | Path) -> Path:
+    """The path of the PNG that now holds the mask: white where the field is solved, black elsewhere.
+
+    It is as large as the bitmap that the instance was read from, or as the page of a vector sketch, rounded:
+    what read_sketch takes as `mask`. Gaps in the outline that were bridged are tinted light blue, and count
+    as white. Raises InputError for an instance that was read from no page, or from one too small or too large
+    for a picture, and OutputError.
+    """
+    from PIL import Image, ImageDraw
+
+    path, page = Path(path), _page(instance)
+    if page is None:
+        raise InputError(
+            f"{instance.name} has no page that a mask could cover; give a sketch with a viewBox or a width "
+            f"and height, of 1 to {MAX_SIDE} units a side and {MAX_PIXELS // 10**6} million in all",
+            file=path,
+        )
+    white = mask_on_page(instance, page)
+    image = Image.fromarray(np.where(white, np.uint8(255), np.uint8(0)))
+    if instance.reading is not None and instance.reading.openings:
+        line = Image.new("L", image.size, 0)
+        scale = np.array(image.size) / page[2:]
+        width = max(1, round(instance.pixel_size * float(scale.mean()) / 2))
+        for ends in (np.array(instance.reading.openings) - page[:2]) * scale:
+            ImageDraw.Draw(line).line(ends.ravel().tolist(), fill=255, width=width)
+        where = Image.fromarray(np.minimum(np.asarray(image), np.asarray(line)))
+        image = Image.composite(Image.new("RGB", image.size, _TINT), image.convert("RGB"), where)
+    with replacing(path) as stream:
+        image.save(stream, "PNG")
+    return path
+
+
+def has_mask(instance: Instance) -> bool:
+    """Whether the mask of an instance can be written as a picture."""
+    return _page(instance) is not None
+
+
+def mask_on_page(instance: Instance, page: Page) -> Bools:
+    """Which pixels of the page, bool [height, width], have their middle in a pixel that is solved for.
+
+    page: x, y, width and height in the units of the drawing; a pixel of it has about one unit a side.
+    """
+    x, y, width, height = page
+    row = _cells(y, height, instance.origin[1], instance.pixel_size)
+    column = _cells(x, width, instance.origin[0], instance.pixel_size)
+    high, wide = instance.mask.shape
+    across = (column >= 0) & (column < wide)
+    down = (row >= 0) & (row < high)
+    white: Bools = np.zeros((len(row), len(column)), dtype=bool)
+    white[np.ix_(down, across)] = instance.mask[np.ix_(row[down], column[across])]
+    return white
+
+
+def _cells(start: float, side: float, origin: float, pixel: float) -> NDArray[np.int64]:
+    """The row or column of the grid, on it or beyond, in which the middle of each page pixel lies."""
+    count = round(side)
+    middle: Floats = start + (np.arange(count) + 0.5) * side / count
+    # Far beyond the grid is as good as just beyond it, and is a whole number of 64 bits.
+    return np.floor(np.clip((middle - origin) / pixel, -1, 1e6)).astype(np.int64)
+
+
+def _page(instance: Instance) -> Page | None:
+    """The page of the drawing, if a mask of it has pixels and not too many."""
+    page = None if instance.reading is None else instance.reading.page
+    if page is None:
+        return None
+    width, height = page[2:]
+    fits = min(width, height) > 0.5 and max(width, height) <= MAX_SIDE and width * height <= MAX_PIXELS
+    return page if fits else None

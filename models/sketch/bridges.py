@@ -1,0 +1,277 @@
+"""Gaps in an outline: where strokes end, and the short bridges that close one.
+
+A drawing's outline is seldom drawn without a break. A bridge is a straight line between two ends of strokes,
+or from an end on to the next stroke; it is kept only where it closes off room that would be open without it
+(`closing`).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.elementary import length as vector_length
+from ..instance.grid import Bools, Floats
+from ..instance.reading import Point
+from .cover import Frame, block_means, covering_curves
+from .outline import enclosed, place
+
+Indices = NDArray[np.intp]
+
+LONGEST: Final = 0.08
+"""Longest bridge, in parts of the grid's longer side: with a wider gap a drawing is meant to be open."""
+WIDER: Final = 0.7
+"""Least side of the square as large as what a bridge closes off, in pixels that the bridge takes.
+
+A line takes up to 1 / 0.7 pixels for each that it is long: the room behind a gap is as wide as the gap.
+"""
+AHEAD: Final = 0.5
+ASIDE: Final = -0.1
+"""Least cosines of the turns from the one stroke and from the other into the bridge: 60 and 96 degrees.
+
+A gap may take a corner away, or begin at one.
+"""
+_TAIL: Final = 11  # pixels round the end of a thinned line that tell where it would go on
+_NEAREST: Final = 8  # other ends that an end may be bridged to: the work stays linear
+_THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
+_SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
+_INK: Final = 0.3
+_MOST_BRIDGES: Final = 10_000  # the shortest ones: the work has a bound
+_MOST_TRIED: Final = 32  # bridges that are tried whether the others do without them
+_MOST_PLACES: Final = 5  # in one warning
+
+
+def curve_ends(points: Floats) -> Floats:
+    """Where one piece alone of all cubics (k, 4, 2) begins or ends: point and way out, (n, 2, 2).
+
+    The way out is the direction (x, y) in which the curve would go on, of any length.
+    """
+    ends = np.concatenate([points[:, 0], points[:, 3]])
+    inside = np.concatenate([points[:, 1:], points[:, 2::-1]])
+    grain = max(_SAME * float(np.ptp(ends, axis=0).max()), np.finfo(float).tiny)
+    apart = (np.abs(inside - ends[:, None]) > grain).any(axis=-1)
+    nearest = inside[np.arange(len(ends)), np.argmax(apart, axis=1)]
+    _, first, times = np.unique(np.round(ends / grain), axis=0, return_index=True, return_counts=True)
+    free = np.sort(first[times == 1])
+    return np.stack([ends[free], ends[free] - nearest[free]], axis=1)
+
+
+def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
+    """Where thin strokes end: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y).
+
+    width: of a stroke in pixels. The ink is thinned to lines of one pixel; a line ends at a pixel that has a
+    single neighbour. A stroke goes on for half its width beyond, which is far below the gaps that count.
+    """
+    from scipy import ndimage
+
+    reduced = max(1.0, max(ink.shape) / _THINNED)
+    rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in ink.shape)
+    small = block_means(ink, rows, columns)
+    line = thinned(small * max(1.0, reduced / width) > _INK)
+    neighbours = ndimage.convolve(line.astype(np.uint8), np.ones((3, 3), dtype=np.uint8), mode="constant")
+    row, column = np.nonzero(line & (neighbours == 2))
+    # From the middle of the line near its end to the end.
+    mean = [
+        ndimage.uniform_filter(part * line, _TAIL, mode="constant")[row, column]
+        for part in (np.ones(line.shape), *np.indices(line.shape, dtype=np.float64)[::-1])
+    ]
+    middle = np.stack(mean[1:], axis=1) / mean[0][:, None]
+    ends = np.stack([column, row], axis=1)
+    return np.stack([(ends + 0.5) * reduced, (ends - middle) * reduced], axis=1)
+
+
+def thinned(shape: Bools) -> Bools:
+    """The shape [h, w] thinned to lines one pixel wide.
+
+    T. Y. Zhang, C. Y. Suen: A fast parallel algorithm for thinning digital patterns, Communications of the
+    ACM 27 (1984).
+    """
+    line = np.pad(shape, 1)
+    while True:
+        before = int(line.sum())
+        for first in (True, False):
+            line[1:-1, 1:-1] &= ~_removable(line, first=first)
+        if int(line.sum()) == before:
+            return line[1:-1, 1:-1]
+
+
+def _removable(line: Bools, *, first: bool) -> Bools:
+    """The pixels of a padded shape that one of the two passes of the thinning takes away."""
+    # Neighbours from the upper one on, clockwise.
+    steps = ((0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0))
+    height, width = line.shape
+    around = np.stack([line[down : height - 2 + down, right : width - 2 + right] for down, right in steps])
+    up, right, down, left = around[::2]
+    count = around.sum(axis=0, dtype=np.uint8)
+    turns = (~around & np.roll(around, -1, axis=0)).sum(axis=0, dtype=np.uint8)
+    sides = (up & right & down) | (right & down & left) if first else (up & right & left) | (up & down & left)
+    removable: Bools = (count >= 2) & (count <= 6) & (turns == 1) & ~sides
+    return removable
+
+
+def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
+    """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
+
+    walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge
+    leads from an end that lies at the outside to another such, or on to the next stroke. It is at most
+    LONGEST, and no longer than the connected strokes at its ends reach; it goes on where they end (AHEAD,
+    ASIDE), and closes off room as wide as the gap (WIDER). Walls that enclose all the room that they can come
+    back as they are.
+    """
+    outside = ~enclosed(walls)
+    bridges = _candidates(walls, outside, ends, frame)
+    if not len(bridges):
+        return walls, bridges
+    number, row, column, _ = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
+    rooms, mouths = _rooms(walls, outside, row, column)
+    if not rooms.any():
+        return walls, bridges[:0]
+    pixels = (number, row, column)
+    kept = _needed(walls, rooms, mouths, pixels)
+    return _with(walls, pixels, kept), bridges[kept]
+
+
+def opened(openings: Floats) -> tuple[str, ...]:
+    """A warning of the gaps (m, 2, 2) in the outline that were bridged, or none."""
+    if not len(openings):
+        return ()
+    wide = vector_length(*(openings[:, 1] - openings[:, 0]).T)
+    order = np.argsort(-wide, kind="stable")
+    places = [f"{place(openings[k].mean(axis=0))} over {wide[k]:.4g}" for k in order[:_MOST_PLACES]]
+    more = f" and {len(order) - _MOST_PLACES} more" if len(order) > _MOST_PLACES else ""
+    warning = (
+        f"outline open here: {', '.join(places)}{more}; it is taken as closed by a straight line, "
+        "draw it on or give a mask if that is wrong"
+    )
+    return (warning,)
+
+
+def as_points(segments: Floats) -> tuple[tuple[Point, Point], ...]:
+    """Both ends of each segment (m, 2, 2) as tuples (x, y)."""
+    return tuple(((a, b), (c, d)) for (a, b), (c, d) in segments.tolist())
+
+
+def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
+    """How far (n,) the connected strokes reach that are at or beside these pixels, in pixels."""
+    from scipy import ndimage
+
+    label, _ = ndimage.label(walls, np.ones((3, 3), dtype=bool))
+    sides = [0, *(max(part.stop - part.start for part in box) for box in ndimage.find_objects(label))]
+    extents: Floats = ndimage.maximum_filter(np.array(sides, dtype=np.float64)[label], size=3)[row, column]
+    return extents
+
+
+def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Floats:
+    """The lines (m, 2, 2) from ends that lie at the outside to other such ends, or on to the next stroke."""
+    from scipy import ndimage
+
+    place = np.floor((ends[:, 0] - (frame.x, frame.y)) / frame.pixel).astype(np.int64)
+    column, row = np.clip(place, 0, np.array(walls.shape[::-1]) - 1).T
+    open_there = ndimage.binary_dilation(outside, np.ones((3, 3), dtype=bool), border_value=1)[row, column]
+    longest = np.minimum(LONGEST * max(walls.shape), _extents(walls, row, column))[open_there]
+    on_grid = (ends[open_there] - [(frame.x, frame.y), (0.0, 0.0)]) / frame.pixel
+    first = slice(_MOST_BRIDGES)
+    on = _prolonged(walls, on_grid[first], longest[first]) * frame.pixel + (frame.x, frame.y)
+    # Of two that do the same the later one is kept: that between two ends.
+    lines: Floats = np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
+    return lines
+
+
+def _between(ends: Floats, longest: Floats) -> Floats:
+    """The straight lines (m, 2, 2) from each end to those near it that lie ahead, each once.
+
+    longest: (n,), what a line from each of the ends may be long.
+    """
+    from scipy.spatial import KDTree
+
+    if len(ends) < 2:
+        return np.empty((0, 2, 2))
+    point, out = ends[:, 0], ends[:, 1]
+    distance, other = KDTree(point).query(
+        point, k=1 + min(_NEAREST, len(ends) - 1), distance_upper_bound=longest.max()
+    )
+    one, place = np.nonzero(np.isfinite(distance))
+    two = other[one, place]
+    pairs = np.unique(np.sort(np.stack([one, two], axis=1), axis=1)[one != two], axis=0)
+    line = np.diff(point[pairs], axis=1)
+    far = vector_length(*line[:, 0].T)
+    way = out[pairs] * np.array([1.0, -1.0])[:, None]
+    length = vector_length(*np.moveaxis(way, -1, 0)) * far[:, None]
+    cosine = np.sort((way * line).sum(axis=-1) / np.maximum(length, np.finfo(float).tiny), axis=1)
+    ahead = (cosine[:, 0] >= ASIDE) & (cosine[:, 1] >= AHEAD) & (far <= longest[pairs].min(axis=1))
+    shortest = np.argsort(far[ahead], kind="stable")[:_MOST_BRIDGES]
+    lines: Floats = point[pairs[ahead][np.sort(shortest)]]
+    return lines
+
+
+def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
+    """The straight lines (m, 2, 2) on which strokes that go on would meet another stroke, all in pixels.
+
+    ends: (n, 2, 2), points and ways out; longest: (n,), what each line may be long.
+    """
+    point, out = ends[:, 0], ends[:, 1]
+    unit = out / np.maximum(vector_length(*out.T), np.finfo(float).tiny)[:, None]
+    step = np.arange(0.0, max(longest.max(initial=0.0), 1.0), 0.5)
+    way = point[:, None] + step[:, None] * unit[:, None]
+    column, row = np.clip(np.floor(way).astype(np.int64), 0, np.array(walls.shape[::-1]) - 1).transpose(
+        2, 0, 1
+    )
+    stroke = walls[row, column]
+    left = np.cumsum(~stroke, axis=1) > 0  # beyond the pixels of the stroke itself
+    meets = stroke & left & (step <= longest[:, None])
+    ahead = meets.any(axis=1)
+    met = way[np.arange(len(way)), np.argmax(meets, axis=1)]
+    lines: Floats = np.stack([point, met], axis=1)[ahead]
+    return lines
+
+
+def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices) -> Bools:
+    """The walls and the pixels (bridge, row, column) of those bridges that are kept."""
+    bridge, row, column = pixels
+    drawn = np.isin(bridge, kept)
+    closed = walls.copy()
+    closed[row[drawn], column[drawn]] = True
+    return closed
+
+
+def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
+    """The room that bridges at these pixels close off, where it is as wide as the gaps to it, and those gaps.
+
+    Both bool [height, width]; the gaps are the bridges' pixels between room and outside.
+    """
+    from scipy import ndimage
+
+    drawn = walls.copy()
+    drawn[row, column] = True
+    region, eight = enclosed(drawn), np.ones((3, 3), dtype=bool)
+    mouths = drawn & ~walls & ndimage.binary_dilation(~region, eight, border_value=1)
+    gained = region & outside & ~mouths
+    label, count = ndimage.label(gained)
+    row, column = np.nonzero(mouths)
+    near = np.pad(label, 1)
+    room = np.sort([near[row + down, column + right] for down in range(3) for right in range(3)], axis=0)
+    room[1:][np.diff(room, axis=0) == 0] = 0  # each pixel once for each room
+    mouth = np.bincount(room.ravel(), minlength=count + 1)
+    wide = np.bincount(label.ravel(), minlength=count + 1) >= np.maximum(4, (WIDER * mouth) ** 2)
+    wide[0] = False
+    return wide[label], mouths
+
+
+def _needed(walls: Bools, rooms: Bools, mouths: Bools, pixels: tuple[Indices, Indices, Indices]) -> Indices:
+    """The numbers of few bridges that enclose these rooms, those nearest to the outside before others."""
+    from scipy import ndimage
+
+    bridge, row, column = pixels
+    count = int(bridge.max()) + 1
+    free = ~walls[row, column]
+    beside = ndimage.binary_dilation(rooms, np.ones((3, 3), dtype=bool)) & mouths
+    outer = np.bincount(bridge[free], mouths[row, column][free], count)
+    share = outer / np.maximum(np.bincount(bridge[free], minlength=count), 1)
+    kept = np.unique(bridge[beside[row, column]])
+    for one in kept[np.argsort(share[kept], kind="stable")][:_MOST_TRIED]:
+        fewer = kept[kept != one]
+        if not (rooms & ~enclosed(_with(walls, pixels, fewer))).any():
+            kept = fewer
+    return kept

@@ -1,0 +1,200 @@
+"""Outlines with a gap, drawings that enclose nothing, holes, and strokes without room between them."""
+
+import io
+
+import crossfield as cf
+import numpy as np
+import places
+import pytest
+from crossfield.models.sketch.bridges import thinned
+from crossfield.models.sketch.curves import flatten
+from crossfield.models.sketch.read import instance_of
+from crossfield.models.sketch.samples import sample_svg, samples
+from crossfield.models.sketch.svg import read_svg
+from PIL import Image, ImageDraw
+from scipy import ndimage
+
+SHARED = places.SHARED / "sketches"
+SKETCHES = [each.name for each in samples() if each.kind == "sketch"]
+COLOURS = {False: "black", True: "#d1242f"}
+
+
+def svg(paths, page="0 0 100 100"):
+    body = "".join(f'<path d="{path}" fill="none" stroke="{colour}"/>' for path, colour in paths)
+    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{page}">{body}</svg>'.encode()
+
+
+def read(data, size=48, source="a.svg"):
+    return instance_of(data, size=size, name="a", source=source)
+
+
+def in_black(*paths):
+    return read(svg([(path, "black") for path in paths]))
+
+
+def middles(instance):
+    return np.array(instance.reading.openings).mean(axis=1)
+
+
+def cut(name, centre, gap):
+    """A sample's drawing without what lies within half a gap of a point."""
+    curves = read_svg(sample_svg(name).encode())
+    segments, owner = flatten(curves.points, 0.05)
+    pieces = np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / 1.5).astype(int).clip(1)
+    of = np.repeat(np.arange(len(segments)), pieces)
+    step = np.arange(len(of)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    ends = [
+        segments[of, 0] + ((step + side) / pieces[of])[:, None] * (segments[of, 1] - segments[of, 0])
+        for side in (0, 1)
+    ]
+    far = np.hypot(*((ends[0] + ends[1]) / 2 - centre).T) > gap / 2
+    lines = np.stack(ends, axis=1)[far].round(3).tolist()
+    red = curves.red[owner[of[far]]]
+    paths = [
+        (
+            "".join(
+                f"M{a} {b}L{c} {d}"
+                for ((a, b), (c, d)), is_red in zip(lines, red, strict=True)
+                if is_red == r
+            ),
+            r,
+        )
+        for r in (False, True)
+    ]
+    page = " ".join(map(str, curves.canvas))
+    return svg([(path, COLOURS[r]) for path, r in paths if path], page)
+
+
+def on_outline(name, instance, rng, count):
+    """Points of a sample's strokes at the outer border of its mask."""
+    points = flatten(read_svg(sample_svg(name).encode()).points, 0.5)[0].mean(axis=1)
+    column, row = np.floor((points - instance.origin) / instance.pixel_size).astype(int).T
+    outside = ~ndimage.binary_fill_holes(instance.mask)
+    border = ndimage.binary_dilation(outside, np.ones((3, 3))) & instance.mask
+    return rng.permutation(points[border[row, column]])[:count]
+
+
+def test_a_gap_in_the_outline_of_a_sample_leaves_its_mask_nearly_the_same():
+    assert sum(bridged_gaps(name) for name in ("mouse", "skew", "singular")) >= 2
+
+
+def bridged_gaps(name):
+    """How many of some gaps had to be bridged; at all of them the mask is nearly that of the whole sample."""
+    whole = cf.sample(name, 48)
+    side = max(whole.mask.shape) * whole.pixel_size
+    rng = np.random.default_rng(2)
+    bridged = 0
+    for share in (0.05, 0.06, 0.07):
+        for centre in on_outline(name, whole, rng, 3):
+            instance = read(cut(name, centre, share * side))
+            if (
+                instance.pixel_size != pytest.approx(whole.pixel_size)
+                or instance.mask.shape != whole.mask.shape
+            ):
+                continue  # an end of the drawing is cut off
+            assert (instance.mask != whole.mask).sum() <= 0.02 * whole.mask.sum(), (share, centre)
+            if instance.reading.openings:
+                bridged += 1
+                assert "outline open here: (" in instance.reading.warnings[0]
+                assert np.hypot(*(middles(instance) - centre).T).max() < share * side
+    return bridged
+
+
+def test_a_compartment_with_a_gap_is_kept_in_svg_and_bitmap():
+    whole = in_black("M10 30H90V70H10Z", "M50 30V70")
+    instance = in_black("M84 30H10V70H90V30", "M50 30V70")  # a gap at a corner
+    assert (instance.mask == whole.mask).all()
+    assert instance.reading.openings == (((84, 30.0), (90.0, 30.0)),)
+    assert instance.reading.warnings[0].startswith("outline open here: (87, 30) over 6; ")
+    image = Image.new("L", (400, 400), 255)
+    draw = ImageDraw.Draw(image)
+    draw.line((336, 120, 40, 120, 40, 280, 360, 280, 360, 120), fill=0, width=4)
+    draw.line((200, 120, 200, 280), fill=0, width=4)
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    bitmap = read(stream.getvalue(), 64, "a.png")
+    assert np.abs(middles(bitmap) - (348, 120)).max() < 5
+    assert bitmap.mask.sum() * bitmap.pixel_size**2 == pytest.approx(324 * 164, rel=0.08)
+
+
+def test_a_stroke_that_stops_short_of_another_is_carried_on_to_it():
+    instance = in_black("M90 25V75", "M84 30H10V70H84", "M50 30V70")
+    assert np.abs(middles(instance) - [(87, 30), (87, 70)]).max() < 1
+    whole = in_black("M90 25V75", "M90 30H10V70H90", "M50 30V70")
+    assert (instance.mask == whole.mask).all()
+
+
+@pytest.mark.parametrize("size", [24, 48])
+def test_closed_drawings_have_no_opening_and_no_warning(size):
+    for name in SKETCHES:
+        assert cf.sample(name, size).reading.warnings == ()
+    if not SHARED.is_dir():
+        pytest.skip("the developers' sketches are not beside the checkout")
+    for path in sorted(SHARED.iterdir()):
+        if path.suffix in {".svg", ".png", ".scap"} and "_mask" not in path.name:
+            assert cf.read_sketch(path, size=size).reading.openings == (), path.name
+
+
+def test_ends_that_do_not_go_on_in_each_other_are_no_gap():
+    fork = "M20 90V10H30V60H70V10H80V90Z"
+    prongs = in_black(fork, "M25 80V14", "M75 80V14", "M30 30H21", "M70 30H79")
+    assert prongs.reading.warnings == ()
+    assert (prongs.mask == in_black(fork).mask).all()
+    overshoots = in_black("M10 40H90V90H10Z", "M30 80V20", "M36 80V20", "M42 80V20")
+    assert not overshoots.reading.openings
+
+
+def test_what_encloses_nothing_is_solved_as_a_rectangle_and_said_to_be():
+    for paths in (["M10 40Q50 10 90 40"], ["M30 30H90V70H10V30H14", "M10 20H90"]):
+        instance = in_black(*paths)
+        assert instance.mask.all() == any("enclose nothing" in text for text in instance.reading.warnings)
+    assert in_black("M10 40Q50 10 90 40").mask.all()
+
+
+def test_a_hole_is_solved_in_one_colour_and_left_out_between_cuts():
+    outer, inner = "M90 50A40 40 0 1 1 90 49.9Z", "M65 50A15 15 0 1 1 65 49.9Z"
+    assert in_black(outer, inner).mask[23:25, 23:25].all()
+    lines = [(outer, "black"), (inner, "black"), ("M10 50H30M70 50H90M50 10V30M50 70V90", "#d1242f")]
+    assert not read(svg(lines)).mask[18:30, 18:30].any()
+
+
+def test_solid_ink_and_hatching_are_warned_of_with_their_place():
+    hatching = "".join(f"M20 {20 + k / 2}H80" for k in range(60))
+    (text,) = in_black("M10 10H90V90H10Z", hatching).reading.warnings
+    assert "strokes leave no room between them round (50," in text
+    image = Image.new("L", (200, 200), 255)
+    ImageDraw.Draw(image).rectangle((20, 20, 180, 180), outline=0, width=3)
+    ImageDraw.Draw(image).ellipse((100, 100, 170, 170), fill=0)
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    (text,) = read(stream.getvalue(), source="a.png").reading.warnings
+    assert "strokes leave no room between them round (13" in text
+
+
+def test_drawings_off_their_page_are_warned_of():
+    data = svg([("M10 10H90V190H10Z", "black")])
+    (text,) = read(data).reading.warnings
+    assert text.startswith("48% of the pixels to solve for lie off the page")
+
+
+def test_thinning_leaves_lines_of_one_pixel():
+    image = Image.new("1", (120, 80))
+    ImageDraw.Draw(image).line((10, 10, 100, 60), fill=1, width=9)
+    ImageDraw.Draw(image).ellipse((20, 40, 50, 70), fill=0, outline=1, width=5)
+    shape = np.asarray(image)
+    line = thinned(shape)
+    assert not (line & ~shape).any()
+    assert ndimage.label(line, np.ones((3, 3)))[1] == ndimage.label(shape, np.ones((3, 3)))[1]
+    assert not ndimage.binary_opening(line, np.ones((2, 2))).sum() > 4
+    neighbours = ndimage.convolve(line.astype(int), np.ones((3, 3)), mode="constant")
+    assert (line & (neighbours == 2)).sum() == 2
+
+
+def test_bridged_gaps_are_drawn_and_tinted_in_the_mask(tmp_path):
+    instance = in_black("M84 30H10V70H90V30", "M50 30V70")
+    picture = np.asarray(Image.open(cf.draw(instance, tmp_path / "a.png", kind="instance")).convert("RGB"))
+    assert (picture == (0x30, 0x56, 0xD3)).all(axis=-1).sum() > 50
+    mask = np.asarray(Image.open(cf.write_mask(instance, tmp_path / "m.png")))
+    tinted = np.argwhere((mask != mask[..., :1]).any(axis=-1))
+    assert np.abs(tinted.mean(axis=0) - (30, 87)).max() < 2
+    assert (mask[tuple(tinted.T)].mean(axis=-1) > 127.5).all()
