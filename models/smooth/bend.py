@@ -2,8 +2,8 @@
 
 Iarussi, Bommes, Bousseau: BendFields: Regularized Curvature Fields from Rough Concept Sketches (ACM
 Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, lets no line turn for
-nothing. Curvature lines do turn along themselves, as the surface bends; what changes little is their direction
-from one of them to the next.
+nothing. Curvature lines do turn along themselves, as the surface bends; what changes little is their
+direction from one of them to the next.
 """
 
 from __future__ import annotations
