@@ -25,8 +25,8 @@ _Places = NDArray[np.intp]
 
 HARMONIC: Final = 0.05
 """Weight of plain smoothness beside bend: 0.01 follows clean strokes best, 0.1 evens out rough ones."""
-HOLD: Final = 2.0
-"""Factor of the stroke weights: above 3, noise on the strokes shows in the field."""
+HOLD: Final = 1.5
+"""Factor of the stroke weights: from 2 on, 3 degrees of noise on the strokes show in the field."""
 
 _ROUNDS: Final = 20  # 2 to 6 are usual
 _FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
