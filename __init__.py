@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from .models.sketch.samples import sample as sample
     from .models.sketch.samples import samples as samples
     from .models.sketch.surfaces import analytic as analytic
+    from .models.smooth.bend import bend_field as bend_field
     from .models.smooth.polyvector import polyvector_field as polyvector_field
     from .models.smooth.power_field import power_field as power_field
 
@@ -64,6 +65,7 @@ _HOME: Final = {
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
     "analytic": ".models.sketch.surfaces",
+    "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
     "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",

@@ -138,7 +138,7 @@ SecondsInAll = Annotated[
         "--time-limit",
         min=0.1,
         metavar="SECONDS",
-        help="Seconds in all, reading and writing files included; greedy and power end when they are done.",
+        help="Seconds in all, reading and writing files included; methods that do not search end earlier.",
     ),
 ]
 SecondsEach = Annotated[

@@ -21,7 +21,8 @@ from ...models.search.greedy import greedy
 from ...models.search.improvement import first_field
 from ...models.search.polyvector_start import polyvector_start
 from ...models.search.search import Search
-from ...models.smooth.polyvector import polyvector_field
+from ...models.smooth.bend import bend_field
+from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
@@ -166,6 +167,14 @@ def _polyvector(request: Request) -> Iterator[Candidate]:
     yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
 
 
+def _bend(request: Request) -> Iterator[Candidate]:
+    request.progress("bend field")
+    yield _timed("bend", lambda: bend_field(polyvector_field(request.instance, hold=max(HOLDS))))
+    start = request.start
+    if start is not None:
+        yield _timed("start + bend", lambda: bend_field(start))
+
+
 def _search(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
     request.progress("search: starting fields")
@@ -271,6 +280,12 @@ METHODS: Final = {
             "polyvector",
             "smooth polynomials whose roots are the lines, at any angle; then the best angles for its jumps",
             _polyvector,
+            timed=False,
+        ),
+        Method(
+            "bend",
+            "lines that change little along the other line, from the PolyVector field with hard strokes",
+            _bend,
             timed=False,
         ),
         Method(

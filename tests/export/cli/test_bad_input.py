@@ -540,6 +540,8 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
         "power + QP",
         "polyvector",
         "polyvector + QP",
+        "bend",
+        "start + bend",
         "search",
         "prove",
     }

@@ -163,7 +163,7 @@ def test_a_run_keeps_the_field_of_least_2_norm_energy(two_parts):
     assert field.energy(2).total == pytest.approx(min(energies), rel=1e-9)
     assert energies == pytest.approx(sorted(energies), rel=1e-8)
     assert report["best"] == report["methods"][0]["method"]
-    assert len(report["methods"]) == 10
+    assert len(report["methods"]) == 12
     assert report["failures"] == {}
     for row in report["methods"]:
         if "status" in row:
@@ -414,9 +414,9 @@ def test_the_table_of_a_run_stands_in_lines(two_parts):
     rows = [
         line
         for line in two_parts[1].stdout.splitlines()
-        if re.match(r" ?(start|greedy|power|polyvector|MILP|two-stage|search|prove)", line)
+        if re.match(r" ?(start|greedy|power|polyvector|bend|MILP|two-stage|search|prove)", line)
     ]
-    assert len(rows) == 10
+    assert len(rows) == 12
     assert sum("*" in row for row in rows) == 1
     assert "*" in rows[0]
 

@@ -1,0 +1,175 @@
+"""The bend field: lines of one family change little along those of the other.
+
+Iarussi, Bommes, Bousseau: BendFields: Regularized Curvature Fields from Rough Concept Sketches (ACM
+Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, lets no line turn for
+nothing. Curvature lines do turn along themselves, as the surface bends; what changes little is their
+direction from one of them to the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..field.field import CrossField
+from ..instance.angles import wrap
+from ..instance.grid import Floats, Ints
+from ..instance.instance import HALF, QUARTER
+from .systems import factored
+
+_Places = NDArray[np.intp]
+
+HARMONIC: Final = 0.05
+"""Weight of plain smoothness beside bend: 0.01 follows clean strokes best, 0.1 evens out rough ones."""
+HOLD: Final = 1.5
+"""Factor of the stroke weights: from 2 on, 3 degrees of noise on the strokes show in the field."""
+
+_ROUNDS: Final = 20  # 2 to 6 are usual
+_FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
+
+
+def bend_field(start: CrossField, *, harmonic: float = HARMONIC, hold: float = HOLD) -> CrossField:
+    """The crosses of little bend that the lines of `start` lead to, as a field with the best jumps.
+
+    With line angles u, v in radians the energy is the sum of (v . grad u)^2 + (u . grad v)^2 over pixels, of
+    2 `harmonic` (du^2 + dv^2) over pairs, of hold w_strokes w (line - theta)^2 over strokes, and of
+    w_beta beta^2 over pixels (docs/mathematics.md, 10). In the brackets u and v stand for unit vectors. The
+    jumps of `start` say which lines of neighbours belong together, and the nearer line of `start` carries a
+    stroke; both stay. So the start decides where singularities are: that of the method `bend` is the
+    PolyVector field with the hardest hold.
+
+    Each round takes the unit vectors as they are and minimises over the angles: one sparse system. The energy
+    is then computed anew; rounds end when it has hardly fallen, at the latest after 20, and one in which it
+    rises is left out.
+    Labels are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic.
+
+    harmonic: weight of plain smoothness, above 0. hold: factor of the stroke weights, above 0.
+    """
+    bend = _Bend.of(start, harmonic, hold)
+    x = np.concatenate(_lines(start))
+    energy = bend.energy(x)
+    for _ in range(_ROUNDS):
+        moved = bend.round(x)
+        fallen = energy - bend.energy(moved)
+        if fallen > 0:
+            x, energy = moved, energy - fallen
+        if fallen <= _FALL * energy:
+            break
+    return CrossField.from_lines(start.instance, *np.split(x, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """The energy of line angles x = (u, v), shape (2n,), as squares: those of bend, and linear ones.
+
+    difference x - offset are the differences of pairs, (2m,), to the right and upwards: row e for the line u
+    of the first pixel of pair e, row m + e for its v. Bend has a square for each quadrant (pixel, line, a
+    horizontal and a vertical neighbour): across (q,) is the place in x of the pixel's other line, sideways
+    and upward (q,) are the rows of the two differences. The linear squares are rows x - goal.
+    """
+
+    difference: Any
+    offset: Floats
+    across: _Places
+    sideways: _Places
+    upward: _Places
+    rows: Any
+    goal: Floats
+
+    @classmethod
+    def of(cls, start: CrossField, harmonic: float, hold: float) -> _Bend:
+        """The energy with the jumps and stroke lines of a field."""
+        difference, offset = _differences(start)
+        carried, theta, weight = _strokes(start, hold)
+        squared, every = np.sqrt(weight), sparse.eye_array(start.instance.grid.size)
+        strokes = sparse.csr_array(
+            (squared, (np.arange(len(carried)), carried)), shape=(len(carried), difference.shape[1])
+        )
+        even, skew = np.sqrt(2 * harmonic), np.sqrt(start.instance.w_beta)
+        rows = [even * difference, strokes, skew / 2 * sparse.hstack([every, -every])]
+        goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
+        return cls(difference, offset, *_quadrants(start), sparse.vstack(rows).tocsr(), np.concatenate(goal))
+
+    def energy(self, x: Floats) -> float:
+        """The energy at x, with the unit vectors of x."""
+        bend = self._along(x) @ (self.difference @ x - self.offset)
+        return float(np.sum(bend**2) + np.sum((self.rows @ x - self.goal) ** 2))
+
+    def round(self, x: Floats) -> Floats:
+        """The angles of least energy for the unit vectors of x."""
+        along = self._along(x)
+        bend = along @ self.difference
+        slope = bend.T @ (along @ (self.difference @ x - self.offset))
+        slope += self.rows.T @ (self.rows @ x - self.goal)
+        step: Floats = factored(bend.T @ bend + self.rows.T @ self.rows)(slope)
+        return x - step
+
+    def _along(self, x: Floats) -> Any:
+        """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
+        angle, every = x[self.across], np.arange(len(self.across))
+        places = (np.concatenate([every, every]), np.concatenate([self.sideways, self.upward]))
+        parts = np.concatenate([np.cos(angle), np.sin(angle)]) / 2
+        return sparse.csr_array((parts, places), shape=(len(every), len(self.offset)))
+
+
+def _lines(field: CrossField) -> tuple[Floats, Floats]:
+    """The angles of u and v, shape (n,) each."""
+    return field.alpha + field.beta, field.alpha + HALF - field.beta
+
+
+def _differences(field: CrossField) -> tuple[Any, Floats]:
+    """Matrix (2m, 2n) and offset (2m,) of the differences of line angles that the jumps compare.
+
+    They are -(A + B) and -(A - B) of (4): an odd jump compares u with v, and a step of the label is pi/2.
+    """
+    grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
+    odd = field.p & 1
+    first = np.concatenate([grid.first, grid.first + size])
+    second = np.concatenate([grid.second + size * odd, grid.second + size * (1 - odd)])
+    values, row = np.ones(2 * pairs), np.arange(2 * pairs)
+    places = (np.concatenate([row, row]), np.concatenate([second, first]))
+    matrix = sparse.csr_array((np.concatenate([values, -values]), places), shape=(2 * pairs, 2 * size))
+    return matrix, HALF * np.concatenate([field.p + odd, field.p - odd])
+
+
+def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:
+    """Across, sideways and upward of each quadrant, as in `_Bend`."""
+    upright = field.instance.grid.upward
+    found = []
+    for beside in _rows_of(field, ~upright):
+        for above in _rows_of(field, upright):
+            at = np.nonzero((beside >= 0) & (above >= 0))[0]
+            across = (at + field.instance.grid.size) % len(beside)
+            found.append((across, beside[at], above[at]))
+    across, sideways, upward = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return across, sideways, upward
+
+
+def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Places]:
+    """The rows of differences that begin and that end at each line, (2n,) each; -1 where there is none.
+
+    Of the chosen pairs, all upright or all level.
+    """
+    grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
+    at = np.nonzero(chosen)[0]
+    begin, end = np.full((2, 2 * size), -1)
+    for line in (0, 1):
+        partner = line ^ (field.p[at] & 1)
+        begin[grid.first[at] + size * line] = at + pairs * line
+        end[grid.second[at] + size * partner] = at + pairs * line
+    return begin, end
+
+
+def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
+    """The line that carries each stroke, as a place in x, its angle there, and its weight; shapes (s,)."""
+    instance = field.instance
+    at = instance.stroke_index
+    lines = np.stack([line[at] for line in _lines(field)])
+    off = wrap(instance.theta - lines, -HALF, np.pi)
+    nearer = np.argmin(np.round(np.abs(off), 9), axis=0)
+    theta = (lines + off)[nearer, np.arange(len(at))]
+    return at + instance.grid.size * nearer, theta, hold * instance.w_strokes * instance.w

@@ -1,0 +1,157 @@
+"""The bend field: exact on constant crosses, near the truth on surfaces, and it moves with the sketch."""
+
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.solving.methods import METHODS, Request
+from crossfield.models.instance.angles import line_difference
+from crossfield.models.instance.instance import HALF, QUARTER
+from crossfield.models.smooth.bend import HARMONIC, HOLD, bend_field
+from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
+from exhaustive import random_instance, sketch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loops import for_each
+
+pytestmark = pytest.mark.numeric
+
+MOVES = {
+    "turned": (np.rot90, lambda angle: angle + HALF),
+    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
+    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
+}
+
+
+def lines(field):
+    return field.alpha + field.beta, field.alpha + HALF - field.beta
+
+
+def noisy(instance, degrees, seed):
+    noise = np.random.default_rng(seed).normal(0, np.radians(degrees), len(instance.theta))
+    return replace(instance, theta=instance.theta + noise)
+
+
+def neighbours(field):
+    """By pixel and side: differences (du, dv) of the lines of a pixel, to the right or upwards."""
+    grid, found = field.instance.grid, {}
+    for i, j, p, upward in zip(grid.first, grid.second, field.p, grid.upward, strict=True):
+        sides, sign = ("up", "down") if upward else ("right", "left"), 1 - 2 * (p & 1)
+        of_j = field.alpha[j] - HALF * p, sign * field.beta[j]  # in the labels of i
+        of_i = field.alpha[i] + HALF * p, sign * field.beta[i]  # in the labels of j
+        a, b = of_j[0] - field.alpha[i], of_j[1] - field.beta[i]
+        found[i, sides[0]] = a + b, a - b
+        a, b = field.alpha[j] - of_i[0], field.beta[j] - of_i[1]
+        found[j, sides[1]] = a + b, a - b
+    return found
+
+
+def bend_energy(field):
+    """The energy of docs/mathematics.md, 10, pixel by pixel."""
+    instance, at = field.instance, neighbours(field)
+    total = 0.0
+    for pixel, (u, v) in enumerate(zip(*lines(field), strict=True)):
+        for beside in ("left", "right"):
+            for above in ("down", "up"):
+                if (pixel, beside) in at and (pixel, above) in at:
+                    (ux, vx), (uy, vy) = at[pixel, beside], at[pixel, above]
+                    total += (np.cos(v) * ux + np.sin(v) * uy) ** 2 / 4
+                    total += (np.cos(u) * vx + np.sin(u) * vy) ** 2 / 4
+    pairs = [du**2 + dv**2 for (_, side), (du, dv) in at.items() if side in {"right", "up"}]
+    strokes = instance.w_strokes * np.sum(instance.w * field.stroke_deviation**2)
+    return total + 2 * HARMONIC * sum(pairs) + HOLD * strokes + instance.w_beta * np.sum(field.beta**2)
+
+
+@for_each("degrees", [(0, 90), (20, 110), (100, 40), (135, 100), (179, 60)])
+def test_constant_crosses_stay(degrees):
+    theta = np.full((6, 7), np.nan)
+    theta[:, 1], theta[:, 5] = np.radians(degrees)
+    instance = replace(sketch(np.ones((6, 7), bool), theta), w_beta=0)
+    angles = [np.full(42, np.radians(angle)) for angle in degrees]
+    field = bend_field(cf.CrossField.from_lines(instance, *angles))
+    assert field.cross_error(*angles) == pytest.approx(np.zeros(42), abs=1e-9)
+    assert bend_energy(field) < 1e-12
+
+
+@for_each("name", ["singular", "saddle", "mouse", "bottle"])
+def test_the_energy_falls_and_the_singularities_stay(name):
+    """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it."""
+    start = cf.greedy(cf.sample(name, 16))
+    field = bend_field(start)
+    assert bend_energy(field) < 0.8 * bend_energy(start)
+    assert field.singularities.index.tolist() == start.singularities.index.tolist()
+    assert bend_energy(bend_field(field)) <= bend_energy(field) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_the_field_moves_with_the_sketch(name):
+    move, turn = MOVES[name]
+    for instance in (cf.sample("mouse", 20), cf.sample("singular", 16)):
+        start, other = polyvector_field(instance, hold=max(HOLDS)), getattr(instance, name)()
+
+        def there(field, mask=other.mask):
+            return [turn(move(field.image(line)))[mask] for line in lines(field)]
+
+        moved = bend_field(cf.CrossField.from_lines(other, *there(start)))
+        assert moved.cross_error(*there(bend_field(start))) == pytest.approx(0, abs=1e-6)
+
+
+def test_labels_do_not_matter():
+    instance = cf.sample("singular", 16)
+    start = cf.greedy(instance)
+    field = bend_field(start)
+    boxed = bend_field(cf.CrossField.from_lines(instance.with_gauge("box"), *lines(start)))
+    assert (boxed.p != field.p).any()
+    assert field.cross_error(*lines(boxed)) == pytest.approx(0, abs=1e-6)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    gauge=st.sampled_from(["strokes", "box"]),
+    w_beta=st.sampled_from([0, 1e-6, 1]),
+    w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
+)
+@settings(deadline=None)
+def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
+    instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
+    field = bend_field(polyvector_field(instance))
+    assert (field.alpha >= instance.alpha_lower).all()
+    assert (field.alpha <= instance.alpha_upper).all()
+    assert (np.abs(field.beta) <= QUARTER).all()
+    assert (field.p >= instance.p_min).all()
+    assert (field.p <= instance.p_max).all()
+
+
+@for_each(
+    "surface",
+    [("tilted_cylinder", 0.5, 1.2), ("torus_patch", 3.0, 4.5), ("wave_sheet", 2.0, 2.5)],
+)
+def test_the_field_is_near_the_true_curvature_lines(surface, tmp_path):
+    """Mean degrees with exact strokes, and with 3 degrees of noise on each stroke pixel."""
+    name, clean, rough = surface
+    true = cf.analytic(name, 48)
+    for degrees, most in ((0, clean), (3, rough)):
+        (found,) = METHODS["bend"].find(Request(noisy(true.instance, degrees, seed=1), tmp_path))
+        assert np.degrees(found.field.cross_error(true.u_angle, true.v_angle).mean()) <= most
+
+
+def test_a_heavier_hold_keeps_the_strokes():
+    start = polyvector_field(cf.sample("mouse", 20))
+    off = [bend_field(start, hold=hold).stroke_deviation.mean() for hold in (0.1, 1, 100)]
+    assert off[0] > off[1] > off[2]
+    assert off[2] < np.radians(1)
+
+
+def test_a_heavy_weight_of_skew_makes_right_angles():
+    instance = cf.sample("mouse", 16, w_beta=1e4)
+    assert line_difference(*lines(bend_field(cf.greedy(instance)))) == pytest.approx(HALF, abs=1e-2)
+
+
+def test_the_method_bends_a_given_start_too(tmp_path):
+    instance = cf.sample("saddle", 12)
+    start = cf.power_field(instance)
+    own, given = METHODS["bend"].find(Request(instance, tmp_path, start=start))
+    assert [own.method, given.method] == ["bend", "start + bend"]
+    assert (given.field.alpha == bend_field(start).alpha).all()
+    assert (given.field.p == bend_field(start).p).all()
