@@ -25,8 +25,8 @@ _Places = NDArray[np.intp]
 
 HARMONIC: Final = 0.05
 """Weight of plain smoothness beside bend: 0.01 follows clean strokes best, 0.1 evens out rough ones."""
-HOLD: Final = 0.15
-"""Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.2 on."""
+HOLD: Final = 0.25
+"""Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
 
 _ROUNDS: Final = 20  # 2 to 6 are usual
 _FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
