@@ -141,8 +141,8 @@ def accuracy() -> None:
 Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one;
 over all pixels. Strokes are exact curvature lines of both families. Search and MILP are given {SECONDS:g} s
 each, and start from the greedy field, improved. The MILP minimises the 1-norm energy, and a lower 1-norm
-energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the field of lowest
-2-norm energy.
+energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the bend field,
+which is nearest to [hidden curves](fields.md) too.
 
 {markdown(columns, rows)}
 """

@@ -123,10 +123,10 @@ def run_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Do everything for one sketch: write all solver files, try methods, keep the best field, draw it.
+    """Do everything for one sketch: write all solver files, try methods, keep a field, draw it.
 
-    The methods are {methods of a run}. report.json has all facts. Ctrl-C ends the run with the best field so
-    far; a second one ends at once.
+    The methods are {methods of a run}. The bend field is kept, and that of least 2-norm energy beside it.
+    report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
     """
     from ..solving.job import Limits
     from ..solving.run import plan, run

@@ -154,22 +154,23 @@ def show_report(report: Report, folder: Path) -> None:
             str(facts["singularities"]),
             f"{facts['seconds']:.1f}",
         ]
-        mark = "*" if candidate is report.best else ""
+        mark = "*" if candidate is report.kept else ""
         rows.append([candidate.method + mark, *numbers, _status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
     say(_LEGEND)
     for candidate in report.candidates:
         if candidate.solution and (told := _bound(report.facts(candidate))):
             say(f"  {candidate.method} {told}")
-    best = report.facts(report.best)
-    words = ", proven optimal" if best.get("proven_optimal") else ""
-    say(f"* kept, the least 2-norm energy{words}: {folder / 'field.npz'} (.json, .rawfield)")
-    quantile = f"{best['stroke_deviation_90_percent_degrees']:.1f}°"
-    far = f"{best['strokes_beyond_10_degrees']:.0%}"
+    kept, best = report.facts(report.kept), report.facts(report.best)
+    say(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
+    quantile = f"{kept['stroke_deviation_90_percent_degrees']:.1f}°"
+    far = f"{kept['strokes_beyond_10_degrees']:.0%}"
     say(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
+    words = ", proven optimal" if best.get("proven_optimal") else ""
+    say(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
     if report.proven:
         bound = f"{best['bound_2_norm']:.10g}"
-        say(f"  no field has less 2-norm energy than {bound}; certificate: {report.proven.certificate}")
+        say(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
     if not report.interrupted:
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
         say(f"  layers that fit on the drawing: {folder / 'overlay.svg'}")

@@ -31,6 +31,10 @@ OVERLAY: Final = ("overlay.svg", "overlay.png")
 """The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 REPORT: Final = "report.json"
 MASK: Final = "mask.png"
+KEPT: Final = "bend"
+"""The field that is kept; docs/fields.md has the measurements."""
+LOWEST: Final = "lowest.npz"
+"""The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """What the field is called that the methods of a run start from: the improved greedy field."""
@@ -46,7 +50,7 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a run found. candidates: every field, best (lowest 2-norm energy) first.
+    """What a run found. candidates: every field, the lowest 2-norm energy first.
 
     Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate` or
     `drawing`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of the 2-norm
@@ -63,8 +67,13 @@ class Report:
 
     @property
     def best(self) -> Candidate:
-        """The field that is kept and drawn."""
+        """The field of least 2-norm energy."""
         return self.candidates[0]
+
+    @property
+    def kept(self) -> Candidate:
+        """The field that is kept and drawn: the bend field, or the best one where there is none."""
+        return next((each for each in self.candidates if each.method == KEPT), self.best)
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
         """What the report says of a field: its own facts, and the bound and the gap where they are proven."""
@@ -107,6 +116,7 @@ class Report:
                 "skew_weight": instance.skew_weight,
             },
             "warnings": list(instance.reading.warnings if instance.reading else ()),
+            "kept": self.kept.method,
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
             "methods": [self.facts(candidate) for candidate in self.candidates],
@@ -145,10 +155,14 @@ def run(
 ) -> Report:
     """The report of a run.
 
-    The folder then holds instance, solver files, the best field, pictures and report.json.
+    The folder then holds instance, solver files, fields, pictures and report.json. The field that is kept is
+    the bend field: it is nearer to curves that were hidden from it than fields of less energy
+    (docs/fields.md).
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
-        DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing
+        DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing; of
+                       the field that is kept
+        DIR/lowest.npz the field of least 2-norm energy
         DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
         DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
@@ -185,7 +199,8 @@ def run(
     watch.lap("certificate")
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
-        write_field(report.best.field, folder / f"field{suffix}")
+        write_field(report.kept.field, folder / f"field{suffix}")
+    write_field(report.best.field, folder / LOWEST)
     if has_mask(instance):
         write_mask(instance, folder / MASK)
     watch.lap("fields")
@@ -199,7 +214,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, MASK, *OVERLAY, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, MASK, LOWEST, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 
@@ -260,11 +275,11 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
     try:
         for kind in PICTURES:
             progress(f"drawing {kind}")
-            subject = report.instance if kind == "instance" else report.best.field
+            subject = report.instance if kind == "instance" else report.kept.field
             draw(subject, folder / _picture(kind), kind=kind)
         for name in OVERLAY:
             progress(f"drawing {name}")
-            draw(report.best.field, folder / name, kind=LAYERS, over=below)
+            draw(report.kept.field, folder / name, kind=LAYERS, over=below)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
     return report

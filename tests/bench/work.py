@@ -261,7 +261,7 @@ def picture(instance: Instance, formulation: str, suffix: str, path: Path) -> Me
     image = Image.new("RGB", (side, side), "white")
     pen = ImageDraw.Draw(image)
     pen.rectangle((side // 50, side // 50, side - side // 50, side - side // 50), outline="black", width=3)
-    for place in np.linspace(0.07, 0.93, 15) * side:
+    for place in np.linspace(0.07, 0.93, min(15, side // 16)) * side:  # no more than leave paper between
         pen.arc(
             (place - side / 2, side / 30, place + side / 2, side - side / 30), 300, 60, fill="red", width=3
         )

@@ -55,11 +55,11 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
     assert list(told["stages"]) == ["start", "models", *tried, "certificate", "fields", "pictures"]
     assert told["seconds"] == round(sum(told["stages"].values()), 3)
     shape = cf.read_field(tmp_path / "field.npz").shape
-    best = rows[told["best"]]
-    assert best["strokes_beyond_10_degrees"] == shape.far_strokes
-    assert best["lines_under_45_degrees"] == shape.narrow_pixels
-    assert best["stroke_deviation_mean_degrees"] == pytest.approx(np.degrees(shape.mean_deviation))
-    assert best["stroke_deviation_90_percent_degrees"] == pytest.approx(np.degrees(shape.most_deviation))
+    kept = rows[told["kept"]]
+    assert kept["strokes_beyond_10_degrees"] == shape.far_strokes
+    assert kept["lines_under_45_degrees"] == shape.narrow_pixels
+    assert kept["stroke_deviation_mean_degrees"] == pytest.approx(np.degrees(shape.mean_deviation))
+    assert kept["stroke_deviation_90_percent_degrees"] == pytest.approx(np.degrees(shape.most_deviation))
 
 
 def test_a_solver_without_time_gives_back_its_start_and_it_is_said(capsys, tmp_path):
