@@ -5,14 +5,15 @@
 With --measure, parts are measured first, and their rows in docs/fields.json replaced: `methods` (hidden
 curves, each method), `weights` (hidden curves, each weight of the strokes), `strokes` (how far fields are
 from the strokes that they were shown), `surfaces` (fields of surfaces with a known answer, with and without
-noise on the strokes). FOLDER has line drawings by others; the samples are there without it.
+noise on the strokes), `shown` and `known` (both of these, each method). FOLDER has line drawings by others; the samples are there without it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +21,10 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.solving.methods import METHODS
+from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.errors import InputError
 from crossfield.models.evaluation.hidden import summary
+from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.weights import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
@@ -95,37 +97,78 @@ def weights(task: Task) -> Rows:
 def strokes(task: Task) -> Rows:
     """The share of the stroke pixels of a drawing that greedy fields miss by more than OFF, by weight."""
     fields = [cf.greedy(task.instance.with_weights(w_strokes=w)) for w in TRIED]
-    off = [float((np.degrees(field.stroke_deviation) > OFF).mean()) for field in fields]
     return [
-        {"drawing": task.name, "size": task.size, "weight": w, "off": round(share, 5)}
-        for w, share in zip(TRIED, off, strict=True)
+        {"drawing": task.name, "size": task.size, "weight": w, "off": round(missing(field), 5)}
+        for w, field in zip(TRIED, fields, strict=True)
     ]
 
 
 def surfaces(task: Task) -> Rows:
     """Mean cross error of fields of a surface, by weight of the strokes; noise on each stroke pixel."""
-    known = cf.analytic(task.name, task.size)
+    truth = cf.analytic(task.name, task.size)
     rows: Rows = []
     for w in TRIED:
         errors = []
         for seed in range(SEEDS if task.noise else 1):
-            noise = np.random.default_rng(seed).standard_normal(len(known.instance.theta))
-            theta = known.instance.theta + np.radians(task.noise) * noise
-            shown = replace(known.instance, theta=theta).with_weights(w_strokes=w)
-            errors.append(np.degrees(cf.greedy(shown).cross_error(known.u_angle, known.v_angle)).mean())
+            field = cf.greedy(noisy(truth.instance, task.noise, seed).with_weights(w_strokes=w))
+            errors.append(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
         facts = {"surface": task.name, "size": task.size, "noise": task.noise, "weight": w}
         rows.append(facts | {"error": round(float(np.mean(errors)), 3)})
     return rows
 
 
+def answers(instance: Instance) -> Iterator[tuple[str, CrossField]]:
+    """The fields of the methods that need no time limit, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        request = Request(instance, Path(folder), cf.Limits(600.0, threads=1))
+        for name, method in METHODS.items():
+            if not method.timed:
+                *_, answer = method.find(request)
+                yield name, answer.field
+
+
+def shown(task: Task) -> Rows:
+    """The share of the stroke pixels of a drawing that methods miss by more than OFF, default weights."""
+    return [
+        {"drawing": task.name, "size": task.size, "method": name, "off": round(missing(field), 5)}
+        for name, field in answers(task.instance)
+    ]
+
+
+def missing(field: CrossField) -> float:
+    """The share of the stroke pixels that a field misses by more than OFF."""
+    return float((np.degrees(field.stroke_deviation) > OFF).mean())
+
+
+def known(task: Task) -> Rows:
+    """Mean cross errors of methods on a surface, default weights; noise on each stroke pixel."""
+    truth = cf.analytic(task.name, task.size)
+    errors: dict[str, list[float]] = {}
+    for seed in range(SEEDS if task.noise else 1):
+        for name, field in answers(noisy(truth.instance, task.noise, seed)):
+            error = np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean()
+            errors.setdefault(name, []).append(float(error))
+    facts = {"surface": task.name, "size": task.size, "noise": task.noise}
+    return [
+        facts | {"method": name, "error": round(float(np.mean(found)), 3)} for name, found in errors.items()
+    ]
+
+
+def noisy(instance: Instance, degrees: float, seed: int) -> Instance:
+    """The instance with an independent error of that standard deviation on each stroke pixel."""
+    noise = np.random.default_rng(seed).standard_normal(len(instance.theta))
+    return replace(instance, theta=instance.theta + np.radians(degrees) * noise)
+
+
 MEASURES: Final[dict[str, Callable[[Task], Rows]]] = {
-    "methods": methods, "weights": weights, "strokes": strokes, "surfaces": surfaces,
+    "methods": methods, "shown": shown, "known": known, "weights": weights, "strokes": strokes,
+    "surfaces": surfaces,
 }  # fmt: skip
 
 
 def tasks(part: str, folder: Path | None, seconds: float) -> list[Task]:
     """What is measured for a part, one after the other."""
-    if part == "surfaces":
+    if part in {"surfaces", "known"}:
         names = [name for name, entry in SAMPLES.items() if entry.kind == "analytic"]
         return [
             Task(name, name, size, seconds, noise) for size in (24, 48) for noise in NOISE for name in names
@@ -194,17 +237,18 @@ def by_weight(rows: Rows) -> str:
     return markdown(("weight", *(f"{size} pixels" for size in SIZES)), table)
 
 
-def missed(rows: Rows) -> str:
-    """Share of stroke pixels that are missed: mean over drawings and the worst one, by weight and size."""
+def missed(rows: Rows, by: str) -> str:
+    """Share of stroke pixels that are missed, by a fact and size: mean over drawings and the worst one."""
     table = []
-    for w in TRIED:
-        shares = [[row["off"] for row in picked(rows, weight=w, size=size)] for size in SIZES]
-        table.append([f"{w:g}", *(f"{np.mean(share):.1%} / {max(share):.1%}" for share in shares)])
-    return markdown(("weight", *(f"{size} pixels" for size in SIZES)), table)
+    for value in dict.fromkeys(row[by] for row in rows):
+        shares = [[row["off"] for row in picked(rows, **{by: value}, size=size)] for size in SIZES]
+        cells = [f"{np.mean(share):.1%} / {max(share):.1%}" for share in shares]
+        table.append([f"{value:g}" if by == "weight" else f"`{value}`", *cells])
+    return markdown((by, *(f"{size} pixels" for size in SIZES)), table)
 
 
-def by_surface(rows: Rows) -> str:
-    """Mean cross errors on surfaces: a row for each surface, size and noise, a column for each weight."""
+def by_surface(rows: Rows, by: str) -> str:
+    """Mean cross errors: a row for each surface, size and noise, a column for each value of a fact."""
     cases = dict.fromkeys((row["surface"], row["size"], row["noise"]) for row in rows)
     table = [
         [
@@ -213,7 +257,9 @@ def by_surface(rows: Rows) -> str:
         ]
         for surface, size, noise in cases
     ]  # fmt: skip
-    return markdown(("surface", "size", "noise", *(f"{w:g}" for w in TRIED)), table)
+    values = dict.fromkeys(row[by] for row in rows)
+    heads = (f"{value:g}" if by == "weight" else f"`{value}`" for value in values)
+    return markdown(("surface", "size", "noise", *heads), table)
 
 
 def in_short(rows: Rows) -> str:
@@ -240,12 +286,14 @@ def write_pages(kept: dict[str, Any]) -> None:
     rows = kept["rows"]
     page = FIELDS.format(
         said=command, short=in_short(rows["methods"]), methods=by_method(rows["methods"]),
-        drawings=by_drawing(rows["methods"], 32), seconds=kept["seconds"],
+        drawings=by_drawing(rows["methods"], 32), seconds=kept["seconds"], off=f"{OFF:g}", seeds=SEEDS,
+        shown=missed(rows["shown"], "method"), known=by_surface(rows["known"], "method"),
     )  # fmt: skip
     (DOCS / "fields.md").write_text(page)
     page = WEIGHTS.format(
         said=command, default=f"{STROKE_WEIGHT:g}", hidden=by_weight(rows["weights"]),
-        missed=missed(rows["strokes"]), surfaces=by_surface(rows["surfaces"]), off=f"{OFF:g}", seeds=SEEDS,
+        missed=missed(rows["strokes"], "weight"), surfaces=by_surface(rows["surfaces"], "weight"),
+        off=f"{OFF:g}", seeds=SEEDS,
     )  # fmt: skip
     (DOCS / "weights.md").write_text(page)
 
