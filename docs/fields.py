@@ -4,8 +4,9 @@
 
 With --measure, parts are measured first, and their rows in docs/fields.json replaced: `methods` (hidden
 curves, each method), `weights` (hidden curves, each weight of the strokes), `strokes` (how far fields are
-from the strokes that they were shown), `surfaces` (fields of surfaces with a known answer, with and without
-noise on the strokes), `shown` and `known` (both of these, each method). FOLDER has line drawings by others; the samples are there without it.
+from the strokes that they were shown) and `surfaces` (fields of surfaces with a known answer, with and
+without noise on the strokes), each weight, `shown` and `known` (both of these, each method). FOLDER has line
+drawings by others; the samples are there without it.
 """
 
 from __future__ import annotations

@@ -160,8 +160,8 @@ def run(
     (docs/fields.md).
         DIR/models     every formulation in every format, starting points, manifests, the instance
         DIR/solve      what the local solvers read and left
-        DIR/field.npz, .json, .rawfield + .obj; overview.png, ...; overlay.svg, .png: over the drawing; of
-                       the field that is kept
+        DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
+        DIR/overview.png, ... pictures of it; overlay.svg, .png: over the drawing
         DIR/lowest.npz the field of least 2-norm energy
         DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`

@@ -35,7 +35,7 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from ..storage import read_bytes, write_bytes
 from .field import CrossField
-from .rawfield import most_bytes, of_rawfield, to_obj, to_rawfield
+from .rawfield import most_bytes, of_rawfield, to_obj, to_rawfield, to_sings
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -54,13 +54,15 @@ _Kind = TypeVar("_Kind")
 def write_field(field: CrossField, path: str | Path) -> Path:
     """The path of the file that now holds the field; .npz, .json or .rawfield by the ending of its name.
 
-    A .rawfield gets its mesh beside it, with the ending .obj. Same field, same bytes.
+    A .rawfield gets its mesh beside it, with the ending .obj, and its singularities, with .sings. Same field,
+    same bytes.
     Raises InputError for another ending and OutputError when a file cannot be written.
     """
     path = Path(path)
     write = _of_suffix(_WRITERS, path, "written")
     if write is to_rawfield:
         write_bytes(path.with_suffix(".obj"), to_obj(field.instance))
+        write_bytes(path.with_suffix(".sings"), to_sings(field))
     return write_bytes(path, write(field))
 
 

@@ -1,4 +1,4 @@
-"""Directional's raw field of a mesh (.rawfield), and the mesh of an instance (.obj).
+"""Directional's raw field of a mesh (.rawfield), its singularities (.sings), and the mesh (.obj).
 
 A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. What is written here goes
 counter-clockwise in every row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
@@ -52,6 +52,21 @@ def to_obj(instance: Instance) -> bytes:
         f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, "
         f"row by row; y up\n{vertices}{faces}"
     ).encode()
+
+
+def to_sings(field: CrossField) -> bytes:
+    """The text of the field's singularities as Directional has them: a line `4 k`, then vertex and 4 index.
+
+    Vertices count from 0 in the order of the .obj; the index, turns of the cross counter-clockwise, follows
+    the field's jumps.
+    """
+    places, _ = _corners(field.instance.grid)
+    found = field.singularities
+    across = field.instance.grid.width + 1
+    at = np.searchsorted(places[:, 0] * across + places[:, 1], (found.row + 1) * across + found.column + 1)
+    index = np.round(4 * found.index).astype(np.int64)
+    order = np.argsort(at, kind="stable")
+    return f"4 {len(at)}\n{_lines(np.stack([at[order], index[order]], axis=1))}".encode()
 
 
 def _corners(grid: Grid) -> tuple[Ints, Ints]:

@@ -111,7 +111,7 @@ def test_the_tour_of_the_verbs(tmp_path, crossfield):
 
 
 RUN_FILES = {
-    "field.json", "field.npz", "field.obj", "field.rawfield", "lowest.npz", "report.json",
+    "field.json", "field.npz", "field.obj", "field.rawfield", "field.sings", "lowest.npz", "report.json",
     "angle.png", "crosses.png", "field.png", "instance.png", "mask.png", "overview.png",
     "overlay.png", "overlay.svg",
 }  # fmt: skip

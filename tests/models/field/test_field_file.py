@@ -14,6 +14,8 @@ from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.sketch.samples import sample
+from crossfield.models.smooth.power_field import power_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -269,10 +271,45 @@ def test_mesh_is_a_manifold_on_any_mask(tmp_path, seed):
     assert inner == field.instance.grid.size + len(field.instance.grid.first)
 
 
+def turns_round(vertex, triangles, angles):
+    """Four times the index of an inner vertex, by the least rotation from each face to the next; else 0."""
+    fan = {}
+    for face in np.nonzero((triangles == vertex).any(axis=1))[0]:
+        _, before, after = np.roll(triangles[face], -int(np.argmax(triangles[face] == vertex)))
+        fan[before] = (after, face)
+    if not fan or set(fan) != {following for following, _ in fan.values()}:
+        return 0
+    total, at = 0.0, next(iter(fan))
+    for _ in fan:
+        following, face = fan[at]
+        other = fan[following][1]
+        turns = [
+            ((np.roll(angles[other], -k) - angles[face] + np.pi) % (2 * np.pi) - np.pi).mean()
+            for k in range(4)
+        ]
+        total += min(turns, key=abs)
+        at = following
+    return round(4 * total / (2 * np.pi))
+
+
+@pytest.mark.parametrize("name", ["singular", "ring", "bottle"])
+def test_singularities_are_the_vertices_round_which_the_raw_field_turns(tmp_path, name):
+    """Recomputed from the mesh and its vectors alone; of a power field, whose lines are at right angles."""
+    field = power_field(sample(name, 16))
+    vectors, vertices, triangles = read_rawfield(write_field(field, tmp_path / "field.rawfield"))
+    angles = np.arctan2(vectors[..., 1], vectors[..., 0])
+    turning = {v: turn for v in range(len(vertices)) if (turn := turns_round(v, triangles, angles))}
+    head, *rows = (tmp_path / "field.sings").read_text().splitlines()
+    assert head == f"4 {len(rows)}"
+    assert {int(row.split()[0]): int(row.split()[1]) for row in rows} == turning
+    assert len(turning) == len(field.singularities.index)
+    assert turning or name != "singular"
+
+
 def test_rawfield_is_the_same_twice(field, tmp_path):
     for name in ("one", "two"):
         write_field(field, tmp_path / f"{name}.rawfield")
-    for suffix in (".rawfield", ".obj"):
+    for suffix in (".rawfield", ".obj", ".sings"):
         assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
 
 

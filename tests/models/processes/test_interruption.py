@@ -13,7 +13,7 @@ from children import all_end, complaints, descendants, running
 from crossfield.export.solving.methods import METHODS
 from crossfield.export.solving.run import PICTURES, plan
 
-FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj"}
+FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings"}
 
 RUN = """
 import sys, crossfield as cf
