@@ -63,7 +63,11 @@ def test_ctrl_c_in_the_search_ends_the_run_with_its_best_field(tmp_path):
     assert cf.read_field(tmp_path / "field.npz").energy().total == pytest.approx(
         min(row["energy_2_norm"] for row in report["methods"]), rel=1e-9
     )
-    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {*FIELDS, "mask.png", "report.json"}
+    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == {
+        *FIELDS,
+        "mask.png",
+        "report.json",
+    }
 
 
 @pytest.mark.slow

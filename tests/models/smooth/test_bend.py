@@ -47,7 +47,7 @@ def neighbours(field):
     return found
 
 
-def bend_energy(field):
+def bend_energy(field, hold=HOLD):
     """The energy of docs/mathematics.md, 10, pixel by pixel."""
     instance, at = field.instance, neighbours(field)
     total = 0.0
@@ -60,7 +60,7 @@ def bend_energy(field):
                     total += (np.cos(u) * vx + np.sin(u) * vy) ** 2 / 4
     pairs = [du**2 + dv**2 for (_, side), (du, dv) in at.items() if side in {"right", "up"}]
     strokes = instance.w_strokes * np.sum(instance.w * field.stroke_deviation**2)
-    return total + 2 * HARMONIC * sum(pairs) + HOLD * strokes + instance.w_beta * np.sum(field.beta**2)
+    return total + 2 * HARMONIC * sum(pairs) + hold * strokes + instance.w_beta * np.sum(field.beta**2)
 
 
 @for_each("degrees", [(0, 90), (20, 110), (100, 40), (135, 100), (179, 60)])
@@ -76,12 +76,15 @@ def test_constant_crosses_stay(degrees):
 
 @for_each("name", ["singular", "saddle", "mouse", "bottle"])
 def test_the_energy_falls_and_the_singularities_stay(name):
-    """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it."""
-    start = cf.greedy(cf.sample(name, 16))
-    field = bend_field(start)
-    assert bend_energy(field) < 0.8 * bend_energy(start)
+    """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it.
+
+    The greedy field of light strokes lies far from strokes that are then held harder.
+    """
+    start, hold = cf.greedy(replace(cf.sample(name, 16), w_strokes=1)), 1.5
+    field = bend_field(start, hold=hold)
+    assert bend_energy(field, hold) < 0.8 * bend_energy(start, hold)
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
-    assert bend_energy(bend_field(field)) <= bend_energy(field) * (1 + 1e-9)
+    assert bend_energy(bend_field(field, hold=hold), hold) <= bend_energy(field, hold) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("name", MOVES)
