@@ -115,7 +115,7 @@ def test_labels_do_not_matter():
     w_beta=st.sampled_from([0, 1e-6, 1]),
     w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
 )
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
     instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
     field = bend_field(polyvector_field(instance))
