@@ -14,18 +14,9 @@ from exhaustive import random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
+from moves import MOVES, lines
 
 pytestmark = pytest.mark.numeric
-
-MOVES = {
-    "turned": (np.rot90, lambda angle: angle + HALF),
-    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
-    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
-}
-
-
-def lines(field):
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
 
 
 def noisy(instance, degrees, seed):
