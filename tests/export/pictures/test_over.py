@@ -160,7 +160,11 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     "suffix, head",
-    [(".svg", b"<?xml"), (".png", b"\x89PNG"), pytest.param(".pdf", b"%PDF", marks=pytest.mark.slow)],
+    [
+        (".svg", b"<?xml"),
+        pytest.param(".png", b"\x89PNG", marks=pytest.mark.slow),
+        pytest.param(".pdf", b"%PDF", marks=pytest.mark.slow),
+    ],
 )
 def test_the_command_lays_a_field_over_a_sample(tmp_path, capsys, suffix, head):
     write_field(power_field(sample("ring", 10)), tmp_path / "f.npz")
