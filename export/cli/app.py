@@ -22,6 +22,7 @@ from .inputs import choice_of, drawing_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
+    Crossings,
     Curvature,
     Facet,
     Folder,
@@ -59,7 +60,6 @@ from .output import (
     show_manifests,
     show_report,
     show_samples,
-    warn_of,
 )
 from .prove_command import prove_command
 from .solve_command import solve_command, tell_solution
@@ -110,6 +110,7 @@ def run_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -134,9 +135,8 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-    warn_of(instance, quiet=quiet)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -168,6 +168,7 @@ def instance_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -183,10 +184,9 @@ def instance_command(
     _require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
-    warn_of(instance, quiet=quiet)
     if not quiet:
         say(f"{output}: {instance.summary}")
 
@@ -203,6 +203,7 @@ def export_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -245,9 +246,8 @@ def export_command(
     )
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-        warn_of(loaded, quiet=quiet)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

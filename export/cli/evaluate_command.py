@@ -10,6 +10,7 @@ import typer
 
 from .inputs import choice_of, known, load
 from .options import (
+    Crossings,
     Curvature,
     GaugeName,
     Json,
@@ -22,7 +23,7 @@ from .options import (
     View,
     What,
 )
-from .output import complain, progress, say, say_json, show_table, warn_of
+from .output import complain, progress, say, say_json, show_table
 
 if TYPE_CHECKING:
     from ..solving.evaluate import Evaluation
@@ -53,6 +54,7 @@ def evaluate_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -80,9 +82,8 @@ def evaluate_command(
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-        warn_of(instance, quiet=quiet)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         found = evaluate(
             instance,
             sketch=sketch,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...models.errors import InputError
 from ...models.sketch.choice import AS_DRAWN, Choice, Silhouette
+from .output import warn_of
 
 if TYPE_CHECKING:
     from ...models.instance.instance import Gauge, Instance
@@ -18,14 +19,16 @@ def load(
     size: int | None,
     mask: Path | None,
     gauge: Gauge | None,
-    choice: Choice = AS_DRAWN,
+    choice: Choice,
     *,
-    w_strokes: float | None = None,
-    w_beta: float | None = None,
+    w_strokes: float | None,
+    w_beta: float | None,
+    quiet: bool,
 ) -> Instance:
     """The instance, of a size that can be written, under the weights that are given, a file's too.
 
-    Raises InputError, and InstanceError for a weight that cannot be.
+    What its reader warns of is printed unless it shall be quiet. Raises InputError, and InstanceError for a
+    weight that cannot be.
     """
     import numpy as np
 
@@ -33,12 +36,15 @@ def load(
 
     instance = _found(what, size, mask, gauge, choice).with_weights(w_strokes, w_beta)
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())
+    warn_of(instance, quiet=quiet)
     return instance
 
 
-def choice_of(silhouette: Silhouette, curvature: list[str] | None, view: str | None) -> Choice:
+def choice_of(
+    silhouette: Silhouette, curvature: list[str] | None, view: str | None, *, crossings: bool
+) -> Choice:
     """What of a drawing is a curvature line, as the user says it. Raises InputError."""
-    return Choice(silhouette, tuple(curvature or ()), view)
+    return Choice(silhouette, tuple(curvature or ()), view, crossings)
 
 
 def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, choice: Choice) -> Instance:
@@ -56,7 +62,9 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
             raise InputError(
                 f"the sample {what} has its own curvature lines; leave --curvature and --view out"
             )
-        return sample(what, pixels, gauge or "strokes", silhouette=choice.silhouette)
+        return sample(
+            what, pixels, gauge or "strokes", crossings=choice.crossings, silhouette=choice.silhouette
+        )
     if not path.exists():
         raise InputError(
             "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
@@ -67,6 +75,7 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
             size=pixels,
             mask=mask,
             gauge=gauge or "strokes",
+            crossings=choice.crossings,
             silhouette=choice.silhouette,
             curvature=choice.curvature,
             view=choice.view,
@@ -78,7 +87,7 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
     if choice != AS_DRAWN:
         raise InputError(
             "is an instance, which has its own curvature lines; "
-            "leave --silhouette, --curvature and --view out",
+            "leave --silhouette, --curvature, --view and --crossings out",
             file=what,
         )
     instance = read_instance(path)

@@ -10,6 +10,7 @@ import typer
 
 from .inputs import choice_of, load
 from .options import (
+    Crossings,
     Curvature,
     GaugeName,
     Json,
@@ -22,7 +23,7 @@ from .options import (
     StrokeWeight,
     View,
 )
-from .output import complain, progress, say, say_json, show_facts, warn_of
+from .output import complain, progress, say, say_json, show_facts
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm
@@ -58,6 +59,7 @@ def prove_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -103,9 +105,8 @@ def prove_command(
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-        warn_of(loaded, quiet=quiet)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),

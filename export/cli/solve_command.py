@@ -12,6 +12,7 @@ from ...models.processes.deadline import Deadline
 from .inputs import choice_of, known, load, options_of
 from .options import (
     BetaNorm,
+    Crossings,
     Curvature,
     Facet,
     Folder,
@@ -32,7 +33,7 @@ from .options import (
     View,
     What,
 )
-from .output import complain, progress, say, say_json, show_facts, show_solution, warn_of
+from .output import complain, progress, say, say_json, show_facts, show_solution
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -70,6 +71,7 @@ def solve_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
+    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -99,9 +101,8 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta)
-        warn_of(loaded, quiet=quiet)
+        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         request = Request(
             loaded,
             output,

@@ -106,7 +106,7 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
-    choice = Choice(silhouette, tuple(curvature), view)
+    choice = Choice(silhouette, tuple(curvature), view, crossings)
     with_mask = None if mask is None else Path(mask)
     data = bytes_of(path)
     try:
@@ -120,7 +120,6 @@ def read_sketch(
                 name=name,
                 source=path.name,
                 choice=choice,
-                crossings=crossings,
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
@@ -136,7 +135,6 @@ def instance_of(
     mask: Path | None = None,
     gauge: Gauge = "strokes",
     choice: Choice = AS_DRAWN,
-    crossings: bool = False,
 ) -> Instance:
     """The instance of a sketch, given as a file's bytes, under the default weights. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower(), choice)
@@ -147,7 +145,7 @@ def instance_of(
     lines, others = sketch.covers(frame)
     solve, found = _solve_mask(lines, others, given, sketch, frame)
     weight = np.where(solve, lines.weight, 0.0)
-    met = sketch.meetings(frame).inside(solve) if crossings and sketch.meetings else None
+    met = sketch.meetings(frame).inside(solve) if choice.crossings and sketch.meetings else None
     if met is not None:
         weight[met.row, met.column] = met.weight[:, 0]
     if choice.silhouette == "outer":
@@ -259,6 +257,7 @@ def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | N
         return read_scap(data, choice.chooser)
     if suffix == ".svg" and drawn:
         return read_svg(data, choice.chooser)
+    choice.refuse_crossings()
     choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
     return None
 

@@ -11,24 +11,14 @@ from crossfield.models.array_archive import pack_arrays
 from crossfield.models.field.file import read_field
 from crossfield.models.proof import check_certificate
 
+SKETCH = ["mouse", "--size", "8", "--w-strokes", "0.3"]
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """What `prove` has written for a sample of some pixels, and what it has printed."""
     folder = tmp_path_factory.mktemp("proof")
-    command = [
-        "prove",
-        "mouse",
-        "--size",
-        "8",
-        "--w-strokes",
-        "0.3",
-        "-o",
-        str(folder),
-        "--time-limit",
-        "100",
-        "-q",
-    ]
+    command = ["prove", *SKETCH, "-o", str(folder), "--time-limit", "100", "-q"]
     assert invoke(command) == 0
     (report,) = folder.glob("*.proof.json")
     return folder, json.loads(report.read_text())
@@ -94,21 +84,7 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
 
 def test_tightened_files_of_a_proof(folder, tmp_path):
     folder, _ = folder
-    command = [
-        "export",
-        "mouse",
-        "--size",
-        "8",
-        "--w-strokes",
-        "0.3",
-        "-o",
-        str(tmp_path),
-        "-f",
-        "miqp-exact",
-        "-F",
-        "lp",
-        "-q",
-    ]
+    command = ["export", *SKETCH, "-o", str(tmp_path), "-f", "miqp-exact", "-F", "lp", "-q"]
     assert invoke([*command, "--tightened", str(of(folder, "certificate.npz"))]) == 0
     (manifest,) = tmp_path.glob("*.manifest.json")
     windows = json.loads(manifest.read_text())["windows"]

@@ -31,8 +31,14 @@ def level(height=6, width=10, pixel_size=5.0, origin=(20.0, 30.0)):
     return CrossField(instance, nothing, nothing, np.zeros(len(instance.grid.first), int))
 
 
-def test_lines_and_strokes_are_where_they_are_on_the_drawing(tmp_path):
-    root, layers = layers_of(draw(level(), tmp_path / "a.svg"))
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """A file of layers of the level field, with a title."""
+    return draw(level(), tmp_path_factory.mktemp("drawn") / "a.svg", title="A <b> & c")
+
+
+def test_lines_and_strokes_are_where_they_are_on_the_drawing(drawn):
+    root, layers = layers_of(drawn)
     assert list(layers) == NAMES
     assert numbers(root.get("viewBox")).tolist() == [0, 0, 70, 60]
     assert (root.get("width"), root.get("height")) == ("70", "60")
@@ -49,20 +55,18 @@ def test_lines_and_strokes_are_where_they_are_on_the_drawing(tmp_path):
         assert max(np.ptp(line[:, along]) for line in lines) > 0.8 * (50, 30)[along]
 
 
-def test_crosses_are_there_but_not_shown_and_ends_are_round(tmp_path):
-    field = level()
-    path = draw(field, tmp_path / "a.svg", title="A <b> & c")
-    root, layers = layers_of(path)
+def test_crosses_are_there_but_not_shown_and_ends_are_round(drawn):
+    root, layers = layers_of(drawn)
     assert root.findtext(f"{SVG}title") == "A <b> & c"
     shown = [name for name, group in layers.items() if group.get("style") == "display:inline"]
     assert shown == [name for name in NAMES if name != "crosses"]
     crosses = lines_in(layers["crosses"])
-    assert len(crosses) == 2 * field.instance.grid.size
+    assert len(crosses) == 2 * level().instance.grid.size
     assert np.mean(crosses[0], axis=0) == pytest.approx([22.5, 32.5])
-    drawn = [group for layer in root.findall(f"{SVG}g") for group in layer if group.get("stroke-width")]
-    lines = [group for group in drawn if group.get("fill") == "none"]
+    groups = [group for layer in root.findall(f"{SVG}g") for group in layer if group.get("stroke-width")]
+    lines = [group for group in groups if group.get("fill") == "none"]
     assert {group.get("stroke-linecap") for group in lines} == {"round"}
-    assert max(len(number) for number in NUMBER.findall(path.read_text())) < 10
+    assert max(len(number) for number in NUMBER.findall(drawn.read_text())) < 10
 
 
 def test_the_page_begins_at_zero_unless_the_field_reaches_beyond_it():
@@ -70,19 +74,25 @@ def test_the_page_begins_at_zero_unless_the_field_reaches_beyond_it():
     assert Place(level(pixel_size=1, origin=(-50.0, 3.0)).instance).page == (-50.0, 3.0, 10.0, 6.0)
 
 
-def test_widths_are_in_proportion_and_the_same_bytes_come_twice(tmp_path):
+def test_widths_are_in_proportion(tmp_path):
     small, large = (
-        draw(level(pixel_size=size), tmp_path / f"{size}.svg").read_text() for size in (1e-9, 1e9)
+        draw(level(2, 12, pixel_size=size), tmp_path / f"{size}.svg").read_text() for size in (1e-9, 1e9)
     )
     widths = [numbers(" ".join(re.findall(r'stroke-width="(.*?)"', text))) for text in (small, large)]
     assert widths[1] / widths[0] == pytest.approx(1e18)
-    field = power_field(sample("mouse", 8))
+
+
+@pytest.mark.parametrize(
+    "field", [level(2, 12), pytest.param(power_field(sample("mouse", 8)), marks=pytest.mark.slow)]
+)
+def test_the_same_bytes_come_twice(tmp_path, field):
     first = draw(field, tmp_path / "a.svg", title="A title").read_bytes()
     again = CrossField(field.instance, field.alpha, field.beta, field.p)
     assert draw(again, tmp_path / "b.svg", title="A title").read_bytes() == first
     assert len(first) < 40_000
 
 
+@pytest.mark.slow
 def test_the_picture_shows_the_layers_where_the_drawing_has_them(tmp_path):
     """Upright lines only right of x = 20 and below y = 30 of a page of 70 x 60."""
     picture = np.asarray(Image.open(draw(level(), tmp_path / "a.png", kind="layers")).convert("RGB"))

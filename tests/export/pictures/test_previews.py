@@ -47,20 +47,20 @@ def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, 
 
 
 def test_instances_and_fields_are_pictures(instance, field):
-    for shown in (instance, field):
-        data = shown._repr_png_()
+    pictures = [shown._repr_png_() for shown in (instance, field)]
+    assert instance._repr_png_() == pictures[0]
+    for data in pictures:
         picture = Image.open(io.BytesIO(data))
         picture.load()
         assert picture.format == "PNG"
         assert 200 < max(picture.size) < 700
         assert np.ptp(np.asarray(picture.convert("L"))) > 100
-        assert shown._repr_png_() == data
 
 
 def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
-    for shown in (problem, solution):
-        html = shown._repr_html_()
-        root = ElementTree.fromstring(html)
+    tables = [shown._repr_html_() for shown in (problem, solution)]
+    roots = [ElementTree.fromstring(html) for html in tables]
+    for root, html in zip(roots, tables, strict=True):
         tags = {element.tag for element in root.iter()}
         assert tags <= {"div", "table", "caption", "tbody", "tr", "th", "td", "img"}
         assert not re.search(r"https?:|url\(|<script", html)
@@ -68,10 +68,10 @@ def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
             kind, data = image.get("src").split(",")
             assert kind == "data:image/png;base64"
             assert base64.b64decode(data).startswith(b"\x89PNG")
-    facts = {row[0].text: row[1].text for row in ElementTree.fromstring(problem._repr_html_()).iter("tr")}
+    facts = {row[0].text: row[1].text for row in roots[0].iter("tr")}
     assert facts["class"] == "MILP, convex"
     assert f"{problem.instance.grid.size} alpha" in facts["columns"]
-    assert len(list(ElementTree.fromstring(solution._repr_html_()).iter("img"))) == 1
+    assert len(list(roots[1].iter("img"))) == 1
 
 
 def test_a_solution_without_a_point_is_told(problem):
@@ -83,6 +83,7 @@ def test_a_solution_without_a_point_is_told(problem):
     assert "&lt;no&gt; &amp; never" in empty._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_module_alone_shows_pictures_too():
     """The face of the package says who draws before any of its modules is there."""
     code = (

@@ -11,6 +11,7 @@ from exhaustive import random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
+from moves import lines
 
 pytestmark = pytest.mark.numeric
 
@@ -24,10 +25,6 @@ def random_field(instance, rng):
     alpha = instance.alpha_lower + HALF * np.clip(rng.uniform(-0.2, 1.2, size), 0, 1)
     beta = np.clip(rng.uniform(-1, 1, size), -QUARTER, QUARTER)
     return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
-
-
-def lines(field):
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
 
 
 def assert_inside(field):

@@ -170,7 +170,9 @@ def picture(side=400, width=4):
     return stream.getvalue()
 
 
-@for_each("size", [16, 24, 40, 100])
+@pytest.mark.parametrize(
+    "size", [16, 40, *(pytest.param(size, marks=pytest.mark.slow) for size in (24, 100))]
+)
 def test_the_rim_of_a_drawing_in_one_colour_carries_no_direction(size):
     thick = picture(width=12)
     for data, source, side in ((svg(CIRCLE), "a.svg", 100), (picture(), "a.png", 400), (thick, "a.png", 400)):

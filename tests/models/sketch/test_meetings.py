@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import crossfield as cf
 import numpy as np
 import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.models.errors import InputError
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.read import LEAST_WEIGHT
 from crossfield.models.sketch.tracing import SEVERAL, curves_of
+from PIL import Image, ImageDraw
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><g fill="none" stroke="black">'
@@ -63,3 +68,32 @@ def test_three_curves_in_one_pixel_leave_none(tmp_path):
     _, instance = read(tmp_path, lines, crossings=True)
     centre = instance.grid.height // 2
     assert not (instance.stroke_pixels[instance.crossings] == centre).all(axis=1).any()
+
+
+def test_commands_keep_both_directions_when_they_are_asked_to(tmp_path, capsys):
+    path, both = read(tmp_path, [(14, 14, 86, 86), (14, 86, 86, 14)], crossings=True)
+    made, sketch = tmp_path / "a.json", [str(path), "--size", "21", "--crossings"]
+    assert invoke(["instance", *sketch, "-q", "-o", str(made)]) == 0
+    assert cf.read_instance(made).sha256 == both.sha256
+    assert invoke(["evaluate", *sketch, "-m", "power", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["instance"]["sha256"] == both.sha256
+    assert {curve["curve"] for curve in found["curves"]} >= {1, 2}
+    assert invoke(["prove", *sketch, "-o", str(tmp_path / "proof")]) == 1
+    assert "no proof knows what two strokes at one pixel cost" in capsys.readouterr().err
+    assert invoke(["instance", str(made), "--crossings", "-o", str(tmp_path / "b.json")]) == 1
+    assert "leave --silhouette, --curvature, --view and --crossings out" in capsys.readouterr().err
+
+
+def test_drawn_samples_keep_both_directions_and_what_names_no_curves_is_refused(tmp_path):
+    both = cf.sample("skew", 24, crossings=True)
+    assert len(both.crossings)
+    assert both.without_crossings().grid.size == cf.sample("skew", 24).grid.size
+    assert not len(cf.sample("skew", 24).crossings)
+    with pytest.raises(InputError, match=r"torus_patch is computed, not drawn; .* leave crossings out"):
+        cf.sample("torus_patch", 8, crossings=True)
+    image = Image.new("L", (60, 60), "white")
+    ImageDraw.Draw(image).line((5, 5, 55, 55), fill=0, width=2)
+    image.save(tmp_path / "a.png")
+    with pytest.raises(InputError, match="is a picture, which does not say which curves meet"):
+        cf.read_sketch(tmp_path / "a.png", crossings=True)

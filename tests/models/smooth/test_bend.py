@@ -14,18 +14,9 @@ from exhaustive import random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
+from moves import MOVES, lines
 
 pytestmark = pytest.mark.numeric
-
-MOVES = {
-    "turned": (np.rot90, lambda angle: angle + HALF),
-    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
-    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
-}
-
-
-def lines(field):
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
 
 
 def noisy(instance, degrees, seed):
@@ -47,7 +38,7 @@ def neighbours(field):
     return found
 
 
-def bend_energy(field):
+def bend_energy(field, hold=HOLD):
     """The energy of docs/mathematics.md, 10, pixel by pixel."""
     instance, at = field.instance, neighbours(field)
     total = 0.0
@@ -60,7 +51,7 @@ def bend_energy(field):
                     total += (np.cos(u) * vx + np.sin(u) * vy) ** 2 / 4
     pairs = [du**2 + dv**2 for (_, side), (du, dv) in at.items() if side in {"right", "up"}]
     strokes = instance.w_strokes * np.sum(instance.w * field.stroke_deviation**2)
-    return total + 2 * HARMONIC * sum(pairs) + HOLD * strokes + instance.w_beta * np.sum(field.beta**2)
+    return total + 2 * HARMONIC * sum(pairs) + hold * strokes + instance.w_beta * np.sum(field.beta**2)
 
 
 @for_each("degrees", [(0, 90), (20, 110), (100, 40), (135, 100), (179, 60)])
@@ -76,12 +67,15 @@ def test_constant_crosses_stay(degrees):
 
 @for_each("name", ["singular", "saddle", "mouse", "bottle"])
 def test_the_energy_falls_and_the_singularities_stay(name):
-    """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it."""
-    start = cf.greedy(cf.sample(name, 16))
-    field = bend_field(start)
-    assert bend_energy(field) < 0.8 * bend_energy(start)
+    """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it.
+
+    The greedy field of light strokes lies far from strokes that are then held harder.
+    """
+    start, hold = cf.greedy(replace(cf.sample(name, 16), w_strokes=1)), 1.5
+    field = bend_field(start, hold=hold)
+    assert bend_energy(field, hold) < 0.8 * bend_energy(start, hold)
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
-    assert bend_energy(bend_field(field)) <= bend_energy(field) * (1 + 1e-9)
+    assert bend_energy(bend_field(field, hold=hold), hold) <= bend_energy(field, hold) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("name", MOVES)
@@ -112,7 +106,7 @@ def test_labels_do_not_matter():
     w_beta=st.sampled_from([0, 1e-6, 1]),
     w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
 )
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
     instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
     field = bend_field(polyvector_field(instance))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.instance.instance import QUARTER, Instance
 from crossfield.models.search.improvement import improved
 from crossfield.models.search.polyvector_start import polyvector_start
 from crossfield.models.search.search import search
@@ -16,19 +16,11 @@ from exhaustive import random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
+from moves import MOVES, lines
 
 pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
-MOVES = {
-    "turned": (np.rot90, lambda angle: angle + HALF),
-    "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
-    "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
-}
-
-
-def lines(field):
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
 
 
 @for_each("degrees", [0, 20, 45, 90, 120, 135, 179])
