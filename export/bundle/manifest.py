@@ -312,7 +312,7 @@ def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints
     recipe = FORMULATIONS.get(name)
     if recipe is None or not recipe.fixed:
         return None
-    from ...models.search.improvement import first_field
+    from ...models.search.starts import first_field
 
     return (start or first_field(instance)).p
 
