@@ -18,7 +18,7 @@ pytestmark = pytest.mark.numeric
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "size"), [("mouse", 96), ("saddle", 128)])
+@pytest.mark.parametrize("name, size", [("mouse", 96), ("saddle", 128)])
 def test_on_a_large_grid_the_first_field_is_at_most_the_improved_greedy_one(name, size):
     instance = cf.sample(name, size)
     assert first_field(instance).energy().total <= improved(greedy(instance)).energy().total + 1e-9
