@@ -306,13 +306,13 @@ def _narrowed(problem: Problem, windows: Windows | None) -> Problem:
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
     """The jumps that a formulation takes as data; None where it has them as variables.
 
-    They are those of `start`, by default of the improved greedy field. Everything that writes or solves a
+    They are those of `start`, by default of the first field. Everything that writes or solves a
     formulation by its name asks here, so that its files and its solutions are of one problem.
     """
     recipe = FORMULATIONS.get(name)
     if recipe is None or not recipe.fixed:
         return None
-    from ...models.search.improvement import first_field
+    from ...models.search.starts import first_field
 
     return (start or first_field(instance)).p
 

@@ -18,9 +18,8 @@ from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
 from ...models.search.greedy import greedy
-from ...models.search.improvement import first_field
-from ...models.search.polyvector_start import polyvector_start
 from ...models.search.search import Search
+from ...models.search.starts import first_field, polyvector_start
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.smooth.power_field import power_field

@@ -13,7 +13,7 @@ from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
 from ...models.processes.progress import Progress, silent
-from ...models.search.improvement import first_field
+from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
@@ -37,7 +37,7 @@ LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
-"""What the field is called that the methods of a run start from: the improved greedy field."""
+"""What the field is called that the methods of a run start from: `first_field`, or the one given."""
 
 
 def facts_with_energies(solution: Solution) -> dict[str, Any]:

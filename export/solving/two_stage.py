@@ -11,7 +11,7 @@ from ...models.formulations.catalogue import FORMULATIONS
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
-from ...models.search.improvement import first_field
+from ...models.search.starts import first_field
 from ..solutions.solution import Solution
 from .job import Limits
 from .local import solve
@@ -57,7 +57,7 @@ def find_jumps(
 ) -> Solution:
     """The solution of `milp-mccormick` by HiGHS: the first stage.
 
-    start: the incumbent handed to HiGHS, the improved greedy field when None: cold, HiGHS is lost beyond 10 x
+    start: the incumbent handed to HiGHS, the first field when None: cold, HiGHS is lost beyond 10 x
     10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
     """
     limits = limits or Limits()
@@ -79,7 +79,7 @@ def two_stage(
     """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
 
     `.milp` and `.qp` are the two, `.field` the one with the jumps of the first and the angles of the second
-    (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the improved greedy field
+    (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the first field
     when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
     MissingSolverError, SolverError, SolutionError.
     """

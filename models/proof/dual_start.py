@@ -38,7 +38,7 @@ def search(
 ) -> Search:
     """The field of least 2-norm energy found, never above `start`.
 
-    Nor is it above the improved greedy field, unless time cuts that off, nor above what a short proof finds:
+    Nor is it above the first field, unless time cuts that off, nor above what a short proof finds:
     the search begins at the best of them (grids of 65 to 1000 pixels, or that many at lower resolution; with
     5 s or more, or 60 s where what it needs has not been compiled yet).
 

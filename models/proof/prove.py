@@ -28,8 +28,9 @@ from ..instance.instance import Instance
 from ..processes.crew import Crew, crew
 from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
-from ..search.improvement import first_field, improved
+from ..search.improvement import improved
 from ..search.search import search
+from ..search.starts import first_field, polyvector_start
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
@@ -82,7 +83,7 @@ def prove(
     norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; of its proofs there are no
     certificates. seconds: when to end; levels that could not be recorded by then are not begun. gap: the
     relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field to begin
-    with where, improved, it is better than the improved greedy one. seed: of the search that follows where
+    with where, improved, it is better than the first field. seed: of the search that follows where
     the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every good place
     whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
     proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
@@ -138,11 +139,13 @@ def _of_norm(norm: Norm) -> type[Work]:
 
 
 def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
-    """The better one of the improved greedy field and of what the user gives."""
+    """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
     fields = [first_field(instance, over)]
     if given is not None:
         fields.append(improved(given, over))
-    return min(fields, key=lambda field: field.energy().total)
+    if not over():
+        fields.append(improved(polyvector_start(instance, over), over))
+    return min(fields, key=lambda field: round(field.energy().total, 9))
 
 
 @dataclass

@@ -52,17 +52,22 @@ def halved(instance: Instance) -> Instance | None:
 
 
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
+    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
+    return improved(grown(coarse, instance, over), over)
+
+
+def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
 
     Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the
-    stroke. Then they are improved until the time is over.
+    stroke. Then angles and jumps settle until the time is over.
     """
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
     settle(state, LinearSolver(), over)
-    return improved(state.bounded(over), over)
+    return state.bounded(over)
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:

@@ -22,21 +22,12 @@ from ..processes.deadline import Over, never
 from .box_qp import least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
-from .greedy import greedy
 from .nearest_stroke import chamfer, nearest_strokes
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
 _MOST_CURVES: Final = 40  # that may change their family, those first that miss their strokes most
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
-
-
-def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """The greedy field, improved as time allows: where searches start, and `qp-fixed`'s jumps.
-
-    Deterministic where time does not cut it off.
-    """
-    return improved(greedy(instance, over=over), over)
 
 
 def improved(field: CrossField, over: Over = never) -> CrossField:

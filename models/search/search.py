@@ -27,10 +27,10 @@ from ..smooth.power_field import power_field
 from .coarse import halved, prolonged
 from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
-from .improvement import first_field, improved, settle, stroke_curves
+from .improvement import improved, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
-from .polyvector_start import polyvector_start
+from .starts import first_field, polyvector_start
 from .walk import LOWER, Explored, Task, explore
 
 RoundProgress = Callable[[int, float], object]
@@ -82,14 +82,14 @@ def search(
 ) -> Search:
     """The field of least 2-norm energy found, never above `start`.
 
-    Nor is it above the improved greedy field, unless time cuts that off, nor above what `suggest` makes of
-    the best of the fields to begin at, here and on grids of lower resolution.
+    Nor is it above the first field (models/search/starts.py), unless time cuts that off, nor above what
+    `suggest` makes of the best of the fields to begin at, here and on grids of lower resolution.
 
     seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
     success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
     100 a second), and the last solve, with 5 % and half a second more.
     Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes; start: a field to begin at where, improved, it is better than the improved greedy,
+    jobs: processes; start: a field to begin at where, improved, it is better than the first,
     PolyVector and power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so
     far. Raises InputError for a limit that is not positive and too many jobs, InstanceError for a start on
     another one.
@@ -169,7 +169,7 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of greedy field, given field and, in time, PolyVector and power field, each improved in time,
+    """The best of first field, given field and, in time, PolyVector and power field, each improved in time,
     or what is suggested from it.
     """
     fields = [first_field(instance, limits.over)]

@@ -10,7 +10,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.solutions.readers.gams_csv import parse as parse_csv
 from crossfield.export.solutions.readers.registry import read_raw
 from crossfield.models.errors import SolutionError
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from crossfield.export.solving.patches import PATCH_SOLVERS, search_patches
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import QUARTER
 from crossfield.models.search.excerpt import excerpt
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 from exhaustive import exact, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -128,7 +128,7 @@ CHILD = """
 import crossfield as cf
 from crossfield.export.cli.app import invoke
 from crossfield.export.solving.patches import search_patches
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 if True:
     tell = lambda patches, energy: print(patches, flush=True)
     found = search_patches(first_field(cf.sample("mouse", 12)), seconds=600, solver="highs", progress=tell)

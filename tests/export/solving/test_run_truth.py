@@ -12,7 +12,7 @@ from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solving.methods import METHODS, Candidate
 from crossfield.export.solving.run import Report
 from crossfield.export.solving.stopwatch import Stopwatch
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 
 
 def test_stages_are_all_the_time_whatever_is_rounded():

@@ -10,7 +10,7 @@ from crossfield.models.proof.common_lattice import CommonLattice
 from crossfield.models.proof.prove_1norm import forced_1norm
 from crossfield.models.proof.pruning import Left
 from crossfield.models.search.box_lp import Residuals, fitted_1norm
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 
 pytestmark = pytest.mark.numeric

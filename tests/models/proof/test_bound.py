@@ -12,7 +12,7 @@ from crossfield.models.processes.deadline import never
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import finer, left, prolonged
 from crossfield.models.proof.sweep import Dual
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 
 pytestmark = pytest.mark.numeric

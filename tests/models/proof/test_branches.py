@@ -11,7 +11,7 @@ from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.pruning import branches, finer, left, prolonged
 from crossfield.models.proof.record import LevelRecord, Proof
 from crossfield.models.proof.sweep import Dual
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 from exhaustive import optimum, random_instance
 
 pytestmark = pytest.mark.numeric

@@ -8,7 +8,7 @@ from crossfield.models.proof import prove as proofs
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.lattice import Lattice
 from crossfield.models.proof.sweep import Dual
-from crossfield.models.search.improvement import first_field
+from crossfield.models.search.starts import first_field
 
 pytestmark = pytest.mark.numeric
 

@@ -10,9 +10,9 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy
-from crossfield.models.search.improvement import first_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.search import search
+from crossfield.models.search.starts import first_field
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.power_field import power_field
 from exhaustive import exact, least_energy, random_instance, sketch

@@ -11,10 +11,11 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.free_field import free_bounds
-from crossfield.models.search.improvement import first_field, stroke_curves
+from crossfield.models.search.improvement import stroke_curves
 from crossfield.models.search.kicks import Kicks
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.search import _Hunt
+from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import explore
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -14,9 +14,10 @@ from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy
-from crossfield.models.search.improvement import first_field, improved, stroke_curves
+from crossfield.models.search.improvement import improved, stroke_curves
 from crossfield.models.search.kicks import Kicks
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
+from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import Task, explore
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings

@@ -7,8 +7,8 @@ import pytest
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import QUARTER, Instance
 from crossfield.models.search.improvement import improved
-from crossfield.models.search.polyvector_start import polyvector_start
 from crossfield.models.search.search import search
+from crossfield.models.search.starts import polyvector_start
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from crossfield.models.smooth.power_field import power_field

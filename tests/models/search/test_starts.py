@@ -1,0 +1,64 @@
+"""First fields: on large grids they grow from coarse ones, are valid, low, repeatable, and end in time."""
+
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.instance.instance import QUARTER
+from crossfield.models.proof.prove import first_of
+from crossfield.models.search import starts
+from crossfield.models.search.coarse import grown, halved, prolonged
+from crossfield.models.search.greedy import greedy
+from crossfield.models.search.improvement import improved
+from crossfield.models.search.starts import first_field, polyvector_start
+from exhaustive import random_instance
+
+pytestmark = pytest.mark.numeric
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name, size", [("mouse", 96), ("saddle", 128)])
+def test_on_a_large_grid_the_first_field_is_at_most_the_improved_greedy_one(name, size):
+    instance = cf.sample(name, size)
+    assert first_field(instance).energy().total <= improved(greedy(instance)).energy().total + 1e-9
+
+
+def test_first_fields_of_large_grids_are_the_same_each_time(monkeypatch):
+    monkeypatch.setattr(starts, "_COARSE", 150)
+    instance = cf.sample("mouse", 24)
+    first, again = first_field(instance), first_field(instance)
+    for name in ("alpha", "beta", "p"):
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+
+
+def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
+    instance = cf.sample("mouse", 16)
+    polyvector = improved(polyvector_start(instance)).energy().total
+    assert polyvector < first_field(instance).energy().total - 1e-3
+    assert first_of(instance, None, lambda: False).energy().total <= polyvector + 1e-9
+    assert cf.search(instance, rounds=0).field.energy().total <= polyvector + 1e-9
+
+
+def test_ragged_grids_grow_from_coarse_ones_to_valid_fields(monkeypatch):
+    monkeypatch.setattr(starts, "_COARSE", 40)
+    for seed in range(12):
+        instance = random_instance(seed, (9, 14), strokes=14, gauge=("strokes", "box")[seed % 2])
+        if seed % 3 == 0:
+            instance = replace(instance, crossings=[1], theta_cross=[instance.theta[1] + 1.2], w_cross=[0.5])
+        field = first_field(instance)
+        assert (field.alpha >= instance.alpha_lower - 1e-9).all()
+        assert (field.alpha <= instance.alpha_upper + 1e-9).all()
+        assert (np.abs(field.beta) <= QUARTER + 1e-9).all()
+        assert ((field.p >= instance.p_min) & (field.p <= instance.p_max)).all()
+        coarse = halved(instance)
+        assert coarse is not None
+        below = first_field(coarse)
+        assert prolonged(below, instance).energy().total <= grown(below, instance).energy().total + 1e-9
+
+
+def test_a_first_field_of_no_time_is_a_field_after_few_questions():
+    asked = []
+    field = first_field(cf.sample("mouse", 96), lambda: bool(asked.append(None)) or True)
+    assert np.isfinite(field.energy().total)
+    assert len(asked) <= 30
