@@ -271,7 +271,9 @@ def in_short(rows: Rows) -> str:
     for size in SIZES:
         of = {name: picked(rows, method=name, size=size) for name in names}
         means = {
-            name: np.mean([angle for row in each for angle in row["degrees"]]) for name, each in of.items()
+            name: np.mean([angle for row in each for angle in row["degrees"]])
+            for name, each in of.items()
+            if any(row["degrees"] for row in each)
         }
         best = min(means, key=lambda name: means[name])
         curves = max(sum(len(row["degrees"]) for row in each) for each in of.values())

@@ -88,8 +88,8 @@ def solve_command(
 ) -> None:
     """Find a field, by a method (-m) or by a solver for one formulation (-f).
 
-    The field, and what the solver read and wrote, is left in the folder. Both begin at the improved greedy
-    field unless --start gives another.
+    The field, and what the solver read and wrote, is left in the folder. Both begin at a field
+    that is found in some seconds, unless --start gives another.
     Ctrl-C ends the search and keeps the best so far.
     """
     deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it

@@ -19,7 +19,7 @@ from .greedy import greedy
 from .improvement import improved
 
 _COARSE: Final = 4096  # pixels up to which the greedy strategy costs little
-_LIGHTER: Final = (0.3, 0.03)  # factors of the stroke weights with which the greedy strategy is tried too
+_LIGHTER: Final = 0.03  # factor of the stroke weights with which the greedy strategy is tried too
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
@@ -64,20 +64,18 @@ def _from_coarsest(instance: Instance, over: Over) -> CrossField:
 
 
 def _best_start(instance: Instance, over: Over) -> CrossField:
-    """The best of the greedy and, in time, the PolyVector start and lightly held greedy fields, improved."""
+    """The best of the greedy field and, in time, the PolyVector start and a lightly held one, improved."""
     best = improved(greedy(instance, over=over), over)
     if not over():
         best = min(best, improved(polyvector_start(instance, over), over), key=_energy)
-    for factor in _LIGHTER:
-        if over():
-            break
-        best = min(best, improved(_lightly_held(instance, factor, over), over), key=_energy)
+    if not over():
+        best = min(best, improved(_lightly_held(instance, over), over), key=_energy)
     return best
 
 
-def _lightly_held(instance: Instance, factor: float, over: Over) -> CrossField:
+def _lightly_held(instance: Instance, over: Over) -> CrossField:
     """The greedy field of lighter strokes: where they contradict each other they leave fewer vortices."""
-    light = greedy(replace(instance, w_strokes=factor * instance.w_strokes), over=over)
+    light = greedy(replace(instance, w_strokes=_LIGHTER * instance.w_strokes), over=over)
     return CrossField(instance, light.alpha, light.beta, light.p).with_best_jumps()
 
 
