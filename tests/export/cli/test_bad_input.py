@@ -586,7 +586,7 @@ DISK = {
 }
 
 
-SLOW = ("solve", "run", "draw pdf")
+SLOW = ("solve", "run", "draw pdf", "draw", "export")
 
 
 @pytest.mark.parametrize(
@@ -613,6 +613,7 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
     assert not (tmp_path / "out" / "report.json").exists()
 
 
+@pytest.mark.slow
 def test_a_file_that_was_there_survives_a_full_disk(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     cf.write_instance(cf.sample("skew", 8), "out.json")

@@ -231,6 +231,7 @@ def test_a_start_gives_the_jumps_of_qp_fixed(tmp_path, crossfield, instance, ins
     assert facts["energy_2_norm"] <= power.energy(2).total + 1e-9
 
 
+@pytest.mark.slow
 def test_an_answer_of_yesterday_is_not_left_for_one_of_today(tmp_path, capsys):
     """A search without a point removes the field of an earlier call."""
     stale = tmp_path / "tiny.minlp-cubic.field.npz"
@@ -462,6 +463,7 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path, instance_file):
     assert without_progress(done.stderr) == ""
 
 
+@pytest.mark.slow
 def test_the_plan_of_a_run_is_told_on_a_terminal_unless_it_shall_be_quiet(tmp_path):
     (tmp_path / "file").touch()
     arguments = ("run", "skew", "--size", "4", "--time-limit", "20", "-o", tmp_path / "file")

@@ -142,6 +142,7 @@ def test_no_record_is_lost_at_the_border_of_a_block(
         assert (tmp_path / file).read_bytes() == (tmp_path / file.replace("whole", "parts")).read_bytes()
 
 
+@pytest.mark.slow
 def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
     chosen = ["minlp-quartic", "miqcp-bilinear", "milp-mccormick"]
     code = (

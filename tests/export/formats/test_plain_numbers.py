@@ -25,6 +25,7 @@ def refusals(instance, folder):
     return [reason for reason in reasons if "nothing beyond" not in reason]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given, better",
     [

@@ -15,7 +15,7 @@ from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from forging import seal
 
-pytestmark = pytest.mark.usefixtures("short_searches")
+pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
 SPEC = """
 format = "crossfield-library-spec"

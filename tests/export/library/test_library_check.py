@@ -762,6 +762,7 @@ def test_an_archive_takes_no_points(solved, built, tmp_path):
         submit(solved[0], packed)
 
 
+@pytest.mark.slow
 def test_all_formulations_and_formats_verify(tmp_path):
     text = SPEC.replace(
         'formulations = ["milp-mccormick", "miqp-mccormick", "minlp-parity", "qp-fixed"]\n', ""

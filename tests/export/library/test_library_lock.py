@@ -21,7 +21,7 @@ from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
 
-pytestmark = pytest.mark.usefixtures("short_searches")
+pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
 SEEDS = (1, 2)
 SPEC = """format = "crossfield-library-spec"

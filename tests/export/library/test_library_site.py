@@ -29,7 +29,7 @@ from crossfield.models.instance.file import read_instance
 from loops import for_each
 from oracles import browser as browser_program
 
-pytestmark = pytest.mark.usefixtures("short_searches")
+pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
 SPEC = """format = "crossfield-library-spec"
 version = 1

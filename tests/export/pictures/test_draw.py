@@ -123,9 +123,9 @@ def test_the_mask_is_white_and_the_rest_grey(tmp_path):
     "kind, index, colour",
     [
         ("field", 0.25, panels.POSITIVE),
-        ("crosses", -0.25, panels.NEGATIVE),
+        pytest.param("crosses", -0.25, panels.NEGATIVE, marks=pytest.mark.slow),
         ("angle", -0.25, panels.NEGATIVE),
-        ("energy", 0.25, panels.POSITIVE),
+        pytest.param("energy", 0.25, panels.POSITIVE, marks=pytest.mark.slow),
     ],
 )
 def test_singularities_are_dots_in_their_place(tmp_path, kind, index, colour):

@@ -49,11 +49,11 @@ def test_without_a_proof_there_is_neither_a_number_nor_the_certificate_of_yester
 
 
 def test_the_method_leaves_its_certificate_beside_the_field(tmp_path, capsys):
-    given = ["solve", "skew", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
+    given = ["solve", "mouse", "--size", "6", "-m", "prove", "--time-limit", "60", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     facts = json.loads(capsys.readouterr().out)
-    field = cf.read_field(tmp_path / "skew.prove.field.npz")
-    certificate = read_certificate(tmp_path / "skew.prove.certificate.npz", on=field.instance)
+    field = cf.read_field(tmp_path / "mouse.prove.field.npz")
+    certificate = read_certificate(tmp_path / "mouse.prove.certificate.npz", on=field.instance)
     assert facts["energy_2_norm"] == pytest.approx(field.energy().total, rel=1e-12)
     assert (facts["proven_optimal"], facts["bound_2_norm"]) == (True, certificate.bound)
     assert METHODS["prove"].timed

@@ -285,6 +285,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert found.ok
 
 
+@pytest.mark.slow
 def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
     assert invoke(["verify", str(tmp_path), "--solve", "-p", "highs", "--json"]) == 0

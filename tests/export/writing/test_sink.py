@@ -135,6 +135,7 @@ def test_a_failure_leaves_no_file_and_no_thread(tmp_path, monkeypatch, begun):
     assert begun() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compress", [False, True])
 def test_files_written_at_once_are_the_same(compress, tmp_path):
     for jobs in (1, 3):

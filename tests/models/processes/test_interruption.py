@@ -94,6 +94,7 @@ def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
         assert "KeyboardInterrupt" in err
 
 
+@pytest.mark.slow
 def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
     """At that size the greedy field takes longer than the signal.
 

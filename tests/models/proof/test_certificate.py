@@ -185,6 +185,7 @@ def least_known(arrays, cache):
     return cache[instance.sha256]
 
 
+@pytest.mark.slow
 def test_no_change_of_an_entry_makes_a_false_claim_pass(written):
     """Every array of several certificates, many times: what passes is true of the instance in it."""
     rng = np.random.default_rng(11)
@@ -380,6 +381,7 @@ def hat(value, places):
     return np.maximum(0, 1 - np.abs(value - places) / (places[1] - places[0]))
 
 
+@pytest.mark.slow
 def test_boxes_over_the_edges_of_windows_are_cut_and_bounded(written):
     """At random crosses of boxes over edges no energy is below the bound, and one is close to it."""
     rng, cut = np.random.default_rng(4), 0

@@ -127,6 +127,7 @@ def test_limits_end_a_proof_with_what_it_has():
             cf.prove(instance, **wrong)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_proof_with_what_it_has():
     program = (
         "import crossfield as cf\n"

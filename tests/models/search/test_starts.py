@@ -40,6 +40,7 @@ def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
     assert cf.search(instance, rounds=0).field.energy().total <= polyvector + 1e-9
 
 
+@pytest.mark.slow
 def test_ragged_grids_grow_from_coarse_ones_to_valid_fields(monkeypatch):
     monkeypatch.setattr(starts, "_COARSE", 40)
     for seed in range(12):
