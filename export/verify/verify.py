@@ -71,7 +71,8 @@ class Check:
 
     problem: instance and formulation. program: its name, or that of the solver. objective: recomputed at the
     solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
-    that follows from angles and jumps. group: where it is equal, so is the optimum; relaxes: the group of
+    that follows from angles and jumps; leeway: how much the rows that the point breaks, by no more than it
+    may, can have lowered its objective. group: where it is equal, so is the optimum; relaxes: the group of
     which the file holds a relaxation, whose optimum is no higher.
     """
 
@@ -84,6 +85,7 @@ class Check:
     objective: float | None = None
     bound: float | None = None
     energy: float | None = None
+    leeway: float | None = None
     seconds: float | None = None
     proven: bool = False
     group: str = ""
@@ -333,8 +335,9 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     point, wrong = _point(held, answer)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
-    numbers |= {"objective": objective, "energy": energy}
     worst = held.violation(point)
+    leeway = worst.worst * float(np.sum(np.abs(held.merged_objective(1)[1])))
+    numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
     if not wrong and worst.worst > FEASIBLE_WITHIN:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
     proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
@@ -342,19 +345,23 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
         # Before the end a solver's own variable for it may be loose.
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
-    wrong = wrong or _energy_difference(subject.problem, objective, energy, proven=proven)
+    wrong = wrong or _energy_difference(subject.problem, objective, energy, leeway, proven=proven)
     if wrong:
         return subject.check(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
     verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, answer.message)
     return subject.check(solver, "solve", verdict, words, proven=proven, **numbers)
 
 
-def _energy_difference(problem: Problem, objective: float, energy: float, *, proven: bool) -> str:
+def _energy_difference(
+    problem: Problem, objective: float, energy: float, leeway: float, *, proven: bool
+) -> str:
     """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
     options = problem.formulation.options
     if options.relax or options.facet == "printed":
         return ""  # z need not be p1 beta, and the field is another point
-    if same(energy, objective) or (not proven and energy < objective):
+    if same(energy, objective) or objective < energy <= objective + leeway:
+        return ""
+    if not proven and energy < objective:
         return ""
     return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
 
@@ -377,6 +384,11 @@ def same(first: float, second: float) -> bool:
     return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
 
 
+def _above(value: float, best: float) -> bool:
+    """Whether an optimum or a bound lies above a point's objective by more than rounding."""
+    return value > best and not same(value, best)
+
+
 def compared(checks: list[Check]) -> list[Check]:
     """The checks; a solve whose optimum or bound contradicts the best of its problem now differs."""
     return [_against(check, checks) for check in checks]
@@ -396,9 +408,9 @@ def _beside_others(check: Check, checks: list[Check]) -> str:
     best = _best(checks, check.group)
     if best is None:
         return ""
-    if check.proven and check.objective is not None and not same(check.objective, best):
+    if check.proven and check.objective is not None and _above(check.objective, best):
         return f"its optimum is {check.objective:.9g}, another has {best:.9g}"
-    if check.bound is not None and check.bound > best and not same(check.bound, best):
+    if check.bound is not None and _above(check.bound, best):
         return f"its bound {check.bound:.9g} is above a point of {best:.9g}"
     return ""
 
@@ -407,7 +419,7 @@ def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
     """How the proven optimum of a relaxation lies above a point of the problem itself; empty when not."""
     best = _best(checks, check.relaxes)
     lower = check.objective if check.proven else check.bound
-    if best is None or lower is None or lower <= best or same(lower, best):
+    if best is None or lower is None or not _above(lower, best):
         return ""
     return f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {best:.9g}"
 
@@ -420,6 +432,7 @@ def _as_relaxation(check: Check, checks: list[Check]) -> str:
 
 
 def _best(checks: list[Check], group: str) -> float | None:
-    """The least objective that was found in a group."""
-    values = [each.objective for each in checks if each.group == group and each.objective is not None]
+    """The least objective that was found in a group, each with what its broken rows can have saved."""
+    found = [each for each in checks if each.group == group]
+    values = [each.objective + (each.leeway or 0.0) for each in found if each.objective is not None]
     return min(values, default=None)

@@ -15,12 +15,23 @@ from cases import MASKS, make_field, make_instance
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solutions.readers.text import RawSolution
+from crossfield.export.solutions.readers.text import RawSolution, Status
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
+from crossfield.export.verify.comparison import names_of
 from crossfield.export.verify.programs import worker as worker_module
 from crossfield.export.verify.programs.reading import load
 from crossfield.export.verify.programs.worker import Worker
-from crossfield.export.verify.verify import Verdict, Verification, same, verify
+from crossfield.export.verify.verify import (
+    Verdict,
+    Verification,
+    _energy_difference,
+    _judged,
+    _subjects,
+    random_field,
+    same,
+    verify,
+)
+from crossfield.export.writing.names import column_names
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -123,6 +134,24 @@ def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
     present = {name for name, solver in SOLVERS.items() if not solver.missing}
     assert {f.program for f in found if f.verdict == Verdict.AGREES} == present
+
+
+def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path):
+    """Slacks of weighted deviations, each less by what a solver may break its row: the same field."""
+    problem = formulate(sample("skew", 4), "milp-mccormick")
+    write_all(problem.instance, tmp_path, ["milp-mccormick"])
+    subjects, _ = _subjects([read_manifest(next(tmp_path.glob("*.manifest.json")))], tmp_path)
+    index, cost = problem.merged_objective(1)
+    for less, verdict in ((0.0, Verdict.AGREES), (4e-6, Verdict.AGREES), (1e-4, Verdict.DIFFERS)):
+        point = problem.point(random_field(problem, 1))
+        point[index[cost > 0, 0]] -= less
+        names = np.array([name.encode() for name in names_of(column_names(problem))])
+        answer = RawSolution(Status.OPTIMAL_GLOBAL, "", None, names, point)
+        check = _judged(subjects[0], "highs", answer, 0.0)
+        assert check.verdict == verdict, (less, check.reason)
+        assert check.objective <= check.energy <= check.objective + check.leeway + 1e-9
+    assert _energy_difference(problem, 1.0, 1.2, 0.1, proven=False)
+    assert not _energy_difference(problem, 1.0, 1.05, 0.1, proven=False)
 
 
 @pytest.mark.slow
