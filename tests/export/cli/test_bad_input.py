@@ -550,6 +550,7 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
     assert cf.read_field(tmp_path / "out" / "field.npz").instance.sha256 == instance.sha256
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["file", "proc"])
 def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, where):
     cf.write_instance(instance, tmp_path / "tiny.json")
@@ -624,6 +625,7 @@ def test_a_file_that_was_there_survives_a_full_disk(tmp_path, monkeypatch):
     assert listing(tmp_path) == {tmp_path / "out.json": len(before)}
 
 
+@pytest.mark.slow
 def test_a_full_device_is_said(tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("there is no /dev/full")

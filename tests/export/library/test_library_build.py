@@ -258,6 +258,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @for_each("case", BAD)
 def test_a_bad_specification_is_one_line_with_file_or_name_and_nothing_half_written(tmp_path, capfd, case):
     text, words = BAD[case]

@@ -596,6 +596,7 @@ PARTS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=800)
 @given(
     st.sampled_from(GOOD),

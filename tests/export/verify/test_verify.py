@@ -285,6 +285,7 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
     assert found["well"].verdict == Verdict.AGREES
 
 
+@pytest.mark.slow
 def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A process that is killed, and one that does not answer: both are told, the next task has a new one."""
     with Worker("highs", tmp_path / "highs") as worker:
@@ -351,6 +352,7 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
         verify(tmp_path)
 
 
+@pytest.mark.slow
 @each_of(["gurobi", "cplex", "xpress", "gams"])
 def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, program: str):
     """A size that no free edition takes; whoever has a licence sees it solved, or the time limit."""

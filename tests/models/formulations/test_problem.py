@@ -28,6 +28,7 @@ def by_terms(terms, count, point):
     return total
 
 
+@pytest.mark.slow
 @for_each("label", POLYNOMIAL)
 def test_terms_give_the_values_of_every_family(label):
     for problem in (problem_of(label), carried(problem_of(label), FORMATS["lp"])):

@@ -82,6 +82,7 @@ def test_ctrl_c_while_it_draws_keeps_the_report(tmp_path):
     assert not list(tmp_path.rglob(".*.part"))
 
 
+@pytest.mark.slow
 def test_ctrl_c_twice_ends_at_once_and_leaves_whole_files(tmp_path):
     with started([sys.executable, "-c", RUN, tmp_path, "600"], "search: energy") as process:
         code, err = press(process, times=2)

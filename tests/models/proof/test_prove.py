@@ -55,6 +55,7 @@ def test_weights_holes_and_parts_without_strokes(weights):
     assert proof.energy - proof.bound <= 1e-4 * proof.energy
 
 
+@pytest.mark.slow
 def test_one_pixel_and_one_row():
     for mask, theta in (([[True]], [[2.0]]), ([[True] * 5], [[0.3, np.nan, 1.2, np.nan, 2.9]])):
         for gauge in ("strokes", "box"):

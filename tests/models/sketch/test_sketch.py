@@ -810,6 +810,7 @@ def test_the_content_decides_what_a_file_is(tmp_path):
 # --- the developers' sketches -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_shared
 @pytest.mark.parametrize("size", [24, 48, 128])
 def test_every_shared_sketch_gives_a_sensible_instance(size):
@@ -834,6 +835,7 @@ PAIRS = {
 }
 
 
+@pytest.mark.slow
 @needs_shared
 @for_each("name", PAIRS)
 @for_each("size", [24, 48, 128])
