@@ -30,14 +30,16 @@ settings.load_profile("same")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
+COMPILING = pytest.StashKey[subprocess.Popen]()
 FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
 """Fixtures, and the program that those who use them need."""
 
 
 def pytest_sessionstart(session):
-    """Compile what proofs need once, and not in every process that runs tests."""
+    """Compile what proofs need once, and not in every process that runs tests, while these collect them."""
     if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
-        subprocess.run([sys.executable, "-m", "crossfield.export.solving.compiling"], check=True)
+        command = [sys.executable, "-m", "crossfield.export.solving.compiling"]
+        session.config.stash[COMPILING] = subprocess.Popen(command)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -71,6 +73,8 @@ def _absent(item):
 
 
 def pytest_sessionfinish(session):
+    if COMPILING in session.config.stash:
+        session.config.stash[COMPILING].wait()
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["left_out"] = session.config.stash.get(LEFT_OUT, {})
 

@@ -56,8 +56,9 @@ OTHERS = {
     "chromium": (
         importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),
         "Chromium with its driver, or selenium,",
-        "apt install chromium chromium-driver",
+        "apt install chromium chromium-driver; pip install selenium",
     ),
+    "distributed": (importlib.util.find_spec("distributed"), "distributed", "pip install '.[cluster]'"),
 }
 """Programs that `verify` does not know: a sign that they are here, their names,
 and what to do where they are not.

@@ -61,7 +61,6 @@ def started(arguments, log, words):
 @pytest.fixture
 def cluster(tmp_path):
     """Address of a scheduler on this machine, and its two workers."""
-    pytest.importorskip("distributed")
     arguments = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     scheduler, found = started(
         arguments, tmp_path / "scheduler.log", r"Scheduler at: +(tcp://127\.0\.0\.1:\d+)"
@@ -94,6 +93,7 @@ def content(folder):
 
 
 @pytest.mark.slow
+@pytest.mark.needs("distributed")
 def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(tmp_path, cluster):
     address, (first, second) = cluster
     spec = tmp_path / "spec.toml"
@@ -118,8 +118,8 @@ def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(t
     assert content(out) == content(local.folder)
 
 
+@pytest.mark.needs("distributed")
 def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, capfd):
-    pytest.importorskip("distributed")
     spec = tmp_path / "spec.toml"
     spec.write_text(SPEC)
     for address in ("nonsense", "ftp://127.0.0.1:1"):
