@@ -8,6 +8,7 @@ as large, up to the greatest that an instance may have.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from .free_field import FreeField
 from .improvement import improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
+_CREEP: Final = 5e-4  # relative fall of the energy in a round: less is not worth a round on a fine grid
 
 
 def halved(instance: Instance) -> Instance | None:
@@ -66,7 +68,7 @@ def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossFi
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
-    settle(state, LinearSolver(), over)
+    settle(state, LinearSolver(), over, enough=_CREEP)
     return state.bounded(over)
 
 

@@ -8,6 +8,7 @@ strategy is that of mixed-integer quadrangulation).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -24,11 +25,24 @@ from .nearest_stroke import nearest_strokes
 JumpProgress = Callable[[int, int], object]
 """Is told how many jumps are known, and how many there are."""
 
-_BATCH_COST: Final = 1.0  # energy that one batch of jumps may add
 _CLOSE_UP_TO: Final = (
     8192  # pixels: beyond, solves take most of the time, and local updates rank jumps as well
 )
-_LOCAL: Final = 3e-2  # relative residual of a local update, which leaves the smooth part of the error
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """How much energy one batch of jumps may add, and to which relative residual angles are then brought up
+    to date locally, which leaves the smooth part of the error; None: by factorisations.
+    """
+
+    batch: float
+    local: float | None
+
+
+_CLOSE: Final = _Pace(1.0, None)
+_LARGE: Final = _Pace(1.0, 3e-2)
+_ROUGH: Final = _Pace(2.0, 1e-2)
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
@@ -40,39 +54,56 @@ def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Ov
     progress: called as progress(jumps known, jumps in all) after every batch. over: says whether the time is
     over; then all jumps that are left are decided at once.
     """
-    nearest = nearest_strokes(instance)
-    angle = np.append(instance.target, 0.0)[nearest]
-    state = FreeField(
-        instance, angle, np.zeros(len(angle)), np.zeros(len(instance.grid.first), dtype=np.int32)
-    )
-    _stitch(state, nearest, progress, over)
+    state, nearest = _cells(instance)
+    pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
+    _stitch(state, nearest, pace, over, progress)
     return state.bounded(over)
 
 
-def _stitch(state: FreeField, nearest: Ints, progress: JumpProgress | None, over: Over) -> None:
-    """Decide the jumps between cells, cheapest first, in batches that cost at most `_BATCH_COST`."""
+def rough_greedy(instance: Instance, over: Over = never) -> CrossField:
+    """As `greedy`, in a third of its time: in larger batches, with angles brought up to date locally.
+
+    The jumps are others, and as good: which strategy has the best is a matter of luck.
+    """
+    state, nearest = _cells(instance)
+    _stitch(state, nearest, _ROUGH, over)
+    return state.bounded(over)
+
+
+def _cells(instance: Instance) -> tuple[FreeField, Ints]:
+    """Each pixel with the angle of its nearest stroke, without a jump; and the numbers of these strokes."""
+    nearest = nearest_strokes(instance)
+    angle = np.append(instance.target, 0.0)[nearest]
+    jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
+    return FreeField(instance, angle, np.zeros(len(angle)), jumps), nearest
+
+
+def _stitch(
+    state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: JumpProgress | None = None
+) -> None:
+    """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
-    _settle(state, known, solver)
+    _settle(state, known, solver, None)
     while not known.all():
         open_ = np.nonzero(~known)[0]
         jumps, cost = free_jumps(grid, state.alpha, state.beta)
         # Rounding must not decide the order of equal costs: it would differ between machines.
         order = np.argsort(np.round(cost[open_], 9), kind="stable")
-        many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), _BATCH_COST, side="right")))
+        many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), pace.batch, side="right")))
         chosen = open_ if over() else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
-        _settle(state, known, solver if grid.size <= _CLOSE_UP_TO else None)
+        _settle(state, known, solver, pace.local)
         if progress is not None:
             progress(int(known.sum()), len(known))
 
 
-def _settle(state: FreeField, known: Bools, solver: LinearSolver | None) -> None:
-    """Bring angles up to date, enough to rank the unknown jumps; locally without a solver."""
+def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
+    """Bring angles up to date, enough to rank the unknown jumps."""
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
-    if solver is None:
-        state.x = state.x + local_step(energy, right, _LOCAL)
-    else:
+    if local is None:
         state.x = state.x + solver.step(energy.matrix, right, CLOSE)
+    else:
+        state.x = state.x + local_step(energy, right, local)

@@ -25,6 +25,7 @@ from .free_field import FreeField, free_bounds
 from .nearest_stroke import chamfer, nearest_strokes
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
+_FALL: Final = 1e-9  # of the energy, relative to 1 + energy: less may be rounding
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
 _MOST_CURVES: Final = 40  # that may change their family, those first that miss their strokes most
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
@@ -49,8 +50,12 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: LinearSolver, over: Over = never) -> None:
-    """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts."""
+def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = _FALL) -> None:
+    """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts.
+
+    enough: relative fall of the energy in a round below which no more rounds follow. Singularities creep by a
+    pixel a round, on fine grids for a hundred rounds.
+    """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
@@ -59,9 +64,11 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never) -> None:
         energy = energy_at(state.instance, state.p)
         state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
-        if least - reached < 1e-9 * (1 + reached):
+        fall = (least - reached) / (1 + reached)
+        if fall >= _FALL:
+            kept, least = (state.x, state.p), reached
+        if fall < enough:
             break
-        kept, least = (state.x, state.p), reached
         _swap_lines(state)
         state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
     state.x, state.p = kept

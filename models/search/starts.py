@@ -1,7 +1,8 @@
 """Fields to start from: the greedy one, PolyVector fields, and what grows out of the best on a coarse grid.
 
-Which jumps a strategy finds is a matter of luck, and on a coarse grid luck is cheap: there several are tried
-and curves change their family, and what is found grows to the fine grid, where angles and jumps only settle.
+Which jumps a strategy finds is a matter of luck, and on a coarse grid luck is cheap: there several are tried,
+curves of the best two change their family, and what is found grows to the fine grid, where angles and jumps
+only settle.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from .box_qp import fitted
 from .coarse import grown, halved, prolonged
-from .greedy import greedy
+from .greedy import greedy, rough_greedy
 from .improvement import improved
 
 _COARSE: Final = 4096  # pixels up to which the greedy strategy costs little
-_LIGHTER: Final = 0.03  # factor of the stroke weights with which the greedy strategy is tried too
+_HELD: Final = (1.0, 0.3, 0.1, 0.03)  # factors of the stroke weights for the greedy strategy
+_IMPROVED: Final = 2  # of the starts: improving one takes as long as finding three
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
@@ -64,19 +66,20 @@ def _from_coarsest(instance: Instance, over: Over) -> CrossField:
 
 
 def _best_start(instance: Instance, over: Over) -> CrossField:
-    """The best of the greedy field and, in time, the PolyVector start and a lightly held one, improved."""
-    best = improved(greedy(instance, over=over), over)
-    if not over():
-        best = min(best, improved(polyvector_start(instance, over), over), key=_energy)
-    if not over():
-        best = min(best, improved(_lightly_held(instance, over), over), key=_energy)
-    return best
+    """The best of the PolyVector start and, in time, of greedy fields; the lowest of them improved."""
+    starts = [polyvector_start(instance, over)]
+    starts += [_held(instance, factor, over) for factor in _HELD if not over()]
+    lowest = sorted(starts, key=_energy)[:_IMPROVED]
+    return min((improved(start, over) for start in lowest), key=_energy)
 
 
-def _lightly_held(instance: Instance, over: Over) -> CrossField:
-    """The greedy field of lighter strokes: where they contradict each other they leave fewer vortices."""
-    light = greedy(replace(instance, w_strokes=_LIGHTER * instance.w_strokes), over=over)
-    return CrossField(instance, light.alpha, light.beta, light.p).with_best_jumps()
+def _held(instance: Instance, factor: float, over: Over) -> CrossField:
+    """The greedy field of strokes held that much, with the best angles for its jumps under the own weights.
+
+    Held less, strokes that contradict each other leave fewer vortices.
+    """
+    light = rough_greedy(replace(instance, w_strokes=factor * instance.w_strokes), over)
+    return fitted(CrossField(instance, light.alpha, light.beta, light.p).with_best_jumps(), over)
 
 
 def _energy(field: CrossField) -> float:

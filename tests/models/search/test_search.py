@@ -200,9 +200,11 @@ def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
 
 @pytest.mark.slow
 def test_search_ends_by_itself_when_nothing_is_found():
-    found = cf.search(cf.sample("skew", 5))
+    instance = cf.sample("skew", 5)
+    found = cf.search(instance)
     assert found.ended == "patience"
-    assert found.field.energy().total < 1e-4
+    # Crosses of one skew cost nothing but that: 25 pixels, beta^2 = 0.18.
+    assert found.field.energy().total < 5 * instance.w_beta
 
 
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
