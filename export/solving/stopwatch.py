@@ -21,5 +21,5 @@ class Stopwatch:
 
     def lap(self, stage: str) -> None:
         """End a stage and begin the next one; what rounding leaves goes to the next one too."""
-        before = sum(self.stages.values())
-        self.stages[stage] = round(self.stages.get(stage, 0.0) + self.clock() - self._begin - before, 3)
+        passed = self.clock() - self._begin - sum(self.stages.values())
+        self.stages[stage] = round(self.stages.get(stage, 0.0) + max(passed, 0.0), 3)

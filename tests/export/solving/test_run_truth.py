@@ -22,6 +22,11 @@ def test_stages_are_all_the_time_whatever_is_rounded():
         watch.lap(stage)
     assert watch.stages == {"a": pytest.approx(1.75), "b": 0.001, "c": pytest.approx(1.499)}
     assert sum(watch.stages.values()) == pytest.approx(3.25, abs=1e-3)
+    short = iter([0.0, 0.0006, 0.0007])
+    watch = Stopwatch(lambda: next(short))
+    watch.lap("a")
+    watch.lap("b")
+    assert [f"{seconds:.1f}" for seconds in watch.stages.values()] == ["0.0", "0.0"]
 
 
 @pytest.mark.slow
