@@ -210,4 +210,4 @@ def tell_solution(solution: Solution, field: Path | None, *, quiet: bool, as_jso
     elif not quiet:
         show_solution(solution, facts, field)
     if solution.interrupted:
-        complain("interrupted; the best point so far was kept")
+        complain("interrupted; the best point so far was kept" if field else "interrupted")

@@ -129,7 +129,7 @@ def test_threads_change_no_bit():
 
 @pytest.mark.slow
 def test_the_bound_of_mouse_is_that_of_the_prototype():
-    instance = cf.sample("mouse", 24)
+    instance = cf.sample("mouse", 24, w_strokes=1.0, w_beta=1e-6)
     field = cf.search(instance, rounds=8, jobs=2).field
     assert field.energy().total == pytest.approx(5.014402, abs=1e-6)
     with crew(2) as hands:
