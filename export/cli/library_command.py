@@ -84,6 +84,7 @@ def solve_command(
     by: Annotated[
         str | None, typer.Option("--by", metavar="TEXT", help="Who measures, as the ledger is to say.")
     ] = None,
+    machine: Annotated[str | None, typer.Option("--machine", metavar="TEXT", help="On what machine.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -92,7 +93,13 @@ def solve_command(
 
     with progress(quiet=quiet) as show:
         records = solve_library(
-            folder, solvers=solver, time_limit=time_limit, up_to=up_to, by=by, progress=show
+            folder,
+            solvers=solver,
+            time_limit=time_limit,
+            up_to=up_to,
+            by=by,
+            machine=machine,
+            progress=show,
         )
     if as_json:
         say_json(records)

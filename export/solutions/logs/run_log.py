@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Final, Literal, NamedTuple
 
-MOST_STEPS: Final = 60
+MOST_STEPS: Final = 40
 """Steps of a trace that are kept: enough for a plot."""
 
 _HUGE: Final = 1e19  # what solvers write for infinity begins at 1e20
