@@ -35,7 +35,7 @@ from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
-from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
+from ..ledger.ledger import Ledger, Record, RunStatus, add_record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
 from .submit import check_texts, is_better
@@ -81,8 +81,41 @@ def solve_library(
             record = replace(record, by=by, machine=machine)
             with locked(library.folder, "a solve of the library", progress):
                 found.append(asdict(add_record(library.folder, record, field)))
+    with locked(library.folder, "a solve of the library", progress):
+        drop_refuted(library)
     rebuild(library.folder, progress=progress)
     return found
+
+
+def drop_refuted(library: Library) -> None:
+    """Take the bounds out of measured records of the ledger that a feasible point lies below.
+
+    A run may have found a point since that shows how far a solver's tolerances went. Bounds that somebody
+    sent in stay: who keeps the library decides about them. The caller holds the lock.
+    """
+    ledger, dropped = read_ledger(library.folder), {}
+    for document in library.entries:
+        measured = [
+            each
+            for each in ledger.of(document["name"], document["problem_sha256"])
+            if each.bound is not None and each.evidence is None
+        ]
+        best = _best(library, document, ledger) if measured else 0.0
+        for each in measured:
+            if contradicts(each.bound or 0.0, best):
+                dropped[each] = replace(each, bound=None)
+    if dropped:
+        write_ledger(replace(ledger, records=tuple(dropped.get(each, each) for each in ledger.records)))
+
+
+def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
+    """The least objective of an entry at its best point and at the ledger's fields of its instance."""
+    problem, file = problem_of(library, document), document["instance"]["file"]
+    relatives = (each["name"] for each in library.entries if each["instance"]["file"] == file)
+    kept = [record for name in relatives if (record := ledger.with_point(name)) is not None]
+    fields = [field for field in map(ledger.field, kept) if field.instance.sha256 == problem.instance.sha256]
+    values = [problem.objective_value(complete_point(problem, field)) for field in fields]
+    return float(min([document["best"]["objective"], *values]))
 
 
 def _chosen(solvers: Sequence[str] | None) -> list[str]:

@@ -5,27 +5,37 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .run_log import LogReader, RunLog, at_least, last, number, table_steps
+from .run_log import LogReader, RunLog, at_least, last, number, step, whole
 
-_ROW: Final = re.compile(
-    r"^\*?\s+\d+\s+(?P<time>[\d.]+)\s+(?:\d+[KMG]B\s+)?(?P<bound>[-+.\dE]+)\s+(?P<best>[-+.\dE]+)(?:\s+[\d.]+%)?$",
-    re.MULTILINE,
-)
+_CELLS: Final = 4
+
+
+def _row(words: list[str]) -> tuple[str, ...]:
+    """Time, bound and objective of a line: iteration, time, memory, bound, objective, progress.
+
+    Earlier versions have no memory and no progress. Empty for another line.
+    """
+    told = [word for word in words if word != "*" and not word.endswith(("B", "%"))]
+    is_row = len(told) == _CELLS and whole(told[0]) is not None and number(told[2]) is not None
+    return tuple(told[1:]) if is_row else ()
 
 
 def _parse(text: str) -> RunLog:
-    rows, exact = list(_ROW.finditer(text)), last(r"^Best possible += +(\S+)$", text)
-    bound = number(exact) if exact else at_least(rows[-1]["bound"]) if rows else None
+    rows = [row for line in text.splitlines() if (row := _row(line.split()))]
+    trace = tuple(each for row in rows if (each := step(*row)))
+    exact = last(r"^Best possible += +(\S+)$", text)
+    before = last(r"^ *Lower bound is +(\S+)$", text)
+    bound = number(exact) if exact else at_least(rows[-1][1] if rows else before)
+    found = number(last(r"^Solution += +(\S+)", text))
     told = last(r"^ +\*\*\* (.+?) \*\*\* *$", text)
-    best = last(r"^Solution += +(\S+)", text) or (rows[-1]["best"] if rows else None)
     return RunLog(
         "baron",
         version=last(r"^ *BARON version (\d[\d.]*\d)", text),
         ended=None if told is None else "optimal" if told == "Normal completion" else "limit",
         bound=bound,
-        objective=number(best),
+        objective=trace[-1].objective if found is None and trace else found,
         seconds=number(last(r"^ *Wall clock time: +(\S+)$", text)),
-        trace=table_steps(rows),
+        trace=trace,
     )
 
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .run_log import LogReader, RunLog, last, number, table_steps, whole
+from .run_log import LogReader, RunLog, Step, last, number, step, table_steps, whole
 
-_ROW: Final = re.compile(
-    r"^[H* ].*?(?P<best>\S+)\s+(?P<bound>\S+)\s+(?:-|[\d.]+%)\s+\S+\s+(?P<time>\d+s)$", re.MULTILINE
-)
 _END: Final = r"^Best objective {}, best bound {}, gap"
 _STOPPED: Final = re.compile(r"^(?:\w+ limit reached|Interrupt request received)", re.MULTILINE)
+
+
+def _row(words: list[str]) -> Step | None:
+    """From the right: time, iterations a node, gap, bound, objective."""
+    if len(words) < 7 or not words[-1].endswith("s") or not (words[-3] == "-" or words[-3].endswith("%")):
+        return None
+    return step(words[-1], words[-4], words[-5])
 
 
 def _parse(text: str) -> RunLog:
@@ -28,7 +32,7 @@ def _parse(text: str) -> RunLog:
         limit=number(last(r"^TimeLimit  (\S+)$", text)),
         columns=whole(last(r"^Optimize a model with \d+ rows, (\d+) columns", text)),
         rows=whole(last(r"^Optimize a model with (\d+) rows", text)),
-        trace=table_steps(_ROW.finditer(text)),
+        trace=table_steps(text, _row),
     )
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .run_log import LogReader, RunLog, last, number, table_steps, whole
+from .run_log import LogReader, RunLog, Step, last, number, step, table_steps, whole
 
-_ROW: Final = re.compile(
-    r"^ ?[A-Za-z]?\s+\S+\s+\S+\s+\S+\s+[\d.]+%\s+(?P<bound>\S+)\s+(?P<best>\S+)\s+\S+(?:\s+\S+){4}\s+"
-    r"(?P<time>[\d.]+s)$",
-    re.MULTILINE,
-)
 _SIZE: Final = r"^\S+ .*has {} rows; {} cols;"
+
+
+def _row(words: list[str]) -> Step | None:
+    """From the right: time, iterations, conflicts, two counts, gap, objective, bound, share explored."""
+    if len(words) < 11 or not words[-1].endswith("s") or not words[-9].endswith("%"):
+        return None
+    return step(words[-1], words[-8], words[-7])
 
 
 def _parse(text: str) -> RunLog:
@@ -27,7 +29,7 @@ def _parse(text: str) -> RunLog:
         threads=whole(last(r"^ +Thread count (\d+) ", text)),
         columns=whole(last(_SIZE.format(r"\d+", r"(\d+)"), text)),
         rows=whole(last(_SIZE.format(r"(\d+)", r"\d+"), text)),
-        trace=table_steps(_ROW.finditer(text)),
+        trace=table_steps(text, _row),
     )
 
 

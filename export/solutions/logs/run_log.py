@@ -13,6 +13,7 @@ MOST_STEPS: Final = 40
 """Steps of a trace that are kept: enough for a plot."""
 
 _HUGE: Final = 1e19  # what solvers write for infinity begins at 1e20
+_LONGEST: Final = 300  # characters of a line of a table
 _TIMES: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _STAMP: Final = re.compile(r"sha256_[0-9a-f]{12}(?![0-9a-f])")
 
@@ -110,23 +111,27 @@ def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:
     bound at the end, by the rounding of the log, is cut to it.
     """
     kept: list[Step] = []
-    for step in steps:
-        cut = step.bound if step.bound is None or bound is None else min(step.bound, bound)
-        if kept and kept[-1].seconds == step.seconds:
+    for each in steps:
+        cut = each.bound if each.bound is None or bound is None else min(each.bound, bound)
+        if kept and kept[-1].seconds >= each.seconds:
             kept.pop()
-        if not kept or kept[-1][1:] != (cut, step.objective):
-            kept.append(Step(step.seconds, cut, step.objective))
+        if not kept or kept[-1][1:] != (cut, each.objective):
+            kept.append(Step(each.seconds, cut, each.objective))
     if len(kept) <= MOST_STEPS:
         return tuple(kept)
     apart = (len(kept) - 1) / (MOST_STEPS - 1)
     return tuple(kept[round(place * apart)] for place in range(MOST_STEPS))
 
 
-def table_steps(rows: Iterable[re.Match[str]]) -> tuple[Step, ...]:
-    """The steps of rows that a pattern found, by its groups `time`, `bound` and `best`."""
-    found = []
-    for row in rows:
-        time = seconds(row["time"])
-        if time is not None:
-            found.append(Step(time, number(row["bound"]), number(row["best"])))
-    return tuple(found)
+def step(time: str, bound: str, best: str) -> Step | None:
+    """A row of a table of progress; None where that is no time."""
+    spent = seconds(time)
+    return None if spent is None else Step(spent, number(bound), number(best))
+
+
+def table_steps(
+    text: str, row: Callable[[list[str]], Step | None], mark: str | None = None
+) -> tuple[Step, ...]:
+    """What a reader of rows makes of the words of each line, or of the cells between marks."""
+    found = (row(line.split(mark)) for line in text.splitlines() if len(line) < _LONGEST)
+    return tuple(each for each in found if each is not None)

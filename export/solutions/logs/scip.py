@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .run_log import LogReader, RunLog, last, number, table_steps, whole
+from .run_log import LogReader, RunLog, Step, last, number, step, table_steps, whole
 
-_ROW: Final = re.compile(
-    r"^.?\s*(?P<time>[\d.]+[smhd])\|[^\n]*\|\s*(?P<bound>[^\s|]+)\s*\|\s*(?P<best>[^\s|]+)\s*\|[^|\n]*\|[^|\n]*$",
-    re.MULTILINE,
-)
 _SIZE: Final = r"^original problem has (\d+) variables \([^)]*\) and (\d+) constraints"
+
+
+def _row(cells: list[str]) -> Step | None:
+    """The time behind a letter in the first cell; from the right: share done, gap, objective, bound."""
+    if len(cells) < 8 or not cells[0].strip():
+        return None
+    return step(cells[0].split()[-1], cells[-4].strip(), cells[-3].strip())
 
 
 def _parse(text: str) -> RunLog:
@@ -26,7 +29,7 @@ def _parse(text: str) -> RunLog:
         seconds=number(last(r"^Solving Time \(sec\) : (\S+)$", text)),
         columns=whole(size[1]) if size else None,
         rows=whole(size[2]) if size else None,
-        trace=table_steps(_ROW.finditer(text)),
+        trace=table_steps(text, _row, "|"),
     )
 
 
