@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import combinations
 
@@ -334,3 +336,16 @@ def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(b
     drop_refuted(read_library(lib))
     after = {each.solver: each.bound for each in read_ledger(lib).records if each.status == "optimal"}
     assert after == {"Xpress": None, "SCIP": sent.bound, "HiGHS": right.bound}
+
+
+@pytest.mark.slow
+def test_runs_that_are_sent_in_at_one_moment_are_all_kept(lib):
+    command = [sys.executable, "-m", "crossfield", "library", "submit-run", "--library", str(lib)]
+    given = [(entry, solver) for entry in (MILP, OTHER) for solver in ("SCIP", "Gurobi")]
+    others = [
+        subprocess.Popen([*command, "--entry", entry, "--solver", solver, "--bound", "0.01", "--quiet"])
+        for entry, solver in given
+    ]
+    assert [other.wait() for other in others] == [0] * len(given)
+    assert sorted((each.entry, each.solver) for each in read_ledger(lib).records) == sorted(given)
+    assert verify_library(lib) == []
