@@ -16,9 +16,14 @@ from .finding import Finding, of_error
 _SUBMIT: Final = "restore it, or submit the run again"
 
 
-def log_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
-    """What is wrong with a record that names a log: the log is missing or damaged, or says something else."""
-    assert record.log is not None
+def run_findings(ledger: Ledger, record: Record) -> Iterator[Finding]:
+    """What is wrong with the record of a run: its log is missing or damaged, or says something else."""
+    if record.log is None:
+        if record.evidence == "log":
+            yield Finding(LEDGER, f"says that a log shows a bound of {record.entry}, and names none", _SUBMIT)
+        return
+    if record.evidence is None and record.bound is not None:
+        yield Finding(LEDGER, f"does not say whether {record.log} shows the bound of its run", _SUBMIT)
     try:
         told = parse_log(ledger.log(record))
     except CrossfieldError as error:

@@ -30,7 +30,6 @@ def _parse(text: str) -> RunLog:
     told = last(r"^ +\*\*\* (.+?) \*\*\* *$", text)
     return RunLog(
         "baron",
-        version=last(r"^ *BARON version (\d[\d.]*\d)", text),
         ended=None if told is None else "optimal" if told == "Normal completion" else "limit",
         bound=bound,
         objective=trace[-1].objective if found is None and trace else found,
@@ -39,4 +38,6 @@ def _parse(text: str) -> RunLog:
     )
 
 
-READER: Final = LogReader("BARON", re.compile(r"^ *BARON version \d", re.MULTILINE), _parse)
+READER: Final = LogReader(
+    "BARON", re.compile(r"^ *BARON version \d", re.MULTILINE), _parse, r"^ *BARON version (\d[\d.]*\d)"
+)

@@ -31,7 +31,6 @@ def _parse(text: str) -> RunLog:
     )
     return RunLog(
         "cplex",
-        version=last(r"Version identifier: +([\d.]+)", text),
         ended="optimal" if proven else "limit" if stopped else None,
         bound=bound,
         objective=number(last(r"^MIP - .*Objective = +(\S+)", text) or last(r"^MIP Solution: +(\S+)", text)),
@@ -76,4 +75,5 @@ READER: Final = LogReader(
         r"^(?:Version identifier: \d|Welcome to IBM.*CPLEX|--- GAMS/CPLEX|IBM ILOG CPLEX)", re.MULTILINE
     ),
     _parse,
+    r"(?:Version identifier:|Interactive Optimizer) +([\d.]+)",
 )

@@ -23,7 +23,6 @@ def _parse(text: str) -> RunLog:
     proven = re.search(r"^Optimal solution found", text, re.MULTILINE)
     return RunLog(
         "gurobi",
-        version=last(r"^Gurobi Optimizer version (\S+)", text),
         ended="optimal" if proven else "limit" if _STOPPED.search(text) else None,
         bound=bound,
         objective=number(last(_END.format(r"(\S+)", r"\S+"), text)),
@@ -36,4 +35,9 @@ def _parse(text: str) -> RunLog:
     )
 
 
-READER: Final = LogReader("Gurobi", re.compile(r"^Gurobi Optimizer version ", re.MULTILINE), _parse)
+READER: Final = LogReader(
+    "Gurobi",
+    re.compile(r"^Gurobi Optimizer version ", re.MULTILINE),
+    _parse,
+    r"^Gurobi Optimizer version (\S+)",
+)

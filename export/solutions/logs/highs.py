@@ -21,11 +21,10 @@ def _parse(text: str) -> RunLog:
     bound, status = number(last(r"^ +Dual bound +(\S+)$", text)), last(r"^ +Status +(\S.*)$", text)
     return RunLog(
         "highs",
-        version=last(r"^Running HiGHS (\S+)", text),
         ended=None if status is None else "optimal" if status == "Optimal" else "limit",
         bound=bound,
         objective=number(last(r"^ +Primal bound +(\S+)$", text)),
-        seconds=number(last(r"^ +Timing +(\S+)$", text)),
+        seconds=number(last(r"^ +Timing +(\S+)", text)),
         threads=whole(last(r"^ +Thread count (\d+) ", text)),
         columns=whole(last(_SIZE.format(r"\d+", r"(\d+)"), text)),
         rows=whole(last(_SIZE.format(r"(\d+)", r"\d+"), text)),
@@ -33,4 +32,6 @@ def _parse(text: str) -> RunLog:
     )
 
 
-READER: Final = LogReader("HiGHS", re.compile(r"^Running HiGHS ", re.MULTILINE), _parse)
+READER: Final = LogReader(
+    "HiGHS", re.compile(r"^Running HiGHS ", re.MULTILINE), _parse, r"^Running HiGHS (\S+)"
+)

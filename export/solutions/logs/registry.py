@@ -10,7 +10,7 @@ from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_LOG
 from ....models.storage import read_bytes
 from . import baron, cplex, gurobi, highs, scip, xpress
-from .run_log import LogReader, RunLog, Step, stamps, thinned
+from .run_log import LogReader, RunLog, Step, last, stamps, thinned
 
 LOG_READERS: Final[tuple[LogReader, ...]] = tuple(
     module.READER for module in (baron, highs, gurobi, scip, xpress, cplex)
@@ -41,7 +41,8 @@ def parse_log(data: bytes) -> RunLog:
                     f"this log of {reader.title} tells neither a bound nor an objective; give one of a run "
                     "that came to its search"
                 )
-            return replace(found, trace=_trace(found), stamps=stamps(text), text=text)
+            version = last(reader.version, text)
+            return replace(found, version=version, trace=_trace(found), stamps=stamps(text), text=text)
     known = ", ".join(sorted(reader.title for reader in LOG_READERS))
     raise SolutionError(f"this is no log of a known solver; give one of {known}, or the bound itself")
 

@@ -53,11 +53,16 @@ class RunLog:
 
 @dataclass(frozen=True)
 class LogReader:
-    """A reader of the logs of one solver. start: where a run begins in a log; parse: what a run says."""
+    """A reader of the logs of one solver.
+
+    start: where a run begins in a log; parse: what a run says; version: the pattern of the solver's version,
+    which may stand before the first run.
+    """
 
     title: str
     start: re.Pattern[str]
     parse: Callable[[str], RunLog]
+    version: str
 
 
 def last(pattern: str, text: str) -> str | None:

@@ -23,7 +23,6 @@ def _parse(text: str) -> RunLog:
     time = last(r"^ +Solution time / primaldual integral : +([\d.]+s)", text)
     return RunLog(
         "xpress",
-        version=last(r"Xpress v([\d.]+)", text),
         ended=None if not finished else "optimal" if complete and bound is not None else "limit",
         bound=bound,
         objective=number(last(r"^Final MIP objective +: (\S+)$", text)),
@@ -46,4 +45,6 @@ def _steps(text: str) -> Iterator[Step]:
             yield Step(float(row[1]), bound, number(line[_BEST].strip()))
 
 
-READER: Final = LogReader("Xpress", re.compile(r"^FICO Xpress .*v\d", re.MULTILINE), _parse)
+READER: Final = LogReader(
+    "Xpress", re.compile(r"^FICO Xpress .*v\d", re.MULTILINE), _parse, r"Xpress.* v([\d.]+)"
+)

@@ -254,7 +254,9 @@ def test_a_forged_run_is_found(built, lib, tmp_path):
         def change(folder):
             path = folder / "ledger.json"
             document = json.loads(path.read_text())
-            document["records"][0] |= given
+            (record,) = document["records"]
+            left = {key: value for key, value in (record | given).items() if key not in given or value}
+            document["records"] = [left]
             path.write_text(json.dumps(document))
 
         return lambda: forged(change)
@@ -263,6 +265,8 @@ def test_a_forged_run_is_found(built, lib, tmp_path):
         (folder / log).write_text((folder / log).read_text() + "\n")
 
     assert "tells another bound" in in_ledger(bound=0.1)()
+    assert "and names none" in in_ledger(evidence="log", log=None, log_sha256=None)()
+    assert "does not say whether" in in_ledger(evidence=None)()
     assert "another course of the run" in in_ledger(trace=[[0.0, 0.1, 0.2]])()
     assert f"says that {log} is of SCIP" in in_ledger(solver="SCIP")()
     assert "is another file than the one its ledger names" in forged(in_log)

@@ -70,6 +70,23 @@ def test_the_shell_of_cplex_tells_the_bound_with_its_digits():
     assert (found.ended, found.bound) == ("optimal", 0.045934185295)
 
 
+def test_other_versions_are_read_as_well():
+    """SCIP's shell says its version before a run; up to SCIP 6 its table had other columns; HiGHS 1.5."""
+    scip = (LOGS / "scip.log").read_text()
+    found = parse_log(("SCIP version 9.2.0 [precision: 8 byte]\n" + scip).encode())
+    assert (found.version, found.columns, found.trace) == ("9.2.0", 280, read_log(LOGS / "scip.log").trace)
+    head = scip[: scip.index(" time | node")]
+    old = head + (
+        " time | node  | left  |LP iter| mem |mdpt |frac |vars |cons |dualbound   | primalbound  |  gap\n"
+        "* 0.5s|     1 |     0 |   341 | 4M  |   0 |  19 | 280 | 413 | 1.250000e-01 | 2.500000e-01 | 100%\n"
+    )
+    assert parse_log(old.encode()).trace == (Step(0.5, 0.125, 0.25),)
+    highs = (
+        (LOGS / "highs.log").read_text().replace("Timing            6.06", "Timing            6.06 (total)")
+    )
+    assert parse_log(highs.encode()).seconds == 6.06
+
+
 def test_long_traces_keep_their_ends_and_drop_what_does_not_change():
     steps = [Step(float(at), at / 1000, 1.0) for at in range(1000)]
     found = thinned(steps, 0.999)
