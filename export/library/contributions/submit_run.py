@@ -227,7 +227,8 @@ def _is_of_size(said: RunLog, problem: Problem) -> bool:
 def _bound(told: Told, said: RunLog | None, best: float, entry: str) -> tuple[float | None, Evidence | None]:
     """The dual bound of a run, and what it rests on. Raises SolutionError for one that cannot be."""
     read = None if said is None else said.bound
-    bound, evidence = (told.bound, "word") if told.bound is not None else (read, "log")
+    bound = read if told.bound is None else told.bound
+    evidence: Evidence = "log" if told.bound is None else "word"
     if bound is None:
         return None, None
     if told.bound is not None and read is not None and abs(told.bound - read) <= slack(read):
@@ -239,7 +240,7 @@ def _bound(told: Told, said: RunLog | None, best: float, entry: str) -> tuple[fl
             f"the bound {bound!r} lies above {best!r}, the objective of a feasible point of {entry}; "
             "it is none, let the solver use tighter tolerances"
         )
-    return bound, evidence  # type: ignore[return-value]
+    return bound, evidence
 
 
 def _record(
