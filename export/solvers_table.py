@@ -155,7 +155,8 @@ class Solver:
     of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
     start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
     that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
-    problems for which others come first. patch: how it solves patches, where it does.
+    problems for which others come first. patch: how it solves patches, where it does. vendor: who makes it,
+    where others of its maker stand here too: what they find is one opinion.
     """
 
     name: str
@@ -169,6 +170,12 @@ class Solver:
     driver: str = ""
     not_for: tuple[str, ...] = ()
     patch: PatchUse | None = None
+    vendor: str = ""
+
+    @property
+    def maker(self) -> str:
+        """Who makes it."""
+        return self.vendor or self.title
 
     def refusal(self, held: Problem, *stages: Stage) -> Refusal | None:
         """Its first refusal of a problem, as a format holds it, at one of these stages (all by default)."""
@@ -208,7 +215,7 @@ SOLVERS: Final = {
                     "with its parameter optimalitytarget = 3",
                 ),
             },
-            start=StartFile("cplex", ".mst", "read MODEL.mps, then read START.mst"),
+            start=StartFile("cplex", ".mst", "read MODEL.mps, then read START.mst"), vendor="IBM",
         ),
         Solver(
             "xpress", "Xpress", ("mps", "lp"), "xpress",
@@ -250,7 +257,7 @@ SOLVERS: Final = {
                 "integers": Refusal("solve", "Ipopt drops integrality; relax it, or fix the jumps"),
                 "non-convexity": Refusal("local", "Ipopt finds local optima"),
             },
-            proves="local", driver="casadi",
+            proves="local", driver="casadi", vendor="COIN-OR",
         ),
         Solver(
             "bonmin", "Bonmin", ("nl", "gms"), "casadi",
@@ -259,7 +266,7 @@ SOLVERS: Final = {
                     "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
                 )
             },
-            proves="convex", driver="casadi", patch=PatchUse("miqp-exact", 4),
+            proves="convex", driver="casadi", patch=PatchUse("miqp-exact", 4), vendor="COIN-OR",
         ),
         Solver(
             "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",
@@ -268,8 +275,9 @@ SOLVERS: Final = {
                 "quadratic rows": Refusal("solve", "CPLEX takes quadratic rows only when they are convex"),
                 "non-convexity": Refusal("solve", "CPLEX takes convex problems up to quadratic"),
             },
+            vendor="IBM",
         ),
-        Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY),
+        Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY, vendor="COIN-OR"),
         Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY),
     )
 }  # fmt: skip

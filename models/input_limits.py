@@ -60,3 +60,7 @@ MAX_NUMBER: Final = 40
 # Solutions
 MAX_SOLUTION: Final = 1 << 31
 """Bytes of a solution file, packed and unpacked: a line for each of 40 million columns."""
+
+# Logs of solvers
+MAX_LOG: Final = 50_000_000
+"""Bytes of a log: a line a second for years."""

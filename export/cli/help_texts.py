@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from importlib import import_module
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from typer.core import TyperCommand
 
@@ -29,6 +29,11 @@ NAMES: Final = {
     ),
     "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
     "solvers": _of("..solvers_table", "DRIVEN"),
+    "all solvers": _of("..solvers_table", "SOLVERS"),
+    "logs": _of(
+        "..solutions.logs.registry", "LOG_READERS", lambda readers: sorted(each.title for each in readers)
+    ),
+    "run statuses": _of("..library.ledger.ledger", "RunStatus", get_args),
     "programs": _of("..solvers_table", "PROGRAMS"),
     "answers": _of(  # a description begins with the program
         "..solutions.readers.registry",

@@ -1,4 +1,4 @@
-"""The commands `library build`, `solve`, `verify`, `submit-point` and `site`."""
+"""The commands `library build`, `solve`, `verify`, `submit-point`, `submit-run` and `site`."""
 
 from __future__ import annotations
 
@@ -71,7 +71,9 @@ def solve_command(
     solver: Annotated[
         list[str] | None,
         typer.Option(
-            "--solver", metavar="NAME", help="{solvers}; all that take an entry by default, may be repeated."
+            "--solver",
+            metavar="NAME",
+            help="{all solvers}; those that are installed by default, may be repeated.",
         ),
     ] = None,
     time_limit: Seconds = 10.0,
@@ -82,6 +84,7 @@ def solve_command(
     by: Annotated[
         str | None, typer.Option("--by", metavar="TEXT", help="Who measures, as the ledger is to say.")
     ] = None,
+    machine: Annotated[str | None, typer.Option("--machine", metavar="TEXT", help="On what machine.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -90,7 +93,13 @@ def solve_command(
 
     with progress(quiet=quiet) as show:
         records = solve_library(
-            folder, solvers=solver, time_limit=time_limit, up_to=up_to, by=by, progress=show
+            folder,
+            solvers=solver,
+            time_limit=time_limit,
+            up_to=up_to,
+            by=by,
+            machine=machine,
+            progress=show,
         )
     if as_json:
         say_json(records)
@@ -158,6 +167,53 @@ def submit_command(
         happened = submit_point(
             file, folder, entry=entry, solver=solver, version=version, seconds=seconds, by=by, progress=show
         )
+    if not quiet:
+        say(str(happened))
+
+
+@command("submit-run")
+def submit_run_command(
+    folder: Annotated[Path, typer.Option("--library", metavar="DIR", help="The library.")],
+    *,
+    point: Annotated[
+        Path | None, typer.Option("--point", metavar="FILE", help="The solver's solution file.")
+    ] = None,
+    log: Annotated[Path | None, typer.Option("--log", metavar="FILE", help="The log of {logs}.")] = None,
+    entry: Annotated[
+        str | None,
+        typer.Option("--entry", metavar="NAME", help="The entry that it is of; by default as the files say."),
+    ] = None,
+    bound: Annotated[
+        float | None, typer.Option("--bound", help="The dual bound; by default as the log tells it.")
+    ] = None,
+    status: Annotated[
+        str | None, typer.Option("--status", help="What the run came to: {run statuses}.")
+    ] = None,
+    solver: Annotated[str | None, typer.Option("--solver", metavar="NAME", help="The solver.")] = None,
+    version: Annotated[str | None, typer.Option("--version", metavar="TEXT", help="Its version.")] = None,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="How long it took.")] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads it used.")] = None,
+    limit: Annotated[float | None, typer.Option("--limit", help="Seconds it was allowed.")] = None,
+    machine: Annotated[
+        str | None, typer.Option("--machine", metavar="TEXT", help="What it ran on: processor, memory.")
+    ] = None,
+    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Who submits the run.")] = None,
+    date: Annotated[
+        str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="The day of the run.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Check a run of a solver (bound, point or both) and keep it, with its log, when it is its solver's best.
+
+    Of --point, --log and --bound at least one is needed. A bound above a feasible point is refused. An
+    entry is solved by a certificate, or when three programs of different makers agree; until then a proof is
+    told as claimed.
+    """
+    from ..library.contributions.submit_run import Told, submit_run
+
+    told = Told(solver, version, status, bound, seconds, threads, limit, machine, by, date)  # type: ignore[arg-type]
+    with progress(quiet=quiet) as show:
+        happened = submit_run(folder, point=point, log=log, entry=entry, told=told, progress=show)
     if not quiet:
         say(str(happened))
 

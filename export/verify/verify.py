@@ -327,12 +327,12 @@ def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
 
 def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Check:
     """What a solver's answer is worth: its point checked, objective and energy computed again."""
-    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": _finite(answer.bound)}
+    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": finite(answer.bound)}
     if not len(answer.values):
         limit = answer.status == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
         return subject.check(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
-    point, wrong = _point(held, answer)
+    point, wrong = told_point(held, answer)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
     worst = held.violation(point)
@@ -366,11 +366,12 @@ def _energy_difference(
     return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
+    """A number, None for what stands for infinity."""
     return None if value is None or abs(value) >= 1e19 else float(value)
 
 
-def _point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
+def told_point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
     """The point by name, integers rounded, what is not told at zero; and what is wrong with it."""
     names = np.array([name.encode() for name in names_of(column_names(problem))])
     values, missing, _ = values_for(names, replace(answer, omits_zeros=False))

@@ -29,10 +29,11 @@ from ...writing.records import number
 from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, ranges, tangent_bound
 from ..ledger.certificates import METHOD
-from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
+from ..ledger.dual_bounds import contradicts, cut, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
 from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
+from ..ledger.standing import best_of_each, runs_of, standing
 from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
 from ..plan.recipe import EntryRecipe, digest
 from .instance_task import Files, Submitted
@@ -84,11 +85,12 @@ def make_entry(task: Entry) -> Files:
         problem = _formulated(instance, task.recipe.formulation, task.recipe.facet, known["baseline"].field.p)
         listed, refused = _models(problem, task.recipe, Path(made))
         best = best_point(problem, list(known.values()))
-        bounds = _bounds(task, best, instance)
-        status, gap = _status(best, bounds)
-        listed += _points(task, best, Path(made), proven=status == "optimal")
-        facts = {"bounds": bounds, "bound": _greatest(bounds), "status": status, "gap": gap}
-        document = _sidecar(task, best, listed, refused) | facts | _context(task, problem)
+        records = _records(task, best, instance)
+        bounds = _bounds(task, best, records)
+        facts = standing(best.objective, bounds, records, task.name)
+        listed += _points(task, best, Path(made), proven=facts["status"] == "optimal")
+        found = _gap(best, bounds, facts["status"]) | {"runs": runs_of(records, task.name, best.objective)}
+        document = _sidecar(task, best, listed, refused) | found | facts | _context(task, problem)
         files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
 
@@ -162,12 +164,10 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
     return {"name": path.name, "format": "sol", "dialect": dialect, **facts, "notes": notes}
 
 
-def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]:
+def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, Any]]:
     """The best dual bound of each solver with a record of this optimum, and what the point implies."""
-    chosen: dict[str, Record] = {}
-    for record in sorted(_records(task, best, instance), key=lambda each: _preference(each, task.name)):
-        chosen.setdefault(record.solver, record)
-    found = [_bound(record, task.name) for record in sorted(chosen.values(), key=lambda each: each.solver)]
+    having = [each for each in records if each.bound is not None]
+    found = [_bound(record, task.name) for record in best_of_each(having, task.name)]
     tangent = tangent_bound(best.problem, best.point)
     if tangent is not None:
         found.append(_computed("tangent at the point", tangent))
@@ -191,20 +191,11 @@ def _within(told: dict[str, Any], best: Best, entry: str) -> float:
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
-    """The records with a bound that are about this very problem, or about one with the same optimum."""
+    """The records that are about this very problem, or about one with the same optimum."""
     shas = {task.name: best.problem.sha256}
     for name, formulation in siblings(task.recipe, task.relatives).items():
         shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
-    return [
-        each
-        for each in task.records
-        if each.bound is not None and shas.get(each.entry) == each.problem_sha256
-    ]
-
-
-def _preference(record: Record, entry: str) -> tuple[Any, ...]:
-    """The greatest bound first; of equal ones that of the entry itself, then the quickest."""
-    return (-(record.bound or 0.0), record.entry != entry, record.seconds or 0.0, record.rank)
+    return [each for each in task.records if shas.get(each.entry) == each.problem_sha256]
 
 
 def _bound(record: Record, entry: str) -> dict[str, Any]:
@@ -219,17 +210,11 @@ def _computed(method: str, bound: float) -> dict[str, Any]:
     return found | {"seconds": None, "threads": None, "via": None}
 
 
-def _greatest(bounds: list[dict[str, Any]]) -> float | None:
-    return max((each["bound"] for each in bounds), default=None)
-
-
-def _status(best: Best, bounds: list[dict[str, Any]]) -> tuple[str, float | None]:
-    bound = _greatest(bounds)
-    if bound is None:
-        return "best known", None
-    return "optimal" if is_proven(best.objective, bound) else "best known", relative_gap(
-        best.objective, bound
-    )
+def _gap(best: Best, bounds: list[dict[str, Any]], status: str) -> dict[str, Any]:
+    """The dual bounds, the greatest, and how far it is below the best point."""
+    bound = max((each["bound"] for each in bounds), default=None)
+    gap = None if bound is None else relative_gap(best.objective, bound)
+    return {"bounds": bounds, "bound": bound, "status": status, "gap": gap}
 
 
 def _sidecar(

@@ -39,8 +39,13 @@ def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None
     written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
     for name, data in written.items():
         write_bytes(folder / name, data)
-    points = (record.point for record in read_ledger(folder).records if record.point is not None)
-    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *points]
+    beside = (
+        name
+        for record in read_ledger(folder).records
+        for name in (record.point, record.log)
+        if name is not None
+    )
+    present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *beside]
     _remove_stale(folder, set(present))
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
     write_bytes(folder / SUMS, sums.encode())

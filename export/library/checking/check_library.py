@@ -32,6 +32,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import plan
 from .check_entry import verify_entry
+from .check_run import run_findings
 from .finding import BUILD, Finding, close, of_error
 from .made_again import instance_findings
 
@@ -251,6 +252,9 @@ class _Verification:
                     ledger.field(record)
                 except CrossfieldError as error:
                     yield of_error(error, record.point)
+            if record.log is not None:
+                self.known.add(record.log)
+            yield from run_findings(ledger, record)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
         """Every instance and its fields are as its own document and the sidecars of its entries say."""

@@ -22,7 +22,7 @@ from ..ledger.certificates import METHOD
 from ..ledger.points import Provenance, ours
 from .finding import Finding, close
 
-_FROM_EACH_OTHER: Final = {"best", "bound", "status", "gap", "files"}
+_FROM_EACH_OTHER: Final = {"best", "bound", "gap", "files"}
 """Keys of a sidecar that are compared elsewhere: with points, with each other, file by file."""
 
 
@@ -31,8 +31,8 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
-    for key, value in made.items():
-        if key not in _FROM_EACH_OTHER and not same(sidecar[key], value):
+    for key in (*made, *sorted(sidecar.keys() - made.keys())):
+        if key not in _FROM_EACH_OTHER and not same(sidecar.get(key), made.get(key)):
             yield Finding(name, f"tells another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
         yield Finding(name, "tells other files, or other things of them, than are made of its problem")

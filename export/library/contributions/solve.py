@@ -1,36 +1,47 @@
-"""Runs of the local solvers on the entries of a library: bounds and times for its ledger, and better points.
+"""Runs of the installed solvers on the entries of a library: bounds and times for its ledger, better points.
 
-Each run starts from the best known point and uses one thread. What was measured is not measured again.
+Each run uses one thread; HiGHS, Ipopt and Bonmin start from the best known point, the others from nothing.
+What was measured is not measured again.
 """
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.errors import InputError, SolutionError, SolverError
+from ....models.errors import (
+    CrossfieldError,
+    InputError,
+    MissingSolverError,
+    SolutionError,
+    SolverError,
+    UnsupportedBySolverError,
+)
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.progress import Progress, silent
+from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
-from ...solvers_table import DRIVEN, PROGRAMS
+from ...solvers_table import DRIVEN, SOLVERS
 from ...solving.job import Limits
 from ...solving.local import refusal, solve
+from ...verify.solve_with import Programs, format_for
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
-from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
+from ..ledger.ledger import Ledger, Record, RunStatus, add_record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
+from .submit import check_texts, is_better
 
 GAP: Final = 1e-7
 """Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
-_BETTER: Final = 1e-9  # relative: a lower objective than this is no better point
 
 
 def solve_library(
@@ -40,24 +51,80 @@ def solve_library(
     time_limit: float = 10.0,
     up_to: str | None = None,
     by: str | None = None,
+    machine: str | None = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """The new records, now in the ledger of the library, which is brought up to date in the end.
 
-    solvers: names of solvers that are driven here, all by default, each on the entries that it takes.
-    time_limit: seconds of a run; up_to: last rung; by: who runs it. Raises InputError for an unknown name.
+    solvers: names of the table of solvers, those that are installed by default, each on the entries that it
+    takes. time_limit: seconds of a run; up_to: last rung; by: who runs it; machine: on what. An entry that is
+    too large for the free edition of a program is passed over. Raises InputError for an unknown name,
+    MissingSolverError for a solver that is asked for and not installed.
     """
-    chosen = _known(solvers or list(DRIVEN), DRIVEN, "solver")
+    chosen = _chosen(solvers)
     (last,) = _known([up_to or RUNGS[-1]], RUNGS, "rung")
+    check_texts({"by": by, "machine": machine})
     library, found = read_library(folder), []
-    runs = list(_runs(library, chosen, RUNGS[: RUNGS.index(last) + 1], time_limit))
-    for number, (document, solver) in enumerate(runs):
-        progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
-        record, field = _run(library, document, solver, time_limit, by)
-        with locked(library.folder, "a solve of the library", progress):
-            found.append(asdict(add_record(library.folder, record, field)))
+    with (
+        tempfile.TemporaryDirectory(prefix="crossfield-") as temporary,
+        Programs(Path(temporary)) as programs,
+    ):
+        work = _Solving(library, programs, Path(temporary), time_limit)
+        runs = list(work.runs(chosen, RUNGS[: RUNGS.index(last) + 1]))
+        for number, (document, solver) in enumerate(runs):
+            progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
+            try:
+                record, field = work.run(document, solver)
+            except UnsupportedBySolverError as error:
+                progress(f"{document['name']}: {error}")
+                continue
+            record = replace(record, by=by, machine=machine)
+            with locked(library.folder, "a solve of the library", progress):
+                found.append(asdict(add_record(library.folder, record, field)))
+    with locked(library.folder, "a solve of the library", progress):
+        drop_refuted(library)
     rebuild(library.folder, progress=progress)
     return found
+
+
+def drop_refuted(library: Library) -> None:
+    """Take the bounds out of measured records of the ledger that a feasible point lies below.
+
+    A run may have found a point since that shows how far a solver's tolerances went. Bounds that somebody
+    sent in stay: who keeps the library decides about them. The caller holds the lock.
+    """
+    ledger, dropped = read_ledger(library.folder), {}
+    for document in library.entries:
+        measured = [
+            each
+            for each in ledger.of(document["name"], document["problem_sha256"])
+            if each.bound is not None and each.evidence is None
+        ]
+        best = _best(library, document, ledger) if measured else 0.0
+        for each in measured:
+            if contradicts(each.bound or 0.0, best):
+                dropped[each] = replace(each, bound=None)
+    if dropped:
+        write_ledger(replace(ledger, records=tuple(dropped.get(each, each) for each in ledger.records)))
+
+
+def _best(library: Library, document: dict[str, Any], ledger: Ledger) -> float:
+    """The least objective of an entry at its best point and at the ledger's fields of its instance."""
+    problem, file = problem_of(library, document), document["instance"]["file"]
+    relatives = (each["name"] for each in library.entries if each["instance"]["file"] == file)
+    kept = [record for name in relatives if (record := ledger.with_point(name)) is not None]
+    fields = [field for field in map(ledger.field, kept) if field.instance.sha256 == problem.instance.sha256]
+    values = [problem.objective_value(complete_point(problem, field)) for field in fields]
+    return float(min([document["best"]["objective"], *values]))
+
+
+def _chosen(solvers: Sequence[str] | None) -> list[str]:
+    if solvers is None:
+        return [name for name, solver in SOLVERS.items() if not solver.missing]
+    for name in (chosen := _known(solvers, SOLVERS, "solver")):
+        if SOLVERS[name].missing:
+            raise MissingSolverError(f"{name} is not installed; {SOLVERS[name].missing}")
+    return chosen
 
 
 def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
@@ -67,69 +134,80 @@ def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _runs(
-    library: Library, solvers: list[str], rungs: Sequence[str], limit: float
-) -> Iterator[tuple[dict[str, Any], str]]:
-    """Sidecars and solvers of what is to be run: the solver takes it, and the ledger does not have it."""
-    ledger = read_ledger(library.folder)
-    for document in library.entries:
-        if document["rung"] not in rungs:
-            continue
-        problem = problem_of(library, document)
-        have = ledger.of(document["name"], problem.sha256)
-        for solver in solvers:
-            if not refusal(problem, DRIVEN[solver]) and not any(
-                _covers(each, solver, limit) for each in have
-            ):
-                yield document, solver
+class _Solving:
+    """Runs on a library, each for so long, with a folder for what they leave."""
+
+    def __init__(self, library: Library, programs: Programs, folder: Path, limit: float) -> None:
+        self.library, self.programs, self.folder, self.limit = library, programs, folder, limit
+
+    def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
+        """Sidecars and solvers of what is to be run: the solver takes it, and the ledger does not have it."""
+        ledger = read_ledger(self.library.folder)
+        for document in self.library.entries:
+            if document["rung"] not in rungs:
+                continue
+            problem = problem_of(self.library, document)
+            have = ledger.of(document["name"], problem.sha256)
+            for solver in solvers:
+                if _takes(problem, solver) and not any(self._covers(each, solver) for each in have):
+                    yield document, solver
+
+    def _covers(self, record: Record, solver: str) -> bool:
+        """Whether a record stands for a run of the solver for so long."""
+        if record.solver != SOLVERS[solver].title or record.version != self.programs.version(solver):
+            return False
+        return record.status == "optimal" or (record.time_limit or 0.0) >= self.limit
+
+    def run(self, document: dict[str, Any], solver: str) -> tuple[Record, CrossField | None]:
+        """The record of a run, and the field that it found when that is better than the best known point.
+
+        Raises UnsupportedBySolverError for a problem that is too large.
+        """
+        problem = problem_of(self.library, document)
+        record = Record(
+            document["name"],
+            problem.sha256,
+            SOLVERS[solver].title,
+            self.programs.version(solver),
+            "no point",
+            threads=1,
+            time_limit=self.limit,
+        )
+        try:
+            found, trace = self._solve(document, problem, solver)
+        except UnsupportedBySolverError:
+            raise
+        except (SolverError, SolutionError):
+            return record, None
+        if found.interrupted:
+            raise KeyboardInterrupt
+        seconds = None if found.seconds is None else round(found.seconds, 3)
+        best = document["best"]["objective"]
+        record = replace(record, bound=_bound(problem, solver, found, best), seconds=seconds, trace=trace)
+        if found.point is None:
+            return record, None
+        field = field_of(found.problem, found.point)
+        primal = problem.objective_value(complete_point(problem, field))
+        record = replace(record, status=_run_status(problem, solver, found), primal=primal)
+        return record, field if is_better(primal, best) else None
+
+    def _solve(
+        self, document: dict[str, Any], problem: Problem, solver: str
+    ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
+        """What a solver finds, and the course of its run where its log tells it."""
+        if solver not in DRIVEN:
+            return self.programs.solve(problem, solver, self.limit), ()
+        start = _start(self.library, document, problem)
+        with tempfile.TemporaryDirectory(dir=self.folder) as folder:
+            found = solve(problem, solver, folder, limits=Limits(self.limit, GAP, 1), start=start)
+            with suppress(CrossfieldError):
+                return found, read_log(next(Path(folder).glob("*.log"))).trace
+        return found, ()
 
 
-def _covers(record: Record, solver: str, limit: float) -> bool:
-    """Whether a record stands for a run of the solver for so long."""
-    same = record.solver == DRIVEN[solver].title and record.version == _version(solver)
-    return same and (record.status == "optimal" or (record.time_limit or 0.0) >= limit)
-
-
-def _version(solver: str) -> str:
-    """The version of its package, named where that is not the solver's own."""
-    program = PROGRAMS[DRIVEN[solver].program]
-    try:
-        installed = version(program.needs)
-    except PackageNotFoundError:
-        return "not installed"
-    return installed if program.name == solver else f"{program.needs} {installed}"
-
-
-def _run(
-    library: Library, document: dict[str, Any], solver: str, limit: float, by: str | None
-) -> tuple[Record, CrossField | None]:
-    """The record of a run, and the field that it found when that is better than the best known point."""
-    problem = problem_of(library, document)
-    record = Record(
-        document["name"],
-        problem.sha256,
-        DRIVEN[solver].title,
-        _version(solver),
-        "no point",
-        threads=1,
-        time_limit=limit,
-        by=by,
-    )
-    try:
-        found = solve(problem, solver, limits=Limits(limit, GAP, 1), start=_start(library, document, problem))
-    except (SolverError, SolutionError):
-        return record, None
-    if found.interrupted:
-        raise KeyboardInterrupt
-    seconds = None if found.seconds is None else round(found.seconds, 3)
-    best = document["best"]["objective"]
-    record = replace(record, bound=_bound(problem, solver, found, best), seconds=seconds)
-    if found.point is None:
-        return record, None
-    field = field_of(found.problem, found.point)
-    primal = problem.objective_value(complete_point(problem, field))
-    record = replace(record, status=_run_status(problem, solver, found), primal=primal)
-    return record, field if primal < best - _BETTER * max(abs(best), _BETTER) else None
+def _takes(problem: Problem, solver: str) -> bool:
+    """Whether a solver takes a problem: where it is driven here, a local answer is taken of a local one."""
+    return not refusal(problem, DRIVEN[solver]) if solver in DRIVEN else bool(format_for(problem, solver))
 
 
 def _start(library: Library, document: dict[str, Any], problem: Problem) -> CrossField | None:
@@ -146,8 +224,10 @@ def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
 
 def _proves(problem: Problem, solver: str, found: Solution) -> bool:
     """Whether the solver came to its end, and that is a proof of a global optimum."""
-    ended = found.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    return ended and problem.convex and DRIVEN[solver].proves != "local"
+    if found.problem.formulation.weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
+        return False
+    local = problem.convex and found.status == Status.OPTIMAL_LOCAL
+    return SOLVERS[solver].proves != "local" and (found.status == Status.OPTIMAL_GLOBAL or local)
 
 
 def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:

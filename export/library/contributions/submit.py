@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -76,14 +77,24 @@ def submit_point(
     """
     file = Path(file)
     texts = {"solver": solver or UNKNOWN, "version": version or UNKNOWN, "by": by or UNKNOWN}
-    for name, text in texts.items():
-        if not text.isprintable() or len(text) > _LONGEST:
-            raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
-    library = _library(folder)
+    check_texts(texts)
+    library = writable_library(folder)
     with locked(library.folder, f"a submission of {file.name}", progress):
-        library = _settled(library, progress)
+        library = settled(library, progress)
         progress("checking the point")
         return _submitted(file, library, entry=entry, texts=texts, seconds=seconds, by=by, progress=progress)
+
+
+def check_texts(texts: Mapping[str, str | None]) -> None:
+    """Nothing, when each text that is given fits a ledger. Raises InputError with its option's name."""
+    for name, text in texts.items():
+        if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
+            raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
+
+
+def is_better(objective: float, known: float) -> bool:
+    """Whether an objective is lower than the best known one by more than rounding."""
+    return known - objective > SAME * max(abs(known), SAME)
 
 
 def _submitted(
@@ -97,14 +108,14 @@ def _submitted(
     progress: Progress,
 ) -> Submission:
     """What happened to a point, by a caller who holds the lock of the library."""
-    sidecar, problem, solution = _found(file, library, entry)
-    _check_feasible(file, sidecar["name"], problem, solution)
+    sidecar, problem, solution = found_in(file, library, entry)
+    check_feasible(file, sidecar["name"], problem, solution)
     assert solution.point is not None
     field = field_of(solution.problem, solution.point)
     objective = problem.objective_value(complete_point(problem, field))
-    _check_bound(file, sidecar, objective)
+    check_bound(file, sidecar, objective)
     known = sidecar["best"]["objective"]
-    better = known - objective > SAME * max(abs(known), SAME)
+    better = is_better(objective, known)
     if better:
         record = Record(
             entry=sidecar["name"],
@@ -121,7 +132,7 @@ def _submitted(
     return Submission(sidecar["name"], known, objective, better)
 
 
-def _library(folder: str | Path) -> Library:
+def writable_library(folder: str | Path) -> Library:
     """The library in a folder. Raises InputError for an archive, and for a library of another version."""
     if Path(folder).is_file():
         raise InputError("is a file; unpack the archive and give its folder", file=folder)
@@ -132,19 +143,19 @@ def _library(folder: str | Path) -> Library:
     return library
 
 
-def _settled(library: Library, progress: Progress) -> Library:
+def settled(library: Library, progress: Progress) -> Library:
     """The library, after what an earlier submission that was stopped has left to do."""
     digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
     sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
-def _found(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:
+def found_in(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:
     """The sidecar and the problem of the entry that a file is of, and the solution that it holds."""
     raw = read_raw(file)
     if not raw.has_point:
         raise SolutionError(f"holds no point ({raw.status}); there is nothing to submit", file=file)
-    name = entry or _by_name(file, library) or _by_columns(file, raw, library)
+    name = entry or by_name(file, library) or _by_columns(file, raw, library)
     sidecar = library.entry(name)
     problem = problem_of(library, sidecar)
     solution = read_solution(file, problem)
@@ -157,7 +168,7 @@ def _found(file: Path, library: Library, entry: str | None) -> tuple[dict[str, A
     return sidecar, problem, solution
 
 
-def _by_name(file: Path, library: Library) -> str:
+def by_name(file: Path, library: Library) -> str:
     """The entry with whose name a file's name begins, the longest one; empty when there is none."""
     known = (name for name in library.document["entries"] if re.match(rf"{name}([._-]|$)", file.name))
     return max(known, key=len, default="")
@@ -192,7 +203,7 @@ def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Librar
     return found.unknown == 0 and (beyond or not found.problem.formulation.lifted)
 
 
-def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
+def check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
     """Nothing, when angles and jumps are feasible. Raises SolutionError with the worst violations.
 
     Every other column follows from them and is computed again, so that a solver's tolerance in those rows
@@ -218,7 +229,7 @@ def _violation(problem: Problem, solution: Solution) -> Violation:
     return replace(completed, integrality=solution.violation.integrality)
 
 
-def _check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
+def check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
     """Nothing, when no dual bound lies above the objective of a feasible point. Raises SolutionError."""
     bound = sidecar["bound"]
     if bound is not None and contradicts(bound, objective):

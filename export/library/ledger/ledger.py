@@ -6,6 +6,7 @@ record carries the SHA-256 of the problem it is about, and counts for that probl
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -24,6 +25,9 @@ VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
 """What a run came to; of a submitted point `feasible`."""
+Evidence = Literal["log", "word"]
+"""What a submitted bound rests on: the log beside the ledger, or the word of whoever sent it."""
+_LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,9 @@ class Record:
 
     problem_sha256: of the entry's problem; primal: objective of its point, recomputed; bound: its dual bound;
     seconds, threads and time_limit as measured; by: who ran it; point: the field's file beside the ledger,
-    with its SHA-256, or None.
+    with its SHA-256, or None. machine: what it ran on; date: as YYYY-MM-DD; evidence: None for a run that
+    `library solve` measured; log: the log's file beside the ledger, with its SHA-256; trace: seconds, dual
+    bound and best objective in the course of the run.
     """
 
     entry: str
@@ -48,6 +54,12 @@ class Record:
     by: str | None = None
     point: str | None = None
     point_sha256: str | None = None
+    machine: str | None = None
+    date: str | None = None
+    evidence: Evidence | None = None
+    log: str | None = None
+    log_sha256: str | None = None
+    trace: tuple[tuple[float | None, ...], ...] = ()
 
     @property
     def rank(self) -> tuple[Any, ...]:
@@ -88,14 +100,34 @@ class Ledger:
             )
         return read_field(path)
 
+    def log(self, record: Record) -> bytes:
+        """The log of a record. Raises InputError, InstanceError for a missing or another file."""
+        path = self.elsewhere.get(str(record.log), self.folder / str(record.log))
+        data = read_bytes(path)
+        if hashlib.sha256(data).hexdigest() != record.log_sha256:
+            raise InstanceError(
+                "is another file than the one its ledger names; restore it, or submit the run again",
+                file=path,
+            )
+        return data
+
     def document(self) -> dict[str, Any]:
         """The ledger as JSON."""
-        return {"format": FORMAT, "version": VERSION, "records": [asdict(record) for record in self.records]}
+        return {"format": FORMAT, "version": VERSION, "records": list(map(_document, self.records))}
+
+
+def _document(record: Record) -> dict[str, Any]:
+    return {key: value for key, value in asdict(record).items() if key not in _LATER or value}
 
 
 def field_file(entry: str) -> str:
     """Name of the file that holds the kept field of an entry."""
     return f"{entry}.field.json"
+
+
+def log_file(entry: str, solver: str, sha256: str) -> str:
+    """Name of the file that holds the log of a run of a solver, by its name in the table."""
+    return f"{entry}.{solver}.{sha256[:12]}.log"
 
 
 def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
@@ -105,7 +137,11 @@ def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
         return Ledger(Path(folder))
     schema, remedy = documents.__name__, "give the ledger.json of a library"
     given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)["records"]
-    return Ledger(Path(folder), tuple(Record(**each) for each in given))
+    return Ledger(Path(folder), tuple(map(_record, given)))
+
+
+def _record(given: dict[str, Any]) -> Record:
+    return Record(**given | {"trace": tuple(map(tuple, given.get("trace", ())))})
 
 
 def write_ledger(ledger: Ledger) -> Path:
@@ -114,15 +150,19 @@ def write_ledger(ledger: Ledger) -> Path:
     return write_bytes(ledger.folder / FILE, data.encode())
 
 
-def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
+def add_record(
+    folder: str | Path, record: Record, field: CrossField | None = None, log: bytes | None = None
+) -> Record:
     """The record, now in the ledger of a folder; a better field takes the place of the kept one.
 
-    The caller holds the lock of the library. The field's file is written first, so that the ledger never
-    names what is not there. Records of the same entry that named the file before lose their field, which is
-    not there any more. Raises OutputError.
+    log: the content of the file that the record names. The caller holds the lock of the library. Files are
+    written first, so that the ledger never names what is not there. Records of the same entry that named the
+    field's file before lose their field, which is not there any more. Raises OutputError.
     """
     ledger = read_ledger(folder)
     records = list(ledger.records)
+    if log is not None:
+        write_bytes(ledger.folder / str(record.log), log)
     if field is not None and _is_better(record, ledger.with_point(record.entry)):
         path = write_field(field, ledger.folder / field_file(record.entry))
         record = replace(record, point=path.name, point_sha256=sha256_of(path))
@@ -161,6 +201,9 @@ def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
             fresh.append(record)
         else:
             fresh.append(_without_point(record))
+        if record.log is not None:
+            other.log(record)
+            elsewhere[record.log] = other.elsewhere.get(record.log, other.folder / record.log)
     records = sorted({*ledger.records, *fresh}, key=lambda each: each.rank)
     return replace(ledger, records=tuple(records), elsewhere=elsewhere)
 

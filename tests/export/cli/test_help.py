@@ -24,7 +24,8 @@ NAMED = {
     "read": ["answers"],
     "draw": ["pictures"],
     "verify": ["programs"],
-    "library solve": ["solvers", "rungs"],
+    "library solve": ["all solvers", "rungs"],
+    "library submit-run": ["logs", "run statuses"],
     "library submit-point": ["answers"],
 }
 OTHERS = ("", "list", "samples", "library", "library build", "library verify", "library site")

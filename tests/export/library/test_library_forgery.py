@@ -174,7 +174,8 @@ def test_a_bound_above_the_point_is_cut_or_refused(above, error, built, tmp_path
     rebuild(lib)
     again = read_library(lib).entry(MILP)
     assert again["bound"] == best == max(each["bound"] for each in again["bounds"])
-    assert (again["status"], again["gap"]) == ("optimal", 0.0)
+    assert (again["status"], again["gap"]) == ("claimed", 0.0)
+    assert again["claimed"] == [{"solver": "S", "version": "1"}]
     assert verify_library(lib) == []
 
 

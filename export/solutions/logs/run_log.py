@@ -1,0 +1,142 @@
+"""What the log of a run says, and how its numbers are read."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from typing import Final, Literal, NamedTuple
+
+MOST_STEPS: Final = 40
+"""Steps of a trace that are kept: enough for a plot."""
+
+_HUGE: Final = 1e19  # what solvers write for infinity begins at 1e20
+_LONGEST: Final = 300  # characters of a line of a table
+_TIMES: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+_STAMP: Final = re.compile(r"sha256_[0-9a-f]{12}(?![0-9a-f])")
+
+
+class Step(NamedTuple):
+    """A moment of a run: seconds since its start, dual bound and best objective then, None without one."""
+
+    seconds: float
+    bound: float | None
+    objective: float | None
+
+
+@dataclass(frozen=True)
+class RunLog:
+    """What the log of one run says; None, or nothing, where it does not say it.
+
+    solver: its name in the table of solvers. ended: `optimal` where it says that the optimum is proven, else
+    `limit`. bound: the dual bound at the end; where the log rounds it, the least number that is shown so.
+    limit: seconds it was allowed. columns, rows: of the model that it read. trace: in the order of time.
+    stamps: of the problems that it names (`Problem.stamp`); text: the whole.
+    """
+
+    solver: str
+    version: str | None = None
+    ended: Literal["optimal", "limit"] | None = None
+    bound: float | None = None
+    objective: float | None = None
+    seconds: float | None = None
+    threads: int | None = None
+    limit: float | None = None
+    columns: int | None = None
+    rows: int | None = None
+    trace: tuple[Step, ...] = ()
+    stamps: frozenset[str] = frozenset()
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class LogReader:
+    """A reader of the logs of one solver.
+
+    start: where a run begins in a log; parse: what a run says; version: the pattern of the solver's version,
+    which may stand before the first run.
+    """
+
+    title: str
+    start: re.Pattern[str]
+    parse: Callable[[str], RunLog]
+    version: str
+
+
+def last(pattern: str, text: str) -> str | None:
+    """The first group of the last place where a pattern matches lines of a text."""
+    found = re.findall(pattern, text, re.MULTILINE)
+    return str(found[-1]) if found else None
+
+
+def number(word: str | None) -> float | None:
+    """The number that a word is, None for anything else and for what stands for infinity."""
+    try:
+        value = float(word or "nan")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and abs(value) < _HUGE else None
+
+
+def whole(word: str | None) -> int | None:
+    """The whole number that a word is."""
+    return int(word) if word is not None and re.fullmatch(r"\d{1,9}", word) else None
+
+
+def seconds(word: str) -> float | None:
+    """A time as `6.4s`, `12m`, `3h`, or a plain number of seconds."""
+    unit = _TIMES.get(word[-1:])
+    value = number(word if unit is None else word[:-1])
+    return None if value is None or value < 0 else value * (unit or 1.0)
+
+
+def at_least(word: str | None) -> float | None:
+    """The least number that is shown so when digits are cut off by rounding: half a unit less."""
+    if number(word) is None:
+        return None
+    try:
+        shown = Decimal(str(word))
+    except InvalidOperation:
+        return None
+    exponent = int(shown.as_tuple().exponent)
+    return float(shown - Decimal(5).scaleb(exponent - 1))
+
+
+def stamps(text: str) -> frozenset[str]:
+    """The stamps of the problems that a text names."""
+    return frozenset(_STAMP.findall(text))
+
+
+def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:
+    """A trace without steps at which nothing changes, at most MOST_STEPS of them, the first and last kept.
+
+    Of steps at one time, which logs round, the last one counts. A bound only grows: one that is above the
+    bound at the end, by the rounding of the log, is cut to it.
+    """
+    kept: list[Step] = []
+    for each in steps:
+        cut = each.bound if each.bound is None or bound is None else min(each.bound, bound)
+        if kept and kept[-1].seconds >= each.seconds:
+            kept.pop()
+        if not kept or kept[-1][1:] != (cut, each.objective):
+            kept.append(Step(each.seconds, cut, each.objective))
+    if len(kept) <= MOST_STEPS:
+        return tuple(kept)
+    apart = (len(kept) - 1) / (MOST_STEPS - 1)
+    return tuple(kept[round(place * apart)] for place in range(MOST_STEPS))
+
+
+def step(time: str, bound: str, best: str) -> Step | None:
+    """A row of a table of progress; None where that is no time."""
+    spent = seconds(time)
+    return None if spent is None else Step(spent, number(bound), number(best))
+
+
+def table_steps(
+    text: str, row: Callable[[list[str]], Step | None], mark: str | None = None
+) -> tuple[Step, ...]:
+    """What a reader of rows makes of the words of each line, or of the cells between marks."""
+    found = (row(line.split(mark)) for line in text.splitlines() if len(line) < _LONGEST)
+    return tuple(each for each in found if each is not None)
