@@ -72,7 +72,7 @@ def _points(pairs: Iterable[tuple[float | None, float | None]]) -> tuple[Point, 
 def trace_picture(curves: list[Curve]) -> bytes:
     """The plot of curves with a point at least: bounds as lines, objectives dashed, a hue for each solver."""
     points = [point for each in curves for point in (*each.bounds, *each.objectives)]
-    seconds, values = _axis([0.0, *(x for x, _ in points)]), _axis([y for _, y in points])
+    seconds, values = _axis([0.0, *(x for x, _ in points)]), _axis(_worth(curves))
     down = _HEIGHT + _ABOVE + _BELOW
 
     def line(points: tuple[Point, ...], end: float) -> str:
@@ -97,6 +97,15 @@ def trace_picture(curves: list[Curve]) -> bytes:
     return "\n".join([*parts, "</svg>", ""]).encode()
 
 
+def _worth(curves: list[Curve]) -> list[float]:
+    """The values, cut to what lies round those at the ends: first ones may be larger by powers of ten."""
+    values = [y for each in curves for _, y in (*each.bounds, *each.objectives)]
+    last = [points[-1][1] for each in curves for points in (each.bounds, each.objectives) if points]
+    low, high = min(last), max(last)
+    room = 2 * max(high - low, 0.5 * max(abs(low), abs(high)))
+    return [min(max(value, low - room), high + room) for value in values]
+
+
 @dataclass(frozen=True)
 class _Axis:
     """A scale from the first tick to the last."""
@@ -117,8 +126,8 @@ def _axis(values: list[float]) -> _Axis:
 
 
 def _at(value: float, axis: _Axis) -> float:
-    """Where a value lies on a scale, from 0 to 1."""
-    return (value - axis.ticks[0]) / (axis.ticks[-1] - axis.ticks[0])
+    """Where a value lies on a scale, from 0 to 1; one beyond it lies at its end."""
+    return min(max((value - axis.ticks[0]) / (axis.ticks[-1] - axis.ticks[0]), 0.0), 1.0)
 
 
 def _scales(seconds: _Axis, values: _Axis) -> list[str]:

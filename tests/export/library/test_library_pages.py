@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from html import unescape
+from html import escape, unescape
 from pathlib import Path
 
 import pytest
@@ -55,13 +55,21 @@ RUNS = [
         "seconds": 0.7,
         "threads": 4,
         "limit": 60,
+        "evidence": "log",
         "machine": "8 cores",
         "by": "A. Tester",
         "date": "2026-11-22",
         "trace": [[0.0, None, 9.0], [0.4, 1.5, 3.0], [0.7, 2.5, 2.5]],
     },
-    {"solver": "SCIP", "version": "10.0", "bound": 1.25, "trace": [[1.0, 0.5, None], [9.0, 1.25, None]]},
-    {"solver": "HiGHS"},
+    {
+        "solver": "SCIP",
+        "version": "10.0",
+        "status": "limit",
+        "evidence": "word",
+        "bound": 1.25,
+        "trace": [[1.0, 0.5, None], [9.0, 1.25, None]],
+    },
+    {"solver": "HiGHS", "version": "1.15.1", "status": "no point"},
 ]
 BIBTEX = "@misc{crossfield-library,\n  title = {A library to cite},\n  year = {2026}\n}"
 TOLD = {
@@ -99,7 +107,9 @@ def told(library, tmp_path_factory):
     about = folder / f"{INSTANCE}.about.json"
     about.write_text(json.dumps(json.loads(about.read_text()) | {"origin": TOLD["origin"]}))
     solved = folder / f"{INSTANCE}_exact.json"
-    by = {"status": "optimal", "solved": {"by": "agreement", "programs": ["Gurobi", "SCIP", "HiGHS"]}}
+    programs = [{"solver": name, "version": "1"} for name in ("Gurobi", "SCIP")]
+    programs += [{"solver": "Bonmin", "version": "2", "via": f"{INSTANCE}_cubic"}]
+    by = {"status": "optimal", "solved": {"by": "agreement", "programs": programs}}
     solved.write_text(json.dumps(json.loads(solved.read_text()) | by))
     index = json.loads((folder / "library.json").read_text())
     release = {
@@ -239,13 +249,22 @@ def test_an_entry_tells_its_runs_origin_and_citation_where_it_has_them(site, tol
         "CC0-1.0",
         "8 cores",
     ]
-    wanted += ["2026-11-22", "18.8", "hard", "Gurobi 13.0.3", "SCIP 10.0", f"{ENTRY}.runs.svg"]
+    wanted += [
+        "the sender&#39;s word",
+        "2026-11-22",
+        "18.8",
+        "hard",
+        "Gurobi 13.0.3",
+        "SCIP 10.0",
+        f"{ENTRY}.runs.svg",
+    ]
     assert [each for each in wanted if each not in text] == []
     assert re.search(r"Optimality is\s+claimed by Gurobi 13\.0\.3", text)
     assert 'class="status claimed">claimed' in text
     assert "@misc{crossfield-library," in text
     assert "@misc{" not in text_of(site, ENTRY)
-    assert re.search(r"Solved\s+by agreement of Gurobi, SCIP, HiGHS", text_of(told, f"{INSTANCE}_exact"))
+    agreed = r"Solved\s+by agreement of Gurobi 1, SCIP 1, Bonmin 2 on cf_mouse_n004_cubic\."
+    assert re.search(agreed, text_of(told, f"{INSTANCE}_exact"))
     plot = ET.parse(told / "pictures" / f"{ENTRY}.runs.svg").getroot()
     assert len(plot.findall(".//*[@class='c0']")) == len(plot.findall(".//*[@class='c1']")) == 2
     for other in (text_of(site, ENTRY), text_of(told, f"{INSTANCE}_qp")):
@@ -256,14 +275,12 @@ def test_an_entry_tells_its_runs_origin_and_citation_where_it_has_them(site, tol
     assert "1.2" in about
 
 
-def test_only_a_library_whose_entries_all_are_says_that_it_is_under_one_licence(site, told):
-    claim = "share and adapt them for any"
-    assert claim in (site / "about.html").read_text()
-    about = (told / "about.html").read_text()
-    assert claim not in about
-    assert "A. Drawer" in about
-    footer = re.search(r"<footer.*?</footer>", about, re.DOTALL)[0]
-    assert "CC BY" not in footer
+def test_every_page_says_one_licence_only_where_all_entries_have_it(site, told):
+    for folder, claimed in ((site, True), (told, False)):
+        about = (folder / "about.html").read_text()
+        assert ("CC BY 4.0" in re.search(r"<footer.*?</footer>", about, re.DOTALL)[0]) == claimed
+        assert ("A. Drawer" in about) != claimed
+        assert escape((folder / "files" / "LICENSE").read_text(), quote=False) in about.replace("&#39;", "'")
 
 
 def test_the_table_of_entries_is_filtered_by_difficulty_where_it_is_known(site, told):

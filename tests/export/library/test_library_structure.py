@@ -123,3 +123,11 @@ def test_a_plot_draws_what_logs_tell_and_leaves_out_what_they_do_not():
 def test_a_plot_of_one_value_has_a_scale(value):
     root = ET.fromstring(trace_picture([curve("A", [[0, value, None]])]))
     assert len(list(root.iter(f"{SVG}text"))) >= 5
+
+
+def test_first_values_that_are_larger_by_powers_of_ten_do_not_flatten_a_plot():
+    trace = [[0, -1e6, 1e9], [1, 3.0, 6.0], [2, 4.0, 5.0]]
+    root = ET.fromstring(trace_picture([curve("A", trace)]))
+    ticks = [each.text for each in root.iter(f"{SVG}text") if each.get("text-anchor") == "end"]
+    assert {"0", "5", "10"} <= set(ticks)
+    assert len(ticks) < 8
