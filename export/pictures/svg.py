@@ -20,6 +20,7 @@ from ...models.instance.grid import Floats, Ints
 from ...models.instance.instance import Instance
 from .combing import combed
 from .panels import FAMILIES, NEGATIVE, POSITIVE, STROKE, runs, sides
+from .scheme import style
 from .streamlines import streamlines
 
 SIDE: Final = 320.0
@@ -228,19 +229,9 @@ def _text(value: float) -> str:
     return f"{value:.4g}" if value else "0"
 
 
-def _style() -> str:
-    def rules(mode: int) -> str:
-        filled = ("paper", "shade", "positive", "negative")
-        return "".join(
-            f".{name}{{{'fill' if name in filled else 'stroke'}:{both[mode]}}}"
-            for name, both in _COLOURS.items()
-        )
-
-    shared = "path{fill:none;stroke-linecap:round;stroke-linejoin:round}circle{stroke:#fff;stroke-width:1.2}"
-    return (
-        f"<style>{shared}{rules(0)}@media "
-        f"(prefers-color-scheme:dark){{{rules(1)}circle{{stroke:#1d2126}}}}</style>"
-    )
-
-
-_STYLE: Final = _style()
+_STYLE: Final = style(
+    _COLOURS,
+    ("paper", "shade", "positive", "negative"),
+    "path{fill:none;stroke-linecap:round;stroke-linejoin:round}circle{stroke:#fff;stroke-width:1.2}",
+    "circle{stroke:#1d2126}",
+)

@@ -35,6 +35,7 @@ from ..building.instance_task import about_file
 from ..documents.documents import Library, read_about, read_library
 from ..documents.mathematics import model
 from ..plan.spec import RUNGS
+from .study import study
 
 ASSETS: Final = ("site.css", "site.js", "icon.svg")
 """Files of the templates that go into a site as they are."""
@@ -207,8 +208,10 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         "model": model,
         "sizes": {name: (library.folder / name).stat().st_size for name in (*sums, SUMS)},
         "sums": sums,
+        "licences": _licences(library.entries),
     }
     written = []
+    pictures = stage / "pictures"
 
     def write(path: str, template: str, **context: Any) -> None:
         root = "../" * path.count("/")
@@ -222,12 +225,14 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         "about",
         formats=_formats(library.entries),
         citation=(read_bytes(library.folder / "CITATION.cff").decode()),
+        licence=(read_bytes(library.folder / "LICENSE").decode()),
         solu=SOLU,
     )
     for each in shown:
         write(f"instance/{each.name}.html", "instance", shown=each)
         for entry in each.entries:
-            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry)
+            worked_out = study(library, entry, pictures)
+            write(f"entry/{entry['name']}.html", "entry", shown=each, entry=entry, study=worked_out)
     return written
 
 
@@ -248,12 +253,17 @@ def _standing(shown: Shown) -> tuple[int, bool]:
 def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
     """What the filters of the table offer."""
     present = {
-        key: dict.fromkeys(entry[key] for entry in entries)
-        for key in ("family", "rung", "formulation", "class", "status")
+        key: dict.fromkeys(entry[key] for entry in entries if key in entry)
+        for key in ("family", "rung", "formulation", "class", "difficulty", "status")
     }
     return {key: list(values) for key, values in present.items()} | {
         "rung": [name for name in RUNGS if name in present["rung"]]
     }
+
+
+def _licences(entries: tuple[dict[str, Any], ...]) -> list[str]:
+    """The licences that the entries state, each once, an empty one where none is stated."""
+    return sorted({entry.get("origin", {}).get("license") or entry.get("licence") or "" for entry in entries})
 
 
 def _formats(entries: tuple[dict[str, Any], ...]) -> list[Any]:

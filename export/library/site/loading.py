@@ -1,0 +1,105 @@
+"""How an entry is loaded in programs that people work with: a few lines each, with the entry's own files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ....models.formulations.catalogue import FORMULATIONS
+from ....models.formulations.problem import Problem
+from ...solvers_table import takes
+
+
+@dataclass(frozen=True)
+class Way:
+    """A program, the lines that load an entry there, and what is to be known of it; no lines: it cannot."""
+
+    title: str
+    text: str
+    note: str = ""
+
+
+def ways(entry: dict[str, Any], problem: Problem) -> list[Way]:
+    """How HiGHS, Gurobi, Pyomo, JuMP, GAMS and AMPL load an entry, from the files that it has."""
+    made = [_highs(entry, problem), _gurobi(entry), _pyomo(entry), _jump(entry), _gams(entry), _ampl(entry)]
+    return [way for way in made if way is not None]
+
+
+def _first(entry: dict[str, Any], *formats: str) -> str:
+    """The name of its first model file in one of these formats; empty where it has none."""
+    found = (each["name"] for form in formats for each in entry["files"] if each["format"] == form)
+    return next((name for name in found if ".row" not in name and ".col" not in name), "")
+
+
+def _unpacked(*names: str) -> tuple[str, tuple[str, ...]]:
+    """The command that unpacks what is packed, with its line's end, and the names afterwards."""
+    packed = [name for name in names if name.endswith(".gz")]
+    command = f"gunzip -k {' '.join(packed)}\n" if packed else ""
+    return command, tuple(name.removesuffix(".gz") for name in names)
+
+
+def _highs(entry: dict[str, Any], problem: Problem) -> Way | None:
+    name = _first(entry, "mps", "lp")
+    said = takes(problem, "highs")
+    if said.answer == "no" or not name:
+        return Way("HiGHS", "", said.reason) if said.reason else None
+    text = f'import highspy\nhighs = highspy.Highs()\nhighs.readModel("{name}"); highs.run()'
+    return Way("HiGHS, in Python", text, "pip install highspy brings no highs command.")
+
+
+def _gurobi(entry: dict[str, Any]) -> Way | None:
+    name = _first(entry, "mps", "lp")
+    if not name:
+        return None
+    return Way("Gurobi, in Python", f'import gurobipy\nmodel = gurobipy.read("{name}")\nmodel.optimize()')
+
+
+def _pyomo(entry: dict[str, Any]) -> Way:
+    """Pyomo reads no model files: the model is made from the instance."""
+    settings = [repr(entry["formulation"]), *_settings(entry)]
+    lines = [
+        "import crossfield as cf",
+        f"instance = cf.read_instance({entry['instance']['file']!r})",
+        f"model = cf.to_pyomo(cf.formulate(instance, {', '.join(settings)}))",
+    ]
+    if entry["jumps"] is not None:
+        lines[:1] = ["import json", "import crossfield as cf", "import numpy as np"]
+        lines[-1:] = [
+            "p = np.zeros(len(instance.grid.first), dtype=int)",
+            f"for pair, jump in json.load(open('{entry['name']}.json'))['jumps']: p[pair] = jump",
+            lines[-1].replace("))", ", p=p))"),
+        ]
+    return Way("Pyomo", "\n".join(lines), "Pyomo reads no model files: crossfield makes the model.")
+
+
+def _settings(entry: dict[str, Any]) -> list[str]:
+    """The options of an entry that are not the defaults of its formulation, as arguments."""
+    declared = FORMULATIONS[entry["formulation"]]
+    return [
+        f"{key}={value!r}"
+        for key, value in entry["options"].items()
+        if key in declared.settable and value != getattr(declared.defaults, key)
+    ]
+
+
+def _jump(entry: dict[str, Any]) -> Way | None:
+    linear = entry["class"] in ("LP", "MILP")
+    name = _first(entry, *(("mps", "lp", "nl") if linear else ("nl",)))
+    return Way("JuMP, in Julia", f'using JuMP\nmodel = read_from_file("{name}")') if name else None
+
+
+def _gams(entry: dict[str, Any]) -> Way | None:
+    name = _first(entry, "gms")
+    if not name:
+        return None
+    command, (name,) = _unpacked(name)
+    return Way("GAMS", f"{command}gams {name}")
+
+
+def _ampl(entry: dict[str, Any]) -> Way | None:
+    files = [each["name"] for each in entry["files"] if each["format"] == "mod"]
+    if not files:
+        return None
+    command, names = _unpacked(*sorted(files, key=lambda name: ".dat" in name))
+    lines = " ".join(f"{'data' if '.dat' in name else 'model'} {name};" for name in names)
+    return Way("AMPL", f"{lines} solve;", f"In a shell before: {command.strip()}" if command else "")

@@ -1,0 +1,110 @@
+"""The structure of a problem: where its matrix and the Hessian of its Lagrangian have entries.
+
+MINLPLib shows the same of its instances. Everything comes from the declaration; nothing is read from files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, combinations_with_replacement
+from typing import Final
+
+import numpy as np
+import sympy as sp
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ....models.formulations.problem import PlacedFamily, Problem
+from ...pictures.sparsity import Parts, Pattern, Places
+
+_HIGHEST: Final = 4
+"""The greatest degree of a polynomial in any formulation."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The blocks of a Hessian, that is sets of columns that no entry joins: their number and their sizes."""
+
+    count: int
+    least: int
+    greatest: int
+    average: float
+
+
+def matrix(problem: Problem) -> Pattern:
+    """Where the Jacobian of the rows has entries; those of nonlinear terms are marked. Rows by family."""
+    rows, columns, curved, offset = [], [], [], 0
+    for family in problem.rows:
+        nonlinear = _nonlinear(family)
+        for symbol in family.variables:
+            rows.append(np.arange(family.count, dtype=np.int64) + offset)
+            columns.append(family.columns(symbol))
+            curved.append(np.full(family.count, symbol in nonlinear))
+        offset += family.count
+    down = Parts(
+        tuple(family.family.tag for family in problem.rows), tuple(family.count for family in problem.rows)
+    )
+    return Pattern(
+        down,
+        _columns(problem),
+        np.concatenate([np.zeros(0, np.int64), *rows]),
+        np.concatenate([np.zeros(0, np.int64), *columns]),
+        np.concatenate([np.zeros(0, bool), *curved]),
+    )
+
+
+def hessian(problem: Problem) -> Pattern:
+    """Where the Hessian of the Lagrangian has entries, both triangles."""
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    keys = np.unique(both[:, 0] * problem.columns + both[:, 1])
+    parts = _columns(problem)
+    return Pattern(parts, parts, keys // problem.columns, keys % problem.columns, np.ones(len(keys), bool))
+
+
+def blocks(pattern: Pattern) -> Blocks:
+    """The blocks of a Hessian among the columns that stand in nonlinear terms."""
+    used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
+    ends = place[: pattern.entries], place[pattern.entries :]
+    graph = coo_array((np.ones(pattern.entries, bool), ends), shape=(len(used), len(used)))
+    count, labels = connected_components(graph, directed=False)
+    sizes = np.bincount(labels)
+    return Blocks(int(count), int(sizes.min()), int(sizes.max()), len(used) / int(count))
+
+
+def _columns(problem: Problem) -> Parts:
+    shown = [block for block in problem.blocks.values() if block.count]
+    return Parts(tuple(block.name for block in shown), tuple(block.count for block in shown))
+
+
+def _nonlinear(family: PlacedFamily) -> set[sp.Symbol]:
+    """The symbols that stand in nonlinear terms of a family."""
+    if family.terms is None:
+        return set(family.variables)
+    return {symbol for term in family.terms if term.degree > 1 for symbol in term.symbols}
+
+
+def _pairs(problem: Problem) -> Iterator[Places]:
+    """Columns whose mixed second derivative is not zero everywhere, arrays (k, 2).
+
+    Terms of the objective that cancel are left out.
+    """
+    for degree in range(2, _HIGHEST + 1):
+        index, _ = problem.merged_objective(degree)
+        yield from (index[:, ends].astype(np.int64) for ends in map(list, combinations(range(degree), 2)))
+    for family in problem.objective:
+        if family.terms is None:
+            yield from _general(family)
+    for family in problem.rows:
+        if family.terms is None:
+            yield from _general(family)
+        for term in family.terms or ():
+            yield from (np.stack(both, axis=1).astype(np.int64) for both in combinations(term.factors, 2))
+
+
+def _general(family: PlacedFamily) -> Iterator[Places]:
+    """The same of what is no polynomial: what the second derivative of the expression says."""
+    for one, other in combinations_with_replacement(family.variables, 2):
+        if sp.diff(family.family.body, one, other) != 0:
+            yield np.stack([family.columns(one), family.columns(other)], axis=1).astype(np.int64)

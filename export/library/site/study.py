@@ -1,0 +1,69 @@
+"""What the page of an entry shows beside its sidecar: structure, presolve, a plot of runs, how to load it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ....models.storage import write_bytes
+from ...pictures.sparsity import Pattern, sparsity_picture
+from ...pictures.traces import curve, trace_picture
+from ..documents.documents import Library, problem_of
+from .loading import Way, ways
+from .presolve import Presolved, presolved
+from .structure import Blocks, blocks, hessian, matrix
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is worked out of an entry. matrix, hessian: None without any entry; blocks: of the Hessian.
+
+    plot: the picture of runs over time, empty where no run tells of them.
+    """
+
+    matrix: Pattern | None
+    hessian: Pattern | None
+    blocks: Blocks | None
+    presolved: Presolved | None
+    ways: list[Way]
+    plot: str
+
+
+def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
+    """What is worked out of an entry; its pictures, NAME.matrix.svg and so on, are written.
+
+    Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
+    names, and OutputError when a picture cannot be written.
+    """
+    problem = problem_of(library, entry)
+    patterns = {
+        kind: pattern
+        for kind, pattern in (("matrix", matrix(problem)), ("hessian", hessian(problem)))
+        if pattern.entries
+    }
+    for kind, pattern in patterns.items():
+        write_bytes(pictures / f"{entry['name']}.{kind}.svg", sparsity_picture(pattern))
+    return Study(
+        patterns.get("matrix"),
+        patterns.get("hessian"),
+        blocks(patterns["hessian"]) if "hessian" in patterns else None,
+        presolved(library.folder, entry),
+        ways(entry, problem),
+        _plot(entry, pictures),
+    )
+
+
+def _plot(entry: dict[str, Any], pictures: Path) -> str:
+    """The name of the plot of an entry's runs, which is written; empty where none has a trace."""
+    curves = [
+        curve(f"{run['solver']} {run.get('version', '')}".strip(), run["trace"])
+        for run in entry.get("runs", ())
+        if run.get("trace")
+    ]
+    shown = [each for each in curves if each.bounds or each.objectives]
+    if not shown:
+        return ""
+    name = f"{entry['name']}.runs.svg"
+    write_bytes(pictures / name, trace_picture(shown))
+    return name

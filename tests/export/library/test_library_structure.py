@@ -1,0 +1,133 @@
+"""Where matrices and Hessians have entries, beside CasADi, which differentiates the written file."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import casadi as ca
+import crossfield as cf
+import numpy as np
+import pytest
+from cases import CASES, make_instance, make_problem, problem_of
+from crossfield.export.library.documents.statistics import counts
+from crossfield.export.library.site.structure import blocks, hessian, matrix
+from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
+from crossfield.export.pictures.traces import curve, trace_picture
+from crossfield.export.writing.canonical import Canonical
+from loops import for_each
+from oracles import by_casadi
+
+PLAIN = [label for label in CASES if not {"pinned", "relax", "shape"} & set(label.replace("=", " ").split())]
+"""Every formulation in both gauges, both facets and both norms."""
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def differentiated(problem, path):
+    """Jacobian and Hessian of the Lagrangian at a random place, as CasADi finds them, in our order."""
+    cf.write(problem, path)
+    model = by_casadi(path)
+    x, f, g = (model.problem[key] for key in "xfg")
+    weights = type(x).sym("weights", g.shape[0])
+    second, _ = ca.hessian(f + ca.dot(weights, g), x)
+    both = ca.Function("both", [x, weights], [ca.jacobian(g, x), second])
+    rng = np.random.default_rng(4)
+    found = both(rng.normal(size=x.shape[0]), rng.normal(size=g.shape[0]))
+    jacobian, second = (np.array(ca.DM(part)) for part in found)
+    layout = Canonical(problem).layout
+    starts = dict(zip(layout.rows, np.cumsum([0, *(each.count for each in layout.rows)]), strict=False))
+    rows = [starts[each] + at for each in problem.rows for at in range(each.count)]
+    return jacobian[rows][:, layout.place], second[layout.place][:, layout.place]
+
+
+def dense(pattern):
+    found = np.zeros((pattern.down.total, pattern.across.total), bool)
+    found[pattern.rows, pattern.columns] = True
+    return found
+
+
+@for_each("label", PLAIN)
+def test_the_patterns_are_where_derivatives_are(label, tmp_path):
+    problem = problem_of(label)
+    jacobian, second = differentiated(problem, tmp_path / "tiny.nl")
+    assert (dense(matrix(problem)) == (np.abs(jacobian) > 1e-12)).all()
+    assert (dense(hessian(problem)) == (np.abs(second) > 1e-9)).all()
+
+
+def test_blocks_are_the_columns_that_no_entry_joins():
+    problem = make_problem("miqcp-bilinear", make_instance("parts"))
+    held = dense(hessian(problem))
+    joined = np.linalg.matrix_power(np.eye(len(held)) + held, len(held)) > 0
+    sizes = sorted(
+        len(set(rows)) for rows in {tuple(np.flatnonzero(row)) for row in joined[held.any(axis=1)]}
+    )
+    found = blocks(hessian(problem))
+    assert (found.count, found.least, found.greatest) == (len(sizes), sizes[0], sizes[-1])
+    assert found.average == sum(sizes) / len(sizes)
+    assert counts(problem)["nonlinear_variables"] == sum(sizes)
+
+
+def cells_of(picture):
+    """Cells drawn, by class, and the names of parts."""
+    root = ET.fromstring(picture)
+    paths = [each for each in root.iter(f"{SVG}path") if each.get("class") in {"linear", "curved"}]
+    drawn = {"linear": 0, "curved": 0}
+    for path in paths:
+        drawn[path.get("class")] += sum(map(int, re.findall(r"h(\d+)v", path.get("d"))))
+    return drawn, [each.text for each in root.iter(f"{SVG}text")]
+
+
+def test_a_small_matrix_is_drawn_entry_by_entry_with_the_names_of_its_parts():
+    problem = make_problem("miqcp-bilinear", make_instance())
+    pattern = matrix(problem)
+    assert pattern.bin == 1
+    drawn, names = cells_of(sparsity_picture(pattern))
+    assert drawn == {"linear": int((~pattern.curved).sum()), "curved": int(pattern.curved.sum())}
+    assert pattern.entries == counts(problem)["nonzeros"]
+    assert pattern.curved.sum() == counts(problem)["nonlinear_nonzeros"]
+    assert set(names) <= {*pattern.down.names, *pattern.across.names}
+    assert "alpha" in names
+
+
+def test_a_large_matrix_is_binned_and_its_picture_stays_small():
+    side, rng = 200_000, np.random.default_rng(1)
+    rows, columns = (np.sort(rng.integers(0, side, 1_000_000)) for _ in "ij")
+    parts = Parts(("one", "other"), (side // 2, side // 2))
+    pattern = Pattern(parts, parts, rows, columns, np.zeros(len(rows), bool))
+    picture = sparsity_picture(pattern)
+    drawn, names = cells_of(picture)
+    assert CELLS <= drawn["linear"] <= CELLS**2
+    assert drawn["curved"] == 0
+    assert names == ["one", "other", "one", "other"]
+    assert len(picture) < 50_000
+    assert sparsity_picture(pattern) == picture
+
+
+def test_a_plot_draws_what_logs_tell_and_leaves_out_what_they_do_not():
+    told = [
+        curve("A <b> 1", [[0, None, 9.5], [1.5, -2.0, 9.5], [4, float("inf"), 7.25], [5, 7.25, 7.25]]),
+        curve("B", [[2.0, 3.0, None]]),
+        curve("C", [[None, 3.0, 1.0]]),
+    ]
+    assert [len(each.bounds) for each in told] == [2, 1, 0]
+    assert [len(each.objectives) for each in told] == [4, 0, 0]
+    picture = trace_picture(told[:2])
+    root = ET.fromstring(picture)
+    paths = [each.get("class") for each in root.iter(f"{SVG}path")]
+    assert paths == ["grid", "edge", "c0", "c0 upper", "c0", "c1", "c1"]
+    texts = [each.text for each in root.iter(f"{SVG}text")]
+    assert {"A <b> 1", "B", "seconds", "0", "10"} <= set(texts)
+    assert trace_picture(told[:2]) == picture
+
+
+@pytest.mark.parametrize("value", [0.0, -3.5, 1e-9, 1e9])
+def test_a_plot_of_one_value_has_a_scale(value):
+    root = ET.fromstring(trace_picture([curve("A", [[0, value, None]])]))
+    assert len(list(root.iter(f"{SVG}text"))) >= 5
+
+
+def test_first_values_that_are_larger_by_powers_of_ten_do_not_flatten_a_plot():
+    trace = [[0, -1e6, 1e9], [1, 3.0, 6.0], [2, 4.0, 5.0]]
+    root = ET.fromstring(trace_picture([curve("A", trace)]))
+    ticks = [each.text for each in root.iter(f"{SVG}text") if each.get("text-anchor") == "end"]
+    assert {"0", "5", "10"} <= set(ticks)
+    assert len(ticks) < 8
