@@ -37,7 +37,8 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from ....models.errors import InputError, naming, shortened
-from ....models.formulations.declaration import FACETS, FORMULATIONS
+from ....models.formulations.catalogue import FORMULATIONS, declaration_of, short_names
+from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
@@ -238,7 +239,7 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _words(document, "formulations", FORMULATIONS, tuple(FORMULATIONS))
+    formulations = _formulations(document)
     rungs = tuple(
         _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
     )
@@ -251,6 +252,17 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
     return Spec(document["title"], formulations, rungs, sketches, ledger)
+
+
+def _formulations(document: dict[str, Any]) -> tuple[str, ...]:
+    """The formulations of a specification, which may use short names."""
+    known = (*FORMULATIONS, *short_names())
+    named = _words(document, "formulations", known, tuple(FORMULATIONS))
+    found = [declaration_of(name).name for name in named]
+    for number, name in enumerate(found):
+        if name in found[:number]:
+            raise InputError(f"formulations: {name!r} is listed twice; list it once")
+    return tuple(found)
 
 
 def _check_names(names: list[str]) -> None:

@@ -17,8 +17,8 @@ from crossfield.models.sketch.read import DEFAULT_SIZE
 NAMED = {
     "run": ["samples", "size", "methods of a run"],
     "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
-    "export": ["samples", "size", "formulations", "formats", "default formats"],
-    "solve": ["samples", "size", "formulations", "methods", "solvers"],
+    "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
+    "solve": ["samples", "size", "formulations", "short names", "methods", "solvers"],
     "prove": ["samples", "size"],
     "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
