@@ -44,6 +44,7 @@ def build_command(
     Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file of all
     that is known of it.
     What is whole in the folder is kept, so that a build that was stopped continues.
+    A size at which nothing of a sketch is left is left out, which is said.
     """
     from ..library.building.build import build, unmatched
     from ..library.plan.spec import default_spec, read_spec
@@ -55,7 +56,10 @@ def build_command(
     if as_json:
         say_json(built.document)
     elif not quiet:
-        say(f"{output}: {len(built.document['entries'])} entries")
+        left_out = f", {len(built.skipped)} instances left out" if built.skipped else ""
+        say(f"{output}: {len(built.document['entries'])} entries{left_out}")
+    for name, reason in built.skipped.items():
+        complain(f"{name} is left out: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
         complain(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field, write_field
 from ....models.instance.file import to_json
@@ -70,6 +71,14 @@ class Preparation:
 def about_file(instance: str) -> str:
     """Name of the file that says what is known of an instance; it is written last."""
     return f"{instance}.about.json"
+
+
+def prepared(task: Preparation) -> Files | NoStrokeError:
+    """The files of an instance as `prepare` has them, or why its size does not suit its sketch."""
+    try:
+        return prepare(task)
+    except NoStrokeError as error:
+        return error
 
 
 def prepare(task: Preparation) -> Files:

@@ -30,7 +30,8 @@ from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
-from ..plan.recipe import plan
+from ..plan.recipe import InstancePlan, plan
+from ..plan.sources import instance_from
 from .check_entry import verify_entry
 from .finding import BUILD, Finding, close, of_error
 from .made_again import instance_findings
@@ -136,16 +137,30 @@ class _Verification:
                 yield Finding(path.name, f"has another SHA-256 than {INDEX} says")
         try:
             spec = library.spec
-            planned = [entry.name for each in plan(spec) for entry in each.entries]
+            plans = plan(spec)
         except CrossfieldError as error:
             yield of_error(error, INDEX)
         else:
             self.known |= {name for sketch in spec.sketches for name in sketch.files}
-            if planned != names:
+            yield from self._skipped(library, plans)
+            made = [each for each in plans if each.recipe.name not in library.skipped]
+            if [entry.name for each in made for entry in each.entries] != names:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
         yield from self._checker(CHECKER, check_point, library)
+
+    def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
+        """What is left out cannot be made, for the reason that is told."""
+        recipes = {each.recipe.name: each.recipe for each in plans}
+        for name, told in library.skipped.items():
+            try:
+                if name in recipes:
+                    instance_from(recipes[name])
+                yield Finding(INDEX, f"leaves out {name}, which can be made or is not asked for")
+            except CrossfieldError as error:
+                if str(error) != f"{name}: {told}":
+                    yield Finding(INDEX, f"tells another reason for leaving {name} out than there is")
 
     def _checker(self, name: str, ours: ModuleType, library: Library) -> Iterator[Finding]:
         """A checker is that of the version which made the library."""
@@ -208,7 +223,7 @@ class _Verification:
         if library.document["generator"] != generator():
             return
         try:
-            made = general(library.spec, sidecars)
+            made = general(library.spec, sidecars, library.skipped)
         except CrossfieldError:
             return  # told with the index
         for name in sorted({*made} - {CHECKER, CERTIFICATES, SOLU}):

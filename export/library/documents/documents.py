@@ -51,6 +51,11 @@ class Library:
         return read_sidecar(self.folder / f"{name}.json")
 
     @property
+    def skipped(self) -> dict[str, str]:
+        """Names of instances whose size leaves nothing of their sketch, and what was said of each."""
+        return dict(self.document.get("skipped", {}))
+
+    @property
     def spec(self) -> Spec:
         """The specification it was built from; drawings are read from the library itself."""
         return spec_of(self.document["spec"], self.folder / INDEX)
