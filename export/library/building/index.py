@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +15,7 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
+from ..documents.citation import PAPER, REFERENCES, Terms, cited
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
@@ -70,7 +70,10 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "spec": spec,
         "generator": generator(),
-        "version": version("crossfield"),
+        "release": cited(spec),
+        "terms": Terms(spec.sketches),
+        "references": REFERENCES,
+        "paper": PAPER,
         "rungs": [rung for rung in rungs if rung["entries"]],
         "instances": len({each["instance"]["sha256"] for each in sidecars}),
         "entries": len(sidecars),
@@ -106,6 +109,7 @@ def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str
         "format": INDEX_FORMAT,
         "version": VERSION,
         "generator": generator(),
+        "release": cited(spec),
         "spec": spec.document(),
         "entries": names,
         "sha256": {name: sha256_of(folder / f"{name}.json") for name in names},

@@ -151,6 +151,7 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         "rung": task.recipe.rung,
         "generator": generator(),
         "source": source_of(instance, task.recipe),
+        **stated_of(task.recipe),
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
@@ -163,6 +164,12 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         ],
         "recipe_sha256": task.sha256,
     }
+
+
+def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
+    """What the specification states of an instance: origin and the day on which it came into the library."""
+    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
+    return {key: value for key, value in stated.items() if value}
 
 
 def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -25,6 +26,7 @@ from ..building.inputs import Inputs
 from ..building.instance_task import about_file
 from ..documents import check_point
 from ..documents.archive import opened
+from ..documents.citation import cited
 from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
@@ -129,6 +131,8 @@ class _Verification:
         """The index names the sidecars of its specification; texts and checker are there."""
         document = library.document
         names = document["entries"]
+        if document["generator"] == generator():
+            yield from self._release(library)
         if sorted(document["sha256"]) != sorted(names):
             yield Finding(INDEX, "lists other entries than it has checksums for")
         for name in names:
@@ -149,6 +153,12 @@ class _Verification:
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
         yield from self._checker(CHECKER, check_point, library)
+
+    def _release(self, library: Library) -> Iterator[Finding]:
+        """What is told of the release follows from the specification."""
+        with suppress(CrossfieldError):  # told with the specification
+            if library.document.get("release") != cited(library.spec):
+                yield Finding(INDEX, "tells another release than follows from the specification")
 
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
         """What is left out cannot be made, for the reason that is told."""

@@ -29,7 +29,6 @@ INDEX_FORMAT: Final = "crossfield-library"
 ABOUT_FORMAT: Final = "crossfield-library-instance"
 VERSION: Final = 1
 INDEX: Final = "library.json"
-LICENCE: Final = "CC-BY-4.0"
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,6 +222,7 @@ def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], sta
         "about",
         formats=_formats(library.entries),
         citation=(read_bytes(library.folder / "CITATION.cff").decode()),
+        licence=(read_bytes(library.folder / "LICENSE").decode()),
         solu=SOLU,
     )
     for each in shown:
