@@ -1,4 +1,4 @@
-"""The commands `library build`, `solve`, `verify`, `submit-point` and `site`."""
+"""The commands `library build`, `solve`, `verify`, `release`, `submit-point` and `site`."""
 
 from __future__ import annotations
 
@@ -130,6 +130,31 @@ def verify_command(
         complain(str(finding))
     if findings:
         raise typer.Exit(1)
+
+
+@command("release")
+def release_command(
+    folder: Library,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write: .tar.gz or .zip.")
+    ],
+    *,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Freeze a library that verifies as one archive, to be published; its checksum lies beside it.
+
+    The library states its version and day: the table [release] of its specification. The same library gives
+    the same archive.
+    """
+    from ..library.checking.release import release_library
+
+    with progress(quiet=quiet) as show:
+        frozen = release_library(folder, output, progress=show)
+    if as_json:
+        say_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
+    elif not quiet:
+        say(f"{frozen.file}: {frozen.files} files, SHA-256 {frozen.sha256}")
 
 
 @command("submit-point")

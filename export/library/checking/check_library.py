@@ -57,7 +57,12 @@ def verify_library(folder: str | Path, *, progress: Progress = silent) -> list[F
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
             raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
         with unchanged(place, "a verification of the library", progress):
-            return list(_Verification(place, progress).findings())
+            return list(findings_in(place, progress))
+
+
+def findings_in(folder: Path, progress: Progress = silent) -> Iterator[Finding]:
+    """As `verify_library`, of a folder whose lock the caller holds."""
+    return _Verification(folder, progress).findings()
 
 
 class _Verification:

@@ -27,7 +27,16 @@ NAMED = {
     "library solve": ["solvers", "rungs"],
     "library submit-point": ["answers"],
 }
-OTHERS = ("", "list", "samples", "library", "library build", "library verify", "library site")
+OTHERS = (
+    "",
+    "list",
+    "samples",
+    "library",
+    "library build",
+    "library verify",
+    "library release",
+    "library site",
+)
 
 
 @pytest.fixture
