@@ -136,8 +136,11 @@ def solve_command(
 
 def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     """Refuse an unknown method, and what goes with formulations alone."""
+    from ...models.formulations.catalogue import FORMULATIONS, short_names
     from ..solving.methods import METHODS
 
+    if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
+        raise typer.BadParameter(f"{name} is a formulation, no method; write -f {name}")
     known([name], METHODS, "method")
     if relax:
         raise typer.BadParameter("--relax goes with --formulation, not with a method")

@@ -118,14 +118,14 @@ class Terms:
 
     @property
     def licence(self) -> str:
-        """The licence that every sketch states, or nothing."""
+        """The licence that every sketch states, if it is the same and a known one; else nothing."""
         stated = {each.origin.license for each in self.sketches}
-        return stated.pop() if len(stated) == 1 else ""
+        return next(iter(stated)) if len(stated) == 1 and stated <= {*LICENCES} else ""
 
     @property
     def name(self) -> str:
         """The full name of the licence of all sketches."""
-        return LICENCES.get(self.licence, (self.licence, ""))[0]
+        return LICENCES[self.licence][0]
 
     @property
     def known(self) -> list[tuple[str, str, str]]:

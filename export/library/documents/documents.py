@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -46,7 +47,9 @@ class Library:
     def entry(self, name: str) -> dict[str, Any]:
         """The sidecar of an entry. Raises InputError for a name that the library does not have."""
         if name not in self.document["sha256"]:
-            raise InputError(f"has no entry {name[:40]!r}; library.json lists them", file=self.folder)
+            near = get_close_matches(name, self.document["entries"], 1)
+            asked = f" (is it {near[0]}?)" if near else ""
+            raise InputError(f"has no entry {name[:60]!r}{asked}; library.json lists them", file=self.folder)
         return read_sidecar(self.folder / f"{name}.json")
 
     @property

@@ -7,7 +7,7 @@ import shutil
 import pytest
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.documents.citation import REFERENCES, bibtex, slug
+from crossfield.export.library.documents.citation import REFERENCES, Terms, bibtex, slug
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import InputError
@@ -125,6 +125,17 @@ def test_a_release_is_told_in_index_and_texts(mixed):
     assert all(f"# {line}" in texts(mixed)["CITATION.cff"] for line in release["bibtex"].split("\n") if line)
     assert release["bibtex"] in texts(mixed)["README.md"]
     assert "## 1.2, 2026-03-01" in texts(mixed)["CHANGELOG.md"]
+
+
+def test_one_licence_is_told_of_all_only_if_all_have_it_and_it_is_known(tmp_path):
+    known = spec_of(tmp_path, RUNG, OURS)
+    other = OURS.replace("mouse", "saddle")
+    assert Terms(known.sketches).licence == "CC-BY-4.0"
+    assert Terms(known.sketches).name == "Creative Commons Attribution 4.0 International (CC BY 4.0)"
+    for more in (FOREIGN, UNSAID, other.replace("CC-BY-4.0", "mine")):
+        assert Terms(spec_of(tmp_path, RUNG, OURS, more).sketches).licence == ""
+    assert Terms(spec_of(tmp_path, RUNG, OURS.replace("CC-BY-4.0", "all mine")).sketches).licence == ""
+    assert Terms(spec_of(tmp_path, RUNG, OURS, other).sketches).licence == "CC-BY-4.0"
 
 
 def test_bibtex_is_whole_and_escapes_what_tex_reads(tmp_path):

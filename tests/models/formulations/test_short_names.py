@@ -4,6 +4,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.bundle.manifest import fixed_jumps, write_all
 from crossfield.export.cli.app import invoke
+from crossfield.export.library.documents.documents import Library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import FormulationError, InputError
 from crossfield.models.formulations.catalogue import FORMULATIONS, declaration_of, declare
@@ -37,6 +38,15 @@ def test_a_word_that_is_near_a_name_is_told_that_name():
         assert f"(is it {near}?)" in str(refusal.value)
     with pytest.raises(FormulationError, match=r"in short parity, quartic, cubic, bilin, bilin1, miqp, milp"):
         declare("zzz")
+
+
+def test_where_no_formulation_is_named_it_is_told_what_was_meant(tmp_path, capfd):
+    assert invoke(["solve", "mouse", "--size", "4", "-m", "milp", "-o", str(tmp_path)]) == 2
+    assert "milp is a formulation, no method; write -f milp" in " ".join(capfd.readouterr().err.split())
+    names = ["cf_mouse_n008_milp", "cf_mouse_n008_miqp", "cf_skew_n008_milp"]
+    library = Library(tmp_path, {"entries": names, "sha256": dict.fromkeys(names, "0" * 64)})
+    with pytest.raises(InputError, match=r"'cf_mouse_n008_milp-mccormick' \(is it cf_mouse_n008_milp\?\)"):
+        library.entry("cf_mouse_n008_milp-mccormick")
 
 
 def test_files_have_full_names_whatever_was_said(tmp_path):
