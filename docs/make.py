@@ -51,7 +51,7 @@ def formulations() -> None:
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
         settable = ", ".join(sorted(recipe.settable)) or "none"
-        told = (recipe.source, recipe.kind, recipe.summary, f"options: {settable}")
+        told = (recipe.source, recipe.kind, recipe.summary, f"in short `{recipe.short}`, options: {settable}")
         facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in told)
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
@@ -319,11 +319,17 @@ def samples_in_short() -> str:
 def readme() -> None:
     """The tables inside README.md, between their markers."""
     _, rows = tables()["formulations"]
-    shown = ("name", "paper", "class", *DEFAULTS)
+    shown = ("name", "short", "paper", "class", *DEFAULTS)
     replace_between(
         README,
         "formulations",
-        markdown(shown, [[f"`{row['name']}`", *(str(row[column]) for column in shown[1:])] for row in rows]),
+        markdown(
+            shown,
+            [
+                [f"`{row['name']}`", f"`{row['short']}`", *(str(row[column]) for column in shown[2:])]
+                for row in rows
+            ],
+        ),
     )
     shown = ("name", "kind", "description")
     replace_between(

@@ -70,6 +70,10 @@ class InstanceError(CrossfieldError):
     """An instance or an instance file that breaks the rules of its format."""
 
 
+class NoStrokeError(InputError, InstanceError):
+    """No pixel or no stroke of a sketch is left: its mask misses them, or the grid is too coarse for it."""
+
+
 class FormulationError(CrossfieldError):
     """An unknown formulation, or an option that the formulation does not have."""
 

@@ -27,7 +27,7 @@ from ...models.errors import (
     UnsupportedByFormatError,
 )
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.catalogue import FORMULATIONS, declaration_of
 from ...models.formulations.declaration import Options
 from ...models.formulations.problem import Problem, formulate, lifted, tightened
 from ...models.formulations.windows import Windows
@@ -190,9 +190,10 @@ def write_all(
         windows,
         options or {},
     )
+    names = [declaration_of(name).name for name in formulations]
     manifests = []
     with sets.threads(jobs):
-        waiting = {name: sets.begin(sets.problem(name)) for name in formulations}
+        waiting = {name: sets.begin(sets.problem(name)) for name in names}
         for name in list(waiting):
             progress(name)
             manifests.append(waiting.pop(name)())
@@ -237,8 +238,7 @@ class _Sets:
 
     def problem(self, name: str) -> Problem:
         """A formulation of the instance, with those of the options that it has."""
-        recipe = FORMULATIONS.get(name)
-        unfit = set() if recipe is None else {*Options.__dataclass_fields__} - recipe.settable
+        unfit = {*Options.__dataclass_fields__} - declaration_of(name).settable
         chosen = {key: value for key, value in self.options.items() if key not in unfit}
         problem = formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.jumps_of), **chosen)
         return _narrowed(problem, self.windows)
@@ -304,13 +304,12 @@ def _narrowed(problem: Problem, windows: Windows | None) -> Problem:
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
-    """The jumps that a formulation takes as data; None where it has them as variables.
+    """The jumps that a formulation takes as data; None where it has them as variables, or FormulationError.
 
     They are those of `start`, by default of the first field. Everything that writes or solves a
     formulation by its name asks here, so that its files and its solutions are of one problem.
     """
-    recipe = FORMULATIONS.get(name)
-    if recipe is None or not recipe.fixed:
+    if not declaration_of(name).fixed:
         return None
     from ...models.search.starts import first_field
 

@@ -18,7 +18,7 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import choice_of, drawing_of, known, load, options_of
+from .inputs import choice_of, drawing_of, formulations_of, known, load, options_of
 from .library_command import library
 from .options import (
     BetaNorm,
@@ -234,16 +234,13 @@ def export_command(
     read a solver's answer.
     """
     from ...models.field.file import read_field
-    from ...models.formulations.catalogue import FORMULATIONS
     from ...models.proof.certificate import read_certificate
     from ...models.proof.tightening import windows_left
     from ..bundle.manifest import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
-    formulations, formats = (
-        known(formulation, FORMULATIONS, "formulation"),
-        known(file_format or list(DEFAULTS), FORMATS, "format"),
-    )
+    formulations = formulations_of(formulation)
+    formats = known(file_format or list(DEFAULTS), FORMATS, "format")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view, crossings=crossings)

@@ -19,6 +19,7 @@ def _of(
 
 NAMES: Final = {
     "formulations": _of("...models.formulations.catalogue", "FORMULATIONS"),
+    "short names": _of("...models.formulations.catalogue", "short_names", lambda short_names: short_names()),
     "formats": _of("..formats.registry", "FORMATS"),
     "default formats": _of("..formats.registry", "DEFAULTS"),
     "methods": _of("..solving.methods", "METHODS"),

@@ -112,6 +112,13 @@ def known(names: list[str] | None, table: Mapping[str, Any], kind: str) -> list[
     return list(dict.fromkeys(names or table))
 
 
+def formulations_of(names: list[str] | None) -> list[str]:
+    """The formulations that full or short names mean, each once; all when there are no names."""
+    from ...models.formulations.catalogue import FORMULATIONS, declaration_of
+
+    return list(dict.fromkeys(declaration_of(name).name for name in names or FORMULATIONS))
+
+
 def options_of(
     facet: str | None, stroke_norm: int | None, beta_norm: int | None, *, relax: bool
 ) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The commands `library build`, `solve`, `verify`, `submit-point`, `submit-run` and `site`."""
+"""The commands `library build`, `solve`, `verify`, `release`, `submit-point`, `submit-run` and `site`."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ def build_command(
     Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file of all
     that is known of it.
     What is whole in the folder is kept, so that a build that was stopped continues.
+    A size at which nothing of a sketch is left is left out, which is said.
     """
     from ..library.building.build import build, unmatched
     from ..library.plan.spec import default_spec, read_spec
@@ -55,7 +56,10 @@ def build_command(
     if as_json:
         say_json(built.document)
     elif not quiet:
-        say(f"{output}: {len(built.document['entries'])} entries")
+        left_out = f", {len(built.skipped)} instances left out" if built.skipped else ""
+        say(f"{output}: {len(built.document['entries'])} entries{left_out}")
+    for name, reason in built.skipped.items():
+        complain(f"{name} is left out: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
         complain(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
@@ -135,6 +139,31 @@ def verify_command(
         complain(str(finding))
     if findings:
         raise typer.Exit(1)
+
+
+@command("release")
+def release_command(
+    folder: Library,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write: .tar.gz or .zip.")
+    ],
+    *,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Freeze a library that verifies as one archive, to be published; its checksum lies beside it.
+
+    The library states its version and day: the table [release] of its specification. The same library gives
+    the same archive.
+    """
+    from ..library.checking.release import release_library
+
+    with progress(quiet=quiet) as show:
+        frozen = release_library(folder, output, progress=show)
+    if as_json:
+        say_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
+    elif not quiet:
+        say(f"{frozen.file}: {frozen.files} files, SHA-256 {frozen.sha256}")
 
 
 @command("submit-point")

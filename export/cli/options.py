@@ -203,7 +203,10 @@ NlForm = Annotated[
 Names = Annotated[
     list[str] | None,
     typer.Option(
-        "-f", "--formulation", metavar="NAME", help="{formulations}; all by default, may be repeated."
+        "-f",
+        "--formulation",
+        metavar="NAME",
+        help="{formulations}; in short {short names}; all by default, may be repeated.",
     ),
 ]
 Formats = Annotated[

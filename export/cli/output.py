@@ -274,7 +274,7 @@ def _text(value: object) -> str:
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
     """Print the tables of formulations, formats, solvers and readers, and which go together."""
     formulations = tables["formulations"][1]
-    columns = ("name", "paper", "class", "summary")
+    columns = ("name", "short", "paper", "class", "summary")
     show_table("formulations", columns, _cells(formulations, columns))
     formats, solvers = tables["formats"], tables["solvers"]
     names = [row["name"] for row in formats[1]]

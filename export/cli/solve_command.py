@@ -9,7 +9,7 @@ import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
-from .inputs import choice_of, known, load, options_of
+from .inputs import choice_of, formulations_of, known, load, options_of
 from .options import (
     BetaNorm,
     Crossings,
@@ -48,7 +48,10 @@ def solve_command(
     formulation: Annotated[
         str | None,
         typer.Option(
-            "-f", "--formulation", metavar="NAME", help="Hand this formulation to a solver: {formulations}."
+            "-f",
+            "--formulation",
+            metavar="NAME",
+            help="Hand this formulation to a solver: {formulations}; in short {short names}.",
         ),
     ] = None,
     method: Annotated[
@@ -133,8 +136,11 @@ def solve_command(
 
 def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     """Refuse an unknown method, and what goes with formulations alone."""
+    from ...models.formulations.catalogue import FORMULATIONS, short_names
     from ..solving.methods import METHODS
 
+    if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
+        raise typer.BadParameter(f"{name} is a formulation, no method; write -f {name}")
     known([name], METHODS, "method")
     if relax:
         raise typer.BadParameter("--relax goes with --formulation, not with a method")
@@ -161,12 +167,11 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
 def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     """The solution of one formulation, and the file of its field, which is there if it has a point."""
     from ...models.field.file import write_field
-    from ...models.formulations.catalogue import FORMULATIONS
     from ...models.formulations.problem import formulate
     from ..bundle.manifest import fixed_jumps
     from ..solving.local import solve
 
-    known([name], FORMULATIONS, "formulation")
+    (name,) = formulations_of([name])
     instance, deadline = request.instance, Deadline.after(request.limits.seconds)
     request.progress("greedy start")
     start = request.begin(deadline)

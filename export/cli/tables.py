@@ -22,7 +22,7 @@ def tables() -> Tables:
     """For each table its columns and its rows, computed from the code, never typed."""
     return {
         "formulations": (
-            ("name", "paper", "class", "summary", *FORMATS),
+            ("name", "short", "paper", "class", "summary", *FORMATS),
             [_formulation_row(problem) for problem in smallest_problems()],
         ),
         "formats": (
@@ -79,7 +79,8 @@ def _with_relaxations() -> list[tuple[Problem, bool]]:
 
 def _formulation_row(problem: Problem) -> Row:
     recipe = FORMULATIONS[problem.name]
-    row: Row = {"name": problem.name, "paper": recipe.paper, "class": recipe.kind, "summary": recipe.summary}
+    row: Row = {"name": problem.name, "short": recipe.short, "paper": recipe.paper}
+    row |= {"class": recipe.kind, "summary": recipe.summary}
     return row | {name: _carriage(problem, name) for name in FORMATS}
 
 

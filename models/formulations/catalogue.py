@@ -13,8 +13,21 @@ from typing import Any, Final
 
 import sympy as sp
 
-from ..errors import FormulationError
-from .declaration import FORMULATIONS, S_C, S_X, E, Facet, Family, Formulation, I, formulation, row, term
+from .declaration import (
+    FORMULATIONS,
+    S_C,
+    S_X,
+    E,
+    Facet,
+    Family,
+    Formulation,
+    I,
+    declaration_of,
+    formulation,
+    row,
+    short_names,
+    term,
+)
 from .symbols import (
     B_LIFTED,
     A,
@@ -218,13 +231,23 @@ def facets_of_z(facet: Facet) -> Families:
 
 
 def declare(name: str, **chosen: Any) -> Formulation:
-    """The formulation of that name with the chosen options: facet, stroke_norm, beta_norm, relax.
+    """The formulation of that name, full or short, with options: facet, stroke_norm, beta_norm, relax.
 
     An option that is None keeps its default. Raises FormulationError for an unknown name, option or value.
     """
-    if name not in FORMULATIONS:
-        raise FormulationError(f"there is no formulation {name!r}; choose one of {', '.join(FORMULATIONS)}")
-    return FORMULATIONS[name].with_options({key: value for key, value in chosen.items() if value is not None})
+    given = {key: value for key, value in chosen.items() if value is not None}
+    return declaration_of(name).with_options(given)
 
 
-__all__ = ["AT_JUMPS", "CUBIC", "FORMULATIONS", "PARITY", "QUARTIC", "TWO_NORM", "declare", "facets_of_z"]
+__all__ = [
+    "AT_JUMPS",
+    "CUBIC",
+    "FORMULATIONS",
+    "PARITY",
+    "QUARTIC",
+    "TWO_NORM",
+    "declaration_of",
+    "declare",
+    "facets_of_z",
+    "short_names",
+]

@@ -7,6 +7,7 @@ it. Nothing about it stands anywhere else.
 
 from __future__ import annotations
 
+import difflib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from typing import Any, Final, Literal, get_args
 
 import sympy as sp
 
-from ..errors import FormulationError
+from ..errors import FormulationError, shortened
 from .symbols import SLOTS, VARIABLES, IndexSet
 
 Facet = Literal["hull", "printed"]
@@ -288,13 +289,33 @@ FORMULATIONS: Final[Mapping[str, Declaration]] = MappingProxyType(_TABLE)
 """The table of formulations by name; command line, library, docs and tests are generated from it."""
 
 
+def declaration_of(name: str) -> Declaration:
+    """The line of the table that a name or short name means, as `milp` means `milp-mccormick`.
+
+    Raises FormulationError for another word, with the nearest of these names.
+    """
+    by_name = {each.short: each for each in FORMULATIONS.values()} | dict(FORMULATIONS)
+    if name in by_name:
+        return by_name[name]
+    near = difflib.get_close_matches(name.lower(), by_name, 1)
+    raise FormulationError(
+        f"there is no formulation {shortened(name)!r}{f' (is it {near[0]}?)' if near else ''}; "
+        f"choose one of {', '.join(FORMULATIONS)}, or in short {', '.join(short_names())}"
+    )
+
+
+def short_names() -> list[str]:
+    """The short names of all formulations, in the order of the table."""
+    return [each.short for each in FORMULATIONS.values()]
+
+
 def formulation(
     name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
 ) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
     """A decorator: enters a function that yields families into the table, as its `Declaration`."""
 
     def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
-        assert name not in _TABLE, f"there are two formulations {name}"
+        assert not {name, short} & {*_TABLE, *short_names()}, f"there are two formulations {name} or {short}"
         _TABLE[name] = Declaration(name, paper, kind, short, minimises, how, families, fixed)
         return _TABLE[name]
 

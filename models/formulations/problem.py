@@ -549,9 +549,9 @@ def _name(symbol: sp.Symbol) -> str:
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """The problem of that formulation on the instance.
 
-    name: as `crossfield list` shows them. options, where the formulation has them: facet (`hull`, `printed`),
-    stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the jumps (m,), for
-    `qp-fixed` alone.
+    name: full or short, as `crossfield list` shows them. options, where the formulation has them: facet
+    (`hull`, `printed`), stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the
+    jumps (m,), for `qp-fixed` alone.
     Raises FormulationError for an unknown name, option or value (docs/formulations.md has the formulas).
     """
     return Problem(instance, declare(name, **options), p)

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from ..errors import InstanceError
+from ..errors import InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import line_difference, wrap
 from .digits import in_digits
@@ -202,14 +202,14 @@ class Instance(Pictured):
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():
-            raise InstanceError("the mask has no pixel to solve for; draw something white in it")
+            raise NoStrokeError("the mask has no pixel to solve for; draw something white in it")
         if max(self.mask.shape) > 9999:
             raise InstanceError(
                 f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; "
                 "at most 9999 pixels a side are allowed"
             )
         if self.stroke_pixels.size == 0:
-            raise InstanceError("no stroke lies inside the mask; move the mask or draw a curvature line")
+            raise NoStrokeError("no stroke lies inside the mask; move the mask or draw a curvature line")
         if self.stroke_pixels.ndim != 2 or self.stroke_pixels.shape[1] != 2:
             raise InstanceError(
                 f"stroke_pixels has shape {self.stroke_pixels.shape}; give a row [row, "

@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import InputError, naming
+from ..errors import InputError, NoStrokeError, naming
 from ..input_limits import MAX_BYTES
 from ..instance.angles import line_of
 from ..instance.grid import Bools, Floats, Ints
@@ -155,7 +155,7 @@ def instance_of(
     stroke = solve & (weight >= LEAST_WEIGHT)
     met = met and met.inside(stroke)
     if not stroke.any():
-        raise InputError("no stroke lies inside the mask; draw a curvature line there or move the mask")
+        raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
     read = Instance(
         name=name,
         mask=solve,
@@ -333,12 +333,12 @@ def _solve_mask(
         return solve, Reading(sketch.page, crowded(filled, solve, frame))
     walls = (lines.amount >= LEAST_WEIGHT) | cut
     if not walls.any():
-        raise InputError("no stroke is left on so coarse a grid; choose a larger size")
+        raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
     closed, openings = closing(walls, sketch.ends(), frame)
     region = inside_outline(closed)
     solve = parts_with(region & ~cut, np.where(lines.weight >= LEAST_WEIGHT, lines.weight, 0.0))
     if not solve.any():
-        raise InputError(
+        raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
     warnings = (

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ....models.errors import CrossfieldError
+from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, are_whole, read_about, read_library, read_sidecar
@@ -24,7 +24,7 @@ from .entry_task import Entry, make_entry
 from .executor import Tasks, ahead, executor
 from .index import write_index
 from .inputs import Inputs
-from .instance_task import Files, about_file, prepare
+from .instance_task import Files, about_file, prepared
 
 
 def build(
@@ -75,9 +75,13 @@ def _built(
         ):  # the last one goes first: small ones, whose faults show at once
             work.begin(each)
         tasks.run()
+    kept = [each for each in plans if each.recipe.name not in work.skipped]
+    if not kept:
+        name, reason = next(iter(work.skipped.items()))
+        raise InputError(f"nothing is left on any grid that it asks for; {name}: {reason}")
     keep(ledger)
     progress("index and checksums")
-    write_index(folder, spec, plans)
+    write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
     return read_library(folder)
 
 
@@ -123,6 +127,8 @@ class _Build:
         self.folder, self.tasks, self.progress = folder, tasks, progress
         self.inputs = Inputs(ledger, plans)
         self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
+        self.skipped: dict[str, str] = {}
+        """Instances whose size leaves nothing of their sketch, and what was said of them."""
 
     def begin(self, each: InstancePlan) -> None:
         """Have an instance made, unless it is whole, and then its entries."""
@@ -132,11 +138,21 @@ class _Build:
             self._entries(each, about)
             return
 
-        def finish(files: Files) -> None:
+        def finish(files: Files | NoStrokeError) -> None:
+            if isinstance(files, NoStrokeError):
+                self._skip(each, files)
+                return
             self._write(files)
             self._entries(each, read_about(self.folder / about_file(task.name)))
 
-        self.tasks.add(prepare, task, finish)
+        self.tasks.add(prepared, task, finish)
+
+    def _skip(self, each: InstancePlan, error: NoStrokeError) -> None:
+        """Leave an instance out with its entries."""
+        name = each.recipe.name
+        self.total -= len(each.entries)
+        self.skipped[name] = str(error).removeprefix(f"{name}: ")
+        self.progress(f"left out: {error}")
 
     def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
         """What is known of an instance, when it was made from the same and its files are whole."""

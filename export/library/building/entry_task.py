@@ -26,7 +26,8 @@ from ...formats.registry import generator, write
 from ...solutions.readers.ampl import write_ampl_sol
 from ...writing.curvature import probtype
 from ...writing.records import number
-from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
+from ..documents.citation import REFERENCES
+from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, ranges, tangent_bound
 from ..ledger.certificates import METHOD
 from ..ledger.dual_bounds import contradicts, cut, relative_gap
@@ -38,12 +39,6 @@ from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, t
 from ..plan.recipe import EntryRecipe, digest
 from .instance_task import Files, Submitted
 
-REFERENCES = (
-    (
-        "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization: "
-        "the formulations, whose equation numbers are in the names of the rows"
-    ),
-)
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
 
 
@@ -222,6 +217,7 @@ def _sidecar(
 ) -> dict[str, Any]:
     problem, about = best.problem, task.about
     inherited = {key: about[key] for key in ("family", "title", "rung", "generator", "source", "instance")}
+    inherited |= {key: about[key] for key in ("origin", "added") if key in about}
     facts = best.facts()
     named = {each["dialect"]: each["name"] for each in listed if each["format"] == "sol"}
     numbers = {key: facts.pop(key) for key in ("objective", "violation", "integrality")}
@@ -252,7 +248,7 @@ def _context(task: Entry, problem: Problem) -> dict[str, Any]:
         "transformations": transformations(problem, task.recipe.formats),
         "equivalent": equivalent(task.recipe, task.relatives),
         "not_equivalent": not_equivalent(task.recipe, task.relatives),
-        "licence": LICENCE,
+        "licence": task.about.get("origin", {}).get("license"),
         "references": list(REFERENCES),
         "recipe_sha256": task.sha256,
     }

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable
-from importlib.metadata import version
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +15,7 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
+from ..documents.citation import PAPER, REFERENCES, Terms, cited
 from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
@@ -32,11 +32,17 @@ TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
 _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
 
-def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None:
-    """Write all that is about the library as a whole; files of entries that left it are removed."""
+def write_index(
+    folder: Path, spec: Spec, plans: Iterable[InstancePlan], skipped: Mapping[str, str] | None = None
+) -> None:
+    """Write all that is about the library as a whole; files of entries that left it are removed.
+
+    skipped: names of instances that the specification asks for and that are not in the plans, and why.
+    """
     plans = tuple(plans)
     sidecars = [read_sidecar(folder / f"{entry.name}.json") for each in plans for entry in each.entries]
-    written = general(spec, sidecars) | {INDEX: as_bytes(_index(folder, spec, sidecars))}
+    index = _index(folder, spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
+    written = general(spec, sidecars, skipped or {}) | {INDEX: as_bytes(index)}
     for name, data in written.items():
         write_bytes(folder / name, data)
     beside = (
@@ -51,9 +57,9 @@ def write_index(folder: Path, spec: Spec, plans: Iterable[InstancePlan]) -> None
     write_bytes(folder / SUMS, sums.encode())
 
 
-def general(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, bytes]:
+def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]) -> dict[str, bytes]:
     """The files that tell of the library as a whole, by name: texts, drawings, checker and library.solu."""
-    context = _context(spec, sidecars)
+    context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
@@ -69,7 +75,10 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "spec": spec,
         "generator": generator(),
-        "version": version("crossfield"),
+        "release": cited(spec),
+        "terms": Terms(spec.sketches),
+        "references": REFERENCES,
+        "paper": PAPER,
         "rungs": [rung for rung in rungs if rung["entries"]],
         "instances": len({each["instance"]["sha256"] for each in sidecars}),
         "entries": len(sidecars),
@@ -105,6 +114,7 @@ def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str
         "format": INDEX_FORMAT,
         "version": VERSION,
         "generator": generator(),
+        "release": cited(spec),
         "spec": spec.document(),
         "entries": names,
         "sha256": {name: sha256_of(folder / f"{name}.json") for name in names},

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field, write_field
 from ....models.instance.file import to_json
@@ -70,6 +71,14 @@ class Preparation:
 def about_file(instance: str) -> str:
     """Name of the file that says what is known of an instance; it is written last."""
     return f"{instance}.about.json"
+
+
+def prepared(task: Preparation) -> Files | NoStrokeError:
+    """The files of an instance as `prepare` has them, or why its size does not suit its sketch."""
+    try:
+        return prepare(task)
+    except NoStrokeError as error:
+        return error
 
 
 def prepare(task: Preparation) -> Files:
@@ -142,6 +151,7 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         "rung": task.recipe.rung,
         "generator": generator(),
         "source": source_of(instance, task.recipe),
+        **stated_of(task.recipe),
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
@@ -154,6 +164,12 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
         ],
         "recipe_sha256": task.sha256,
     }
+
+
+def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
+    """What the specification states of an instance: origin and the day on which it came into the library."""
+    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
+    return {key: value for key, value in stated.items() if value}
 
 
 def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -25,12 +26,14 @@ from ..building.inputs import Inputs
 from ..building.instance_task import about_file
 from ..documents import check_point
 from ..documents.archive import opened
+from ..documents.citation import cited
 from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
-from ..plan.recipe import plan
+from ..plan.recipe import InstancePlan, plan
+from ..plan.sources import instance_from
 from .check_entry import verify_entry
 from .check_run import run_findings
 from .finding import BUILD, Finding, close, of_error
@@ -55,7 +58,12 @@ def verify_library(folder: str | Path, *, progress: Progress = silent) -> list[F
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
             raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
         with unchanged(place, "a verification of the library", progress):
-            return list(_Verification(place, progress).findings())
+            return list(findings_in(place, progress))
+
+
+def findings_in(folder: Path, progress: Progress = silent) -> Iterator[Finding]:
+    """As `verify_library`, of a folder whose lock the caller holds."""
+    return _Verification(folder, progress).findings()
 
 
 class _Verification:
@@ -129,6 +137,8 @@ class _Verification:
         """The index names the sidecars of its specification; texts and checker are there."""
         document = library.document
         names = document["entries"]
+        if document["generator"] == generator():
+            yield from self._release(library)
         if sorted(document["sha256"]) != sorted(names):
             yield Finding(INDEX, "lists other entries than it has checksums for")
         for name in names:
@@ -137,16 +147,36 @@ class _Verification:
                 yield Finding(path.name, f"has another SHA-256 than {INDEX} says")
         try:
             spec = library.spec
-            planned = [entry.name for each in plan(spec) for entry in each.entries]
+            plans = plan(spec)
         except CrossfieldError as error:
             yield of_error(error, INDEX)
         else:
             self.known |= {name for sketch in spec.sketches for name in sketch.files}
-            if planned != names:
+            yield from self._skipped(library, plans)
+            made = [each for each in plans if each.recipe.name not in library.skipped]
+            if [entry.name for each in made for entry in each.entries] != names:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
         yield from self._checker(CHECKER, check_point, library)
+
+    def _release(self, library: Library) -> Iterator[Finding]:
+        """What is told of the release follows from the specification."""
+        with suppress(CrossfieldError):  # told with the specification
+            if library.document.get("release") != cited(library.spec):
+                yield Finding(INDEX, "tells another release than follows from the specification")
+
+    def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
+        """What is left out cannot be made, for the reason that is told."""
+        recipes = {each.recipe.name: each.recipe for each in plans}
+        for name, told in library.skipped.items():
+            try:
+                if name in recipes:
+                    instance_from(recipes[name])
+                yield Finding(INDEX, f"leaves out {name}, which can be made or is not asked for")
+            except CrossfieldError as error:
+                if str(error) != f"{name}: {told}":
+                    yield Finding(INDEX, f"tells another reason for leaving {name} out than there is")
 
     def _checker(self, name: str, ours: ModuleType, library: Library) -> Iterator[Finding]:
         """A checker is that of the version which made the library."""
@@ -209,7 +239,7 @@ class _Verification:
         if library.document["generator"] != generator():
             return
         try:
-            made = general(library.spec, sidecars)
+            made = general(library.spec, sidecars, library.skipped)
         except CrossfieldError:
             return  # told with the index
         for name in sorted({*made} - {CHECKER, CERTIFICATES, SOLU}):

@@ -17,7 +17,7 @@ from ....models.instance.file import read_instance
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
 from ..building.entry_task import Entry, make_entry
-from ..building.instance_task import Files, Preparation, source_of
+from ..building.instance_task import Files, Preparation, source_of, stated_of
 from ..ledger.certificates import METHOD
 from ..ledger.points import Provenance, ours
 from .finding import Finding, close
@@ -31,7 +31,7 @@ def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterat
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
-    for key in (*made, *sorted(sidecar.keys() - made.keys())):
+    for key in dict.fromkeys((*made, *sidecar)):
         if key not in _FROM_EACH_OTHER and not same(sidecar.get(key), made.get(key)):
             yield Finding(name, f"tells another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
@@ -103,9 +103,11 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
         "rung": recipe.rung,
         "source": source_of(instance, recipe),
         "recipe_sha256": task.sha256,
+        **dict.fromkeys(("origin", "added")),
+        **stated_of(recipe),
     }
     for key, value in expected.items():
-        if not same(about[key], value):
+        if not same(about.get(key), value):
             yield Finding(name, f"tells another {key} than follows from the specification")
     known = {each.provenance for each in task.submitted}
     for role, facts in about["fields"].items():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -29,7 +30,6 @@ INDEX_FORMAT: Final = "crossfield-library"
 ABOUT_FORMAT: Final = "crossfield-library-instance"
 VERSION: Final = 1
 INDEX: Final = "library.json"
-LICENCE: Final = "CC-BY-4.0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +47,15 @@ class Library:
     def entry(self, name: str) -> dict[str, Any]:
         """The sidecar of an entry. Raises InputError for a name that the library does not have."""
         if name not in self.document["sha256"]:
-            raise InputError(f"has no entry {name[:40]!r}; library.json lists them", file=self.folder)
+            near = get_close_matches(name, self.document["entries"], 1)
+            asked = f" (is it {near[0]}?)" if near else ""
+            raise InputError(f"has no entry {name[:60]!r}{asked}; library.json lists them", file=self.folder)
         return read_sidecar(self.folder / f"{name}.json")
+
+    @property
+    def skipped(self) -> dict[str, str]:
+        """Names of instances whose size leaves nothing of their sketch, and what was said of each."""
+        return dict(self.document.get("skipped", {}))
 
     @property
     def spec(self) -> Spec:

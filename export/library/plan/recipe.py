@@ -24,7 +24,8 @@ class InstanceRecipe:
     """How an instance is made. sketch: with the drawing's bytes; seed: None unless the sketch is random.
 
     prove: whether its 2-norm optimum is to be proven, where the rung says so and a formulation asks for it;
-    not under the gauge `box`, where bounds are weak.
+    not under the gauge `box`, where bounds are weak. added: the day on which it came into the library, empty
+    where none is stated.
     """
 
     name: str
@@ -34,6 +35,7 @@ class InstanceRecipe:
     seed: int | None
     gauge: str
     prove: bool = False
+    added: str = ""
 
     def document(self) -> dict[str, Any]:
         """All that decides its content, as JSON."""
@@ -43,6 +45,7 @@ class InstanceRecipe:
             "what": self.sketch.what,
             "title": self.sketch.title,
             "sha256": hashes,
+            "origin": self.sketch.origin.document(),
         }
         return asdict(self) | {"sketch": sketch}
 
@@ -104,6 +107,7 @@ def _instances(sketch: Sketch, rung: Rung, *, prove: bool) -> list[InstanceRecip
             seed,
             gauge,
             prove=prove and gauge == "strokes",
+            added=max(sketch.added, rung.added),
         )
         for size in sketch.sizes_on(rung)
         for seed in sketch.seeds

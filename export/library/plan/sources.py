@@ -9,7 +9,7 @@ from typing import Final, cast
 
 import numpy as np
 
-from ....models.errors import CrossfieldError, InputError
+from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
 from ....models.sketch.outline import largest_part
 from ....models.sketch.read import LEAST_WEIGHT, instance_of
@@ -23,7 +23,9 @@ RAGGED_SHARE: Final = 0.75
 
 
 def instance_from(recipe: InstanceRecipe) -> Instance:
-    """The instance of a recipe, under the recipe's name. Raises InputError that names it.
+    """The instance of a recipe, under the recipe's name.
+
+    Raises InputError that names it; a NoStrokeError when the size leaves nothing of the sketch.
 
     Its weights are the coefficients of the paper, 1 and 1e-6, on every grid: what others have published of
     these problems is about them.
@@ -32,6 +34,8 @@ def instance_from(recipe: InstanceRecipe) -> Instance:
     try:
         of_paper = {weight: getattr(Instance, weight) for weight in ("w_strokes", "w_beta")}
         return replace(make(recipe), name=recipe.name, **of_paper)
+    except NoStrokeError as error:
+        raise NoStrokeError(f"{recipe.name}: {error}") from error
     except CrossfieldError as error:
         raise InputError(f"{recipe.name}: {error}") from error
 

@@ -9,6 +9,9 @@ Read from TOML and checked.
     gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
     ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
 
+    [release]                          what is cited; may be left out
+    version = "1.0", date = "2026-11-22", authors = ["A. Name"]
+
     [rungs.tiny]                       tiny, small, medium or large
     sizes = [4]                        pixels on the longer side
     formats = ["nl", "mps"]            all by default
@@ -22,6 +25,10 @@ Read from TOML and checked.
     seeds = [1, 2]                     of a random one
     rungs = ["tiny"]                   all by default
     sizes = { tiny = [10] }            other ones than the rung has, for a drawing that needs them
+    author = "A. Name"                 of the drawing; with license and source, told where they are stated
+    license = "CC-BY-4.0"              best as SPDX has it
+    source = "..."                     where it is from
+    added = "2026-11-22"               when it came into the library; also of a rung: the later day counts
 
 Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
 what is checked here are words of tables that the program has, and what several keys say together.
@@ -37,13 +44,15 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from ....models.errors import InputError, naming, shortened
-from ....models.formulations.declaration import FACETS, FORMULATIONS
+from ....models.formulations.catalogue import FORMULATIONS, declaration_of, short_names
+from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
+from .origin import NOTHING_STATED, Origin, Release, day
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
@@ -66,6 +75,7 @@ class Rung:
     gauges: tuple[str, ...]
     facets: tuple[str, ...]
     prove: bool
+    added: str = ""
 
     def document(self) -> dict[str, Any]:
         """The rung as a table of a specification."""
@@ -76,6 +86,7 @@ class Rung:
             "gauges": list(self.gauges),
             "facets": list(self.facets),
             "prove": self.prove,
+            **({"added": self.added} if self.added else {}),
         }
 
 
@@ -97,6 +108,8 @@ class Sketch:
     drawing: bytes = b""
     mask: bytes = b""
     mask_name: str = ""
+    origin: Origin = NOTHING_STATED
+    added: str = ""
 
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
         """Its sizes on a rung."""
@@ -121,12 +134,13 @@ class Sketch:
         """The sketch as a table of a specification, its files as they lie in a library."""
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
         head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
+        head |= self.origin.document() | ({"added": self.added} if self.added else {})
         if self.kind == "sample":
             return head | {"sample": self.what}
         if self.kind == "random":
             return head | {"random": self.what, "seeds": list(self.seeds)}
         masked = {"mask": self._mask()} if self.mask else {}
-        return head | {"file": self._copy(), "source": self.what} | masked
+        return head | {"file": self._copy(), "file_name": self.what} | masked
 
 
 @dataclass(frozen=True)
@@ -138,6 +152,7 @@ class Spec:
     rungs: tuple[Rung, ...]
     sketches: tuple[Sketch, ...]
     ledger: Path | None = None
+    release: Release | None = None
 
     def document(self) -> dict[str, Any]:
         """The specification with every default written out, as library.json holds it."""
@@ -145,6 +160,7 @@ class Spec:
             "format": FORMAT,
             "version": VERSION,
             "title": self.title,
+            **({"release": self.release.document()} if self.release else {}),
             "formulations": list(self.formulations),
             "rungs": {rung.name: rung.document() for rung in self.rungs},
             "sketches": [sketch.document() for sketch in self.sketches],
@@ -238,7 +254,7 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _words(document, "facets", FACETS, ("hull",)),
     }
-    formulations = _words(document, "formulations", FORMULATIONS, tuple(FORMULATIONS))
+    formulations = _formulations(document)
     rungs = tuple(
         _rung(name, document["rungs"][name], defaults) for name in RUNGS if name in document["rungs"]
     )
@@ -250,7 +266,19 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
-    return Spec(document["title"], formulations, rungs, sketches, ledger)
+    release = Release.of(document["release"]) if "release" in document else None
+    return Spec(document["title"], formulations, rungs, sketches, ledger, release)
+
+
+def _formulations(document: dict[str, Any]) -> tuple[str, ...]:
+    """The formulations of a specification, which may use short names."""
+    known = (*FORMULATIONS, *short_names())
+    named = _words(document, "formulations", known, tuple(FORMULATIONS))
+    found = [declaration_of(name).name for name in named]
+    for number, name in enumerate(found):
+        if name in found[:number]:
+            raise InputError(f"formulations: {name!r} is listed twice; list it once")
+    return tuple(found)
 
 
 def _check_names(names: list[str]) -> None:
@@ -280,7 +308,12 @@ def _rung(name: str, table: dict[str, Any], defaults: dict[str, tuple[str, ...]]
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
-    return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, **words)
+    added = _added(table, f"rungs.{name}.")
+    return Rung(name, _whole(table["sizes"]), compress=compress, prove=prove, added=added, **words)
+
+
+def _added(table: dict[str, Any], place: str) -> str:
+    return day(table["added"], f"{place}added") if "added" in table else ""
 
 
 def _whole(numbers: list[float]) -> tuple[int, ...]:
@@ -299,6 +332,8 @@ def _sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, 
         title=table.get("title", what.pop("title")),
         rungs=wanted,
         sizes=_sizes(table, place, wanted),
+        origin=Origin.of(table),
+        added=_added(table, place),
         **what,
     )
     every = [size for rung in rungs if rung.name in wanted for size in sketch.sizes_on(rung)]
@@ -335,7 +370,7 @@ def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]
 
 def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     what, mask = table["file"], table.get("mask", "")
-    source = table.get("source", Path(what).name)
+    source = table.get("file_name", Path(what).name)
     drawing = _content(folder / what, f"{place}file")
     masked = _content(folder / mask, f"{place}mask") if mask else b""
     return {"what": source, "title": source, "drawing": drawing, "mask": masked, "mask_name": mask}

@@ -289,7 +289,7 @@ def test_missing_keys(key, written):
 @pytest.mark.parametrize(
     "keys, value, error, message",
     [
-        (["formulation"], "milp", FormulationError, "no formulation 'milp'"),
+        (["formulation"], "mlip", FormulationError, "no formulation 'mlip'"),
         (["formulation"], "milp-mccormick", FormulationError, "leave p out"),
         (["options", "relax"], True, FormulationError, "qp-fixed has no option relax"),
         (["jumps"], None, FormulationError, "takes the jumps of all pairs"),

@@ -265,14 +265,14 @@ def test_what_is_not_there_is_refused_with_a_hint(tmp_path, refused):
 
 NAMES = {
     "formulation": (
-        ["export", "-f", "milp-mccormick", "-f", "milp"],
-        "there is no formulation 'milp'; choose one of minlp-parity, ",
+        ["export", "-f", "milp-mccormick", "-f", "milp-mcormick"],
+        "there is no formulation 'milp-mcormick' (is it milp-mccormick?); choose one of minlp-parity, ",
     ),
     "format": (
         ["export", "-F", "nl", "-F", "xyz"],
         "there is no format 'xyz'; choose one of nl, gms, lp, mps",
     ),
-    "formulation to solve": (["solve", "-f", "milp"], "there is no formulation 'milp'"),
+    "formulation to solve": (["solve", "-f", "quartc"], "there is no formulation 'quartc' (is it quartic?)"),
     "solver": (
         ["solve", "-f", "milp-mccormick", "--solver", "gurobi"],
         "there is no solver 'gurobi'; choose one of highs, ipopt, bonmin",

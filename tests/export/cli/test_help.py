@@ -17,8 +17,8 @@ from crossfield.models.sketch.read import DEFAULT_SIZE
 NAMED = {
     "run": ["samples", "size", "methods of a run"],
     "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
-    "export": ["samples", "size", "formulations", "formats", "default formats"],
-    "solve": ["samples", "size", "formulations", "methods", "solvers"],
+    "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
+    "solve": ["samples", "size", "formulations", "short names", "methods", "solvers"],
     "prove": ["samples", "size"],
     "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
@@ -28,7 +28,16 @@ NAMED = {
     "library submit-run": ["logs", "run statuses"],
     "library submit-point": ["answers"],
 }
-OTHERS = ("", "list", "samples", "library", "library build", "library verify", "library site")
+OTHERS = (
+    "",
+    "list",
+    "samples",
+    "library",
+    "library build",
+    "library verify",
+    "library release",
+    "library site",
+)
 
 
 @pytest.fixture

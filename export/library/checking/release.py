@@ -1,0 +1,121 @@
+"""A library frozen as one archive, verified before, with its checksum beside it.
+
+The same library gives the same bytes, whoever packs it and when: order, times, owners and modes are fixed.
+Only another zlib may compress otherwise.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import tarfile
+import zipfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Final
+
+from ....models.errors import InputError, OutputError
+from ....models.processes.progress import Progress, silent
+from ....models.storage import make_folder, read_bytes, replacing, sha256_of, write_bytes
+from ..building.index import SUMS
+from ..documents.citation import slug
+from ..documents.documents import Library, read_library
+from ..documents.lock import unchanged
+from .check_library import findings_in
+
+_TIME: Final = (1980, 1, 1, 0, 0, 0)
+"""The time of every file, the earliest that a .zip can hold."""
+_SECONDS: Final = 315532800  # the same in Unix time
+_MODE: Final = 0o644
+_LEVEL: Final = 9
+_LONGEST: Final = 60  # characters of a folder's name that come from the title
+
+Members = Iterable[tuple[str, bytes]]
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """A release that was written: its archive, its SHA-256, and how many files are in it."""
+
+    file: Path
+    sha256: str
+    files: int
+
+    @property
+    def sum_file(self) -> Path:
+        """The file beside it that `sha256sum --check` reads."""
+        return self.file.with_name(f"{self.file.name}.sha256")
+
+
+def release_library(folder: str | Path, output: str | Path, *, progress: Progress = silent) -> Frozen:
+    """The release of a library as an archive, .tar.gz or .zip, now in `output`, its checksum beside it.
+
+    Nobody changes the library meanwhile. Raises InputError for another suffix, for a library that states no
+    version and day, and for one that does not verify; OutputError where nothing can be written.
+    """
+    folder, output = Path(folder), Path(output)
+    pack = _packer(output)
+    if output.resolve().is_relative_to(folder.resolve()):
+        raise OutputError("lies inside the library, whose files are its own; choose another", file=output)
+    with unchanged(folder, "a release of the library", progress):
+        top = _top(read_library(folder))
+        _check(folder, progress)
+        names = [SUMS, *(line[66:] for line in read_bytes(folder / SUMS).decode().splitlines())]
+        progress(f"{len(names)} files")
+        make_folder(output.parent)
+        with replacing(output) as stream:
+            pack(stream, ((f"{top}/{name}", read_bytes(folder / name)) for name in sorted(names)))
+    frozen = Frozen(output, sha256_of(output), len(names))
+    write_bytes(frozen.sum_file, f"{frozen.sha256}  {output.name}\n".encode())
+    return frozen
+
+
+def _packer(output: Path) -> Callable[[IO[bytes], Members], None]:
+    for suffix, pack in _KINDS.items():
+        if output.name.lower().endswith(suffix):
+            return pack
+    raise InputError(f"is no name of an archive; let it end in {' or '.join(_KINDS)}", file=output)
+
+
+def _top(library: Library) -> str:
+    """Name of the folder in the archive: title and version."""
+    stated = library.document.get("release", {})
+    if "version" not in stated:
+        raise InputError(
+            "states no version and no day; write [release] into its specification and build it again",
+            file=library.folder,
+        )
+    return f"{slug(stated['title'])[:_LONGEST]}-{slug(stated['version'])[:_LONGEST]}"
+
+
+def _check(folder: Path, progress: Progress) -> None:
+    found = list(findings_in(folder, progress))
+    if found:
+        more = f" ({len(found) - 1} more)" if found[1:] else ""
+        raise InputError(
+            f"does not verify, so it is not released: {found[0]}{more}; see `crossfield library verify`",
+            file=folder,
+        )
+
+
+def _tar(stream: IO[bytes], members: Members) -> None:
+    with (
+        gzip.GzipFile("", "wb", _LEVEL, stream, mtime=0) as packed,
+        tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive,
+    ):
+        for name, data in members:
+            entry = tarfile.TarInfo(name)
+            entry.size, entry.mode, entry.mtime = len(data), _MODE, _SECONDS
+            archive.addfile(entry, io.BytesIO(data))
+
+
+def _zip(stream: IO[bytes], members: Members) -> None:
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, data in members:
+            entry = zipfile.ZipInfo(name, _TIME)
+            entry.create_system, entry.external_attr = 3, _MODE << 16  # Unix, whatever the system is
+            archive.writestr(entry, data, zipfile.ZIP_DEFLATED, _LEVEL)
+
+
+_KINDS: Final = {".tar.gz": _tar, ".zip": _zip}

@@ -1,0 +1,79 @@
+"""A size that does not suit a sketch is left out with a line; the build goes on, and verify agrees."""
+
+import json
+
+import pytest
+from children import complaints
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.plan.spec import read_spec
+from crossfield.models.errors import InputError
+
+pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
+
+SPEC = """format = "crossfield-library-spec"
+version = 1
+title = "a library for tests"
+formulations = ["milp", "qp"]
+[rungs.tiny]
+sizes = [2, 3]
+formats = ["mps"]
+gauges = ["strokes", "box"]
+prove = false
+[[sketches]]
+name = "bottle"
+sample = "bottle"
+sizes = { tiny = [3] }
+"""
+MOUSE = '[[sketches]]\nname = "mouse"\nsample = "mouse"\n'
+COARSE = "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
+
+
+@pytest.fixture
+def spec(tmp_path):
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC + MOUSE)
+    return path
+
+
+def test_a_size_that_does_not_suit_is_left_out_with_a_line(spec, tmp_path, capfd):
+    folder = tmp_path / "library"
+    assert invoke(["library", "build", str(spec), "-o", str(folder)]) == 0
+    shown = capfd.readouterr()
+    names = ["cf_bottle_n003", "cf_bottle_n003_box"]
+    assert shown.out == f"{folder}: 8 entries, 2 instances left out\n"
+    told = complaints(shown.err).splitlines()
+    assert [line for line in told if "is left out" in line] == told
+    assert all(f"{name} is left out: {COARSE}" in line for name, line in zip(names, told, strict=True))
+    index = json.loads((folder / "library.json").read_text())
+    assert index["skipped"] == dict.fromkeys(names, COARSE)
+    assert {name.split("_")[1] for name in index["entries"]} == {"mouse"}
+    assert not list(folder.glob("cf_bottle_n*"))
+    assert "Left out" in (folder / "README.md").read_text()
+    assert verify_library(folder) == []
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert invoke(["library", "build", str(spec), "-o", str(folder), "-q", "--jobs", "2"]) == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_what_is_left_out_without_need_is_found(spec, tmp_path):
+    folder = build(read_spec(spec), tmp_path / "library").folder
+    path = folder / "library.json"
+    index = json.loads(path.read_text())
+    for skipped, words in (
+        (index["skipped"] | {"cf_mouse_n002": COARSE}, "leaves out cf_mouse_n002, which can be made"),
+        (index["skipped"] | {"cf_cat_n002": COARSE}, "leaves out cf_cat_n002, which can be made or is not"),
+        (index["skipped"] | {"cf_bottle_n003": "a whim"}, "another reason for leaving cf_bottle_n003 out"),
+        ({}, "skipped"),
+    ):
+        path.write_text(json.dumps(index | {"skipped": skipped}))
+        findings = [str(finding) for finding in verify_library(folder) if finding.file == "library.json"]
+        assert any(words in each for each in findings), (words, findings)
+
+
+def test_a_library_of_which_nothing_is_left_is_an_error(spec, tmp_path):
+    spec.write_text(SPEC)
+    with pytest.raises(InputError, match="nothing is left on any grid that it asks for; cf_bottle_n003"):
+        build(read_spec(spec), tmp_path / "library")
+    assert not (tmp_path / "library" / "library.json").exists()
