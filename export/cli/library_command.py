@@ -1,4 +1,4 @@
-"""The commands `library build`, `solve`, `verify`, `submit-point` and `site`."""
+"""The commands `library build`, `solve`, `verify`, `submit-point`, `points` and `site`."""
 
 from __future__ import annotations
 
@@ -36,6 +36,10 @@ def build_command(
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Build on the workers of a dask scheduler."),
     ] = None,
+    search: Annotated[
+        bool,
+        typer.Option("--search", help="Search for points and proofs even where the specification has them."),
+    ] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -45,12 +49,15 @@ def build_command(
     that is known of it.
     What is whole in the folder is kept, so that a build that was stopped continues.
     """
+    from dataclasses import replace
+
     from ..library.building.build import build, unmatched
     from ..library.plan.spec import default_spec, read_spec
 
     with progress(quiet=quiet) as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
+        wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
     if as_json:
         say_json(built.document)
@@ -160,6 +167,24 @@ def submit_command(
         )
     if not quiet:
         say(str(happened))
+
+
+@command("points")
+def points_command(
+    folder: Library,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.zip", help="The archive.")],
+    *,
+    quiet: Quiet = False,
+) -> None:
+    """Keep the points of a library: an archive of fields and certificates that a specification may name.
+
+    A build of that specification then searches for nothing, and its bytes are the same on every processor.
+    """
+    from ..library.ledger.given import write_points
+
+    number = write_points(folder, output)
+    if not quiet:
+        say(f"{output}: points of {number} instances")
 
 
 @command("site")

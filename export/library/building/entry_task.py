@@ -27,8 +27,9 @@ from ...solutions.readers.ampl import write_ampl_sol
 from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.documents import FORMAT, LICENCE, VERSION, as_bytes, listed_jumps
-from ..documents.statistics import counts, curvature, ranges, tangent_bound
+from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
 from ..ledger.certificates import METHOD
+from ..ledger.difficulty import difficulty
 from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
@@ -43,6 +44,7 @@ REFERENCES = (
         "the formulations, whose equation numbers are in the names of the rows"
     ),
 )
+_TANGENT = "tangent at the point"
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
 
 
@@ -88,6 +90,7 @@ def make_entry(task: Entry) -> Files:
         status, gap = _status(best, bounds)
         listed += _points(task, best, Path(made), proven=status == "optimal")
         facts = {"bounds": bounds, "bound": _greatest(bounds), "status": status, "gap": gap}
+        facts |= {"density": density(instance), "difficulty": _grade(task, best, bounds, status)}
         document = _sidecar(task, best, listed, refused) | facts | _context(task, problem)
         files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
@@ -170,7 +173,7 @@ def _bounds(task: Entry, best: Best, instance: Instance) -> list[dict[str, Any]]
     found = [_bound(record, task.name) for record in sorted(chosen.values(), key=lambda each: each.solver)]
     tangent = tangent_bound(best.problem, best.point)
     if tangent is not None:
-        found.append(_computed("tangent at the point", tangent))
+        found.append(_computed(_TANGENT, tangent))
     certificate = task.about.get("certificate")
     if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
         found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
@@ -230,6 +233,16 @@ def _status(best: Best, bounds: list[dict[str, Any]]) -> tuple[str, float | None
     return "optimal" if is_proven(best.objective, bound) else "best known", relative_gap(
         best.objective, bound
     )
+
+
+def _grade(task: Entry, best: Best, bounds: list[dict[str, Any]], status: str) -> str:
+    """How hard the entry is, by the runs on itself and by the tangent at its point."""
+    runs = [
+        each for each in task.records if (each.entry, each.problem_sha256) == (task.name, best.problem.sha256)
+    ]
+    shown = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
+    tangent = any(is_proven(best.objective, bound) for bound in shown)
+    return difficulty(status, runs, tangent=tangent)
 
 
 def _sidecar(

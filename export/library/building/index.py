@@ -16,12 +16,11 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
-from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
+from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
 from ..plan.recipe import InstancePlan
 from ..plan.spec import RUNGS, Spec
-from .instance_task import about_file
 
 CHECKER: Final = "check_point.py"
 CERTIFICATES: Final = "check_certificate.py"

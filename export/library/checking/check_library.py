@@ -22,12 +22,12 @@ from ...formats.registry import generator
 from ..building.entry_task import Entry
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..building.instance_task import about_file
 from ..documents import check_point
 from ..documents.archive import opened
-from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
+from ..documents.documents import INDEX, Library, about_file, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
+from ..ledger.given import points_of
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import plan
@@ -186,7 +186,7 @@ class _Verification:
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
         """What the library was made of; None when its specification is damaged, told with the index."""
         try:
-            return Inputs(ledger, plan(library.spec))
+            return Inputs(ledger, plan(library.spec), points_of(self.folder))
         except CrossfieldError:
             return Inputs(ledger, ())
 
