@@ -112,6 +112,7 @@ def verify_command(
         typer.Argument(metavar="DIR|ARCHIVE", help="Folder, .zip or .tar (.gz, .bz2, .xz) of a library."),
     ],
     *,
+    jobs: Processes = 1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -124,7 +125,7 @@ def verify_command(
     from ..library.checking.check_library import verify_library
 
     with progress(quiet=quiet) as show:
-        findings = verify_library(folder, progress=show)
+        findings = verify_library(folder, jobs=jobs, progress=show)
     if as_json:
         say_json([asdict(finding) for finding in findings])
     elif not quiet and not findings:

@@ -266,3 +266,19 @@ def test_sidecars_tell_density_and_difficulty(searched):
     assert entry["difficulty"] == "hard"
     assert read_library(searched).entry(f"{STEM}_qp")["difficulty"] == "easy"
     assert read_library(searched).entry(f"{STEM}_milp")["difficulty"] == "open"
+
+
+@pytest.mark.slow
+def test_two_processes_find_what_one_finds(searched, tmp_path):
+    lib = shutil.copytree(searched, tmp_path / "lib")
+    (lib / f"{STEM}_milp.sol").unlink()
+    (lib / f"{SADDLE}_exact.json").write_text("{}")
+    path = lib / f"{STEM}_cubic.json"
+    path.write_text(path.read_text().replace('"difficulty": "hard"', '"difficulty": "easy"'))
+    one, two = [], []
+    found = verify_library(lib, progress=one.append)
+    assert verify_library(lib, jobs=2, progress=two.append) == found
+    assert one == two
+    told = {(finding.file, finding.what) for finding in found}
+    words = "tells another difficulty than follows from its instance and the ledger"
+    assert (f"{STEM}_cubic.json", words) in told
