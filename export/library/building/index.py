@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
@@ -78,10 +79,13 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell of a rung: sizes, number of entries, and how many have a proven optimum."""
+    """What the texts tell of a rung: sizes, share of strokes, numbers of entries, optima and grades."""
     sizes = sorted({each["source"]["size"] for each in sidecars})
     proven = sum(each["status"] == "optimal" for each in sidecars)
-    return {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven}
+    density = sum(each["density"] for each in sidecars) / max(len(sidecars), 1)
+    grades = Counter(each["difficulty"] for each in sidecars)
+    told = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
+    return told | {"density": f"{density:.2f}"}
 
 
 def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:
