@@ -7,7 +7,6 @@ import subprocess
 import sys
 import zipfile
 
-import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
@@ -21,6 +20,7 @@ from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import InputError
+from processors import PROCESSORS
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -47,15 +47,6 @@ sample = "saddle"
 sizes = {{ tiny = [4] }}
 """
 STEM, SADDLE = "cf_rand_n003_s1", "cf_saddle_n004_box"
-PLAIN = {
-    "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
-    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
-}
-PROCESSORS = [
-    {"OPENBLAS_CORETYPE": "Haswell"},
-    {"OPENBLAS_CORETYPE": "SkylakeX"},
-    {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN,
-]
 
 
 def write_spec(folder, more=""):
