@@ -1,4 +1,4 @@
-"""The commands `library build`, `solve`, `verify`, `release`, `submit-point`, `submit-run` and `site`."""
+"""The commands of `library`: build, solve, verify, release, points, submit-point, submit-run, site."""
 
 from __future__ import annotations
 
@@ -36,6 +36,10 @@ def build_command(
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Build on the workers of a dask scheduler."),
     ] = None,
+    search: Annotated[
+        bool,
+        typer.Option("--search", help="Search for points and proofs even where the specification has them."),
+    ] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -46,12 +50,15 @@ def build_command(
     What is whole in the folder is kept, so that a build that was stopped continues.
     A size at which nothing of a sketch is left is left out, which is said.
     """
+    from dataclasses import replace
+
     from ..library.building.build import build, unmatched
     from ..library.plan.spec import default_spec, read_spec
 
     with progress(quiet=quiet) as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
+        wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
     if as_json:
         say_json(built.document)
@@ -118,6 +125,7 @@ def verify_command(
         typer.Argument(metavar="DIR|ARCHIVE", help="Folder, .zip or .tar (.gz, .bz2, .xz) of a library."),
     ],
     *,
+    jobs: Processes = 1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -130,7 +138,7 @@ def verify_command(
     from ..library.checking.check_library import verify_library
 
     with progress(quiet=quiet) as show:
-        findings = verify_library(folder, progress=show)
+        findings = verify_library(folder, jobs=jobs, progress=show)
     if as_json:
         say_json([asdict(finding) for finding in findings])
     elif not quiet and not findings:
@@ -245,6 +253,24 @@ def submit_run_command(
         happened = submit_run(folder, point=point, log=log, entry=entry, told=told, progress=show)
     if not quiet:
         say(str(happened))
+
+
+@command("points")
+def points_command(
+    folder: Library,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.zip", help="The archive.")],
+    *,
+    quiet: Quiet = False,
+) -> None:
+    """Keep the points of a library: an archive of fields and certificates that a specification may name.
+
+    A build of that specification then searches for nothing, and its bytes are the same on every processor.
+    """
+    from ..library.ledger.given import write_points
+
+    number = write_points(folder, output)
+    if not quiet:
+        say(f"{output}: points of {number} instances")
 
 
 @command("site")

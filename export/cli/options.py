@@ -171,7 +171,7 @@ Jobs = Annotated[
     typer.Option("--jobs", callback=_jobs, help=f"How many solver files are written at once; 1 to {MOST}."),
 ]
 Processes = Annotated[
-    int, typer.Option("--jobs", callback=_jobs, help=f"How many entries are built at once; 1 to {MOST}.")
+    int, typer.Option("--jobs", callback=_jobs, help=f"How many processes work at once; 1 to {MOST}.")
 ]
 Threads = Annotated[
     int,

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 from crossfield.models.instance.elementary import arctangent, cosine, sine
+from processors import PROCESSORS
 
 HASHES = """
 import json
@@ -18,15 +19,6 @@ from crossfield.models.sketch.samples import SAMPLES
 names = [name for name in SAMPLES if name not in {"skew", "saddle", "singular"}]
 print(json.dumps({name: cf.sample(name, 10).sha256 for name in names}))
 """
-PLAIN = {
-    "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
-    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
-}
-PROCESSORS = [
-    {"OPENBLAS_CORETYPE": "Haswell"},
-    {"OPENBLAS_CORETYPE": "Nehalem"},
-    {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN,
-]
 
 
 def hashes_on(processor):

@@ -15,8 +15,9 @@ from typing import Any
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, write_bytes
-from ..documents.documents import Library, are_whole, read_about, read_library, read_sidecar
+from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
+from ..ledger.given import Points, nothing, points_of, read_points
 from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
@@ -24,7 +25,7 @@ from .entry_task import Entry, make_entry
 from .executor import Tasks, ahead, executor
 from .index import write_index
 from .inputs import Inputs
-from .instance_task import Files, about_file, prepared
+from .instance_task import Files, prepared
 
 
 def build(
@@ -39,15 +40,16 @@ def build(
 
     jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
     progress: called with a line for each entry that is made. Same specification and ledger, same bytes, with
-    any number of processes; on another kind of processor, points may end in other digits. Raises InputError,
-    OutputError, BuildError.
+    any number of processes. Where the specification brings points, on every processor too; else points are
+    searched for, and may end in other digits on another kind. Raises InputError, OutputError, BuildError.
     """
     plans = plan(spec)
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
         with locked(folder, "a build of the library", progress):
-            return _built(spec, plans, folder, jobs=jobs, scheduler=scheduler, progress=progress)
+            points = read_points(spec.points) if spec.points else nothing
+            return _built(spec, plans, folder, points, jobs=jobs, scheduler=scheduler, progress=progress)
     except BaseException:
         if is_new:
             with suppress(OSError):  # it may hold what is whole, for the next build
@@ -59,6 +61,7 @@ def _built(
     spec: Spec,
     plans: Sequence[InstancePlan],
     folder: Path,
+    points: Points,
     *,
     jobs: int,
     scheduler: str | None,
@@ -69,7 +72,7 @@ def _built(
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
         tasks = Tasks(chosen, ahead(jobs, scheduler))
-        work = _Build(folder, ledger, plans, tasks, progress)
+        work = _Build(folder, Inputs(ledger, plans, points), tasks, progress)
         for each in sorted(
             plans, key=lambda each: -each.recipe.size
         ):  # the last one goes first: small ones, whose faults show at once
@@ -95,7 +98,8 @@ def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -
 def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
     """As `rebuild`, for a caller who holds the lock of the library."""
     spec = read_library(folder).spec
-    return _built(spec, plan(spec), folder, jobs=jobs, scheduler=None, progress=progress)
+    points = points_of(folder)
+    return _built(spec, plan(spec), folder, points, jobs=jobs, scheduler=None, progress=progress)
 
 
 def unmatched(library: Library) -> list[Record]:
@@ -121,11 +125,8 @@ def _ledger(spec: Spec, plans: Iterable[InstancePlan], folder: Path) -> Ledger:
 class _Build:
     """A build under way: what is to be made, and how far it is."""
 
-    def __init__(
-        self, folder: Path, ledger: Ledger, plans: Iterable[InstancePlan], tasks: Tasks, progress: Progress
-    ) -> None:
-        self.folder, self.tasks, self.progress = folder, tasks, progress
-        self.inputs = Inputs(ledger, plans)
+    def __init__(self, folder: Path, inputs: Inputs, tasks: Tasks, progress: Progress) -> None:
+        self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
         self.skipped: dict[str, str] = {}
         """Instances whose size leaves nothing of their sketch, and what was said of them."""
@@ -143,7 +144,10 @@ class _Build:
                 self._skip(each, files)
                 return
             self._write(files)
-            self._entries(each, read_about(self.folder / about_file(task.name)))
+            about = read_about(self.folder / about_file(task.name))
+            if task.given and task.given.instance != about["instance"]["sha256"]:
+                self.progress(f"{task.name}: the points given are of another instance; searched for others")
+            self._entries(each, about)
 
         self.tasks.add(prepared, task, finish)
 

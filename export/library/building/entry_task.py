@@ -28,9 +28,10 @@ from ...writing.curvature import probtype
 from ...writing.records import number
 from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
-from ..documents.statistics import counts, curvature, ranges, tangent_bound
+from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
 from ..ledger.certificates import METHOD
-from ..ledger.dual_bounds import contradicts, cut, relative_gap
+from ..ledger.difficulty import difficulty
+from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
 from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
@@ -39,6 +40,7 @@ from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, t
 from ..plan.recipe import EntryRecipe, digest
 from .instance_task import Files, Submitted
 
+_TANGENT = "tangent at the point"
 _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for sure
 
 
@@ -83,8 +85,10 @@ def make_entry(task: Entry) -> Files:
         records = _records(task, best, instance)
         bounds = _bounds(task, best, records)
         facts = standing(best.objective, bounds, records, task.name)
-        listed += _points(task, best, Path(made), proven=facts["status"] == "optimal")
-        found = _gap(best, bounds, facts["status"]) | {"runs": runs_of(records, task.name, best.objective)}
+        status = facts["status"]
+        listed += _points(task, best, Path(made), proven=status == "optimal")
+        found = _gap(best, bounds, status) | {"runs": runs_of(records, task.name, best.objective)}
+        found |= {"density": density(instance), "difficulty": _grade(task, best, bounds, status)}
         document = _sidecar(task, best, listed, refused) | found | facts | _context(task, problem)
         files = {each["name"]: (Path(made) / each["name"]).read_bytes() for each in listed}
         return files | {f"{task.name}.json": as_bytes(document)}
@@ -165,7 +169,7 @@ def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, An
     found = [_bound(record, task.name) for record in best_of_each(having, task.name)]
     tangent = tangent_bound(best.problem, best.point)
     if tangent is not None:
-        found.append(_computed("tangent at the point", tangent))
+        found.append(_computed(_TANGENT, tangent))
     certificate = task.about.get("certificate")
     if certificate is not None and FORMULATIONS[task.recipe.formulation].minimises == TWO_NORM:
         found.append(_computed(METHOD, certificate["bound"]) | {"certificate": certificate["file"]})
@@ -210,6 +214,16 @@ def _gap(best: Best, bounds: list[dict[str, Any]], status: str) -> dict[str, Any
     bound = max((each["bound"] for each in bounds), default=None)
     gap = None if bound is None else relative_gap(best.objective, bound)
     return {"bounds": bounds, "bound": bound, "status": status, "gap": gap}
+
+
+def _grade(task: Entry, best: Best, bounds: list[dict[str, Any]], status: str) -> str:
+    """How hard the entry is, by the runs on itself and by the tangent at its point."""
+    runs = [
+        each for each in task.records if (each.entry, each.problem_sha256) == (task.name, best.problem.sha256)
+    ]
+    shown = [each["bound"] for each in bounds if each["solver"] == ours(_TANGENT).solver]
+    tangent = any(is_proven(best.objective, bound) for bound in shown)
+    return difficulty(status, runs, tangent=tangent)
 
 
 def _sidecar(

@@ -56,7 +56,7 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     except BrokenProcessPool as error:
         raise BuildError(
             "a process ended before its work was done, for want of memory most likely; "
-            "build again with fewer --jobs, what is whole is kept"
+            "try again with fewer --jobs; of a build, what is whole is kept"
         ) from error
 
 

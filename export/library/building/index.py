@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -16,12 +17,11 @@ from ...formats.registry import FORMATS, generator
 from ...writing.records import number
 from ..documents import check_point
 from ..documents.citation import PAPER, REFERENCES, Terms, cited
-from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, as_bytes, read_about, read_sidecar
+from ..documents.documents import INDEX, INDEX_FORMAT, VERSION, about_file, as_bytes, read_about, read_sidecar
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import read_ledger
 from ..plan.recipe import InstancePlan
 from ..plan.spec import RUNGS, Spec
-from .instance_task import about_file
 
 CHECKER: Final = "check_point.py"
 CERTIFICATES: Final = "check_certificate.py"
@@ -93,10 +93,13 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell of a rung: sizes, number of entries, and how many have a proven optimum."""
+    """What the texts tell of a rung: sizes, share of strokes, numbers of entries, optima and grades."""
     sizes = sorted({each["source"]["size"] for each in sidecars})
     proven = sum(each["status"] == "optimal" for each in sidecars)
-    return {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven}
+    density = sum(each["density"] for each in sidecars) / max(len(sidecars), 1)
+    grades = Counter(each["difficulty"] for each in sidecars)
+    told = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
+    return told | {"density": f"{density:.2f}"}
 
 
 def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ....models.storage import read_bytes
+from ..ledger.given import Points, nothing
 from ..ledger.ledger import Ledger, Record
 from ..ledger.points import Provenance
 from ..plan.recipe import InstancePlan
@@ -15,17 +16,17 @@ from .instance_task import Preparation, Submitted
 
 
 class Inputs:
-    """The tasks of a library of these plans with this ledger."""
+    """The tasks of a library of these plans with this ledger and given points."""
 
-    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan]) -> None:
-        self.ledger, self.plans = ledger, tuple(plans)
+    def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = nothing) -> None:
+        self.ledger, self.plans, self.points = ledger, tuple(plans), points
         self._relatives: dict[str, list[str]] = {}
         for each in self.plans:
             self._relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
 
     def preparation(self, each: InstancePlan) -> Preparation:
         """The task of an instance. Raises InputError, InstanceError for a damaged field of the ledger."""
-        return Preparation(each.recipe, self._submitted(each))
+        return Preparation(each.recipe, self._submitted(each), self.points(each.recipe.name))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
         """The tasks of its entries. Raises as `preparation`, InputError for a file that is missing."""

@@ -14,15 +14,24 @@ from typing import Any, Final
 
 from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
-from ....models.field.file import read_field, write_field
+from ....models.field.file import write_field
 from ....models.instance.file import to_json
 from ....models.instance.instance import Instance
 from ....models.search.box_qp import fitted
 from ...formats.registry import generator
-from ..documents.documents import ABOUT_FORMAT, VERSION, as_bytes
+from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
-from ..ledger.certificates import Certified, certified
-from ..ledger.points import Known, Provenance, baseline_field, least_energy, ours, searched_field
+from ..ledger.certificates import certified
+from ..ledger.given import Given
+from ..ledger.points import (
+    Known,
+    Provenance,
+    baseline_field,
+    field_from,
+    least_energy,
+    ours,
+    searched_field,
+)
 from ..ledger.search_1norm import better_in_1norm
 from ..plan.recipe import InstanceRecipe, digest
 from ..plan.sources import RAGGED_SHARE, STROKE_SHARE, instance_from, kind_of
@@ -43,18 +52,16 @@ class Submitted:
 
     def known(self) -> Known:
         """The field."""
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-            path = Path(folder) / "submitted.field.json"
-            path.write_bytes(self.data)
-            return Known(read_field(path), self.provenance)
+        return Known(field_from(self.data), self.provenance)
 
 
 @dataclass(frozen=True)
 class Preparation:
-    """The task of an instance: its recipe, and the fields that the ledger has for its entries."""
+    """The task of an instance: its recipe, the fields that the ledger has for its entries, given points."""
 
     recipe: InstanceRecipe
     submitted: tuple[Submitted, ...] = ()
+    given: Given | None = None
 
     @property
     def name(self) -> str:
@@ -64,13 +71,20 @@ class Preparation:
     @property
     def sha256(self) -> str:
         """Stands for all that its files depend on."""
-        given = [[hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted]
-        return digest([generator(), self.recipe.document(), given])
+        submitted = [
+            [hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted
+        ]
+        given = [] if self.given is None else [self.given.sha256]
+        return digest([generator(), self.recipe.document(), submitted, *given])
 
 
-def about_file(instance: str) -> str:
-    """Name of the file that says what is known of an instance; it is written last."""
-    return f"{instance}.about.json"
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was found of an instance: the baseline, fields of low energy, bytes and facts of a certificate."""
+
+    baseline: Known
+    low: list[Known]
+    certificate: tuple[bytes, dict[str, Any]] | None
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
@@ -84,9 +98,9 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
 def prepare(task: Preparation) -> Files:
     """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
-    searched = searched_field(instance)
-    proven = certified(searched.field) if task.recipe.prove and not len(instance.crossings) else None
-    chosen = _chosen(instance, task, [searched, *([proven.known] if proven else [])])
+    given = task.given if task.given and task.given.instance == instance.sha256 else None
+    found = _searched(instance, task.recipe) if given is None else _given(given, task.recipe)
+    chosen = _chosen(instance, task, found)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(ROLES):
@@ -97,18 +111,34 @@ def prepare(task: Preparation) -> Files:
             files[name] = field_bytes(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    certificate = _certificate(proven, task, files)
+    certificate = _certificate(found, task, files)
     about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
     return files | {about_file(task.name): as_bytes(about)}
 
 
-def _certificate(proven: Certified | None, task: Preparation, files: Files) -> dict[str, Any]:
+def _searched(instance: Instance, recipe: InstanceRecipe) -> _Found:
+    """What a search, a proof where the recipe wants it, and HiGHS in the 1-norm find."""
+    searched = searched_field(instance)
+    proven = certified(searched.field) if recipe.prove and not len(instance.crossings) else None
+    found = better_in_1norm(searched.field, recipe.rung)
+    staged = [Known(fitted(each.field), ours("two stages")) for each in found]
+    low = [searched, *([proven.known] if proven else []), *found, *staged]
+    return _Found(baseline_field(instance), low, (proven.data, proven.facts) if proven else None)
+
+
+def _given(given: Given, recipe: InstanceRecipe) -> _Found:
+    """What is given, without any search."""
+    low = [given.field("least_2"), given.field("least_1")]
+    return _Found(given.field("baseline"), low, given.certificate if recipe.prove else None)
+
+
+def _certificate(found: _Found, task: Preparation, files: Files) -> dict[str, Any]:
     """What is told of the certificate, which is among the files now; nothing where there is none."""
-    if proven is None:
+    if found.certificate is None:
         return {}
     name = f"{task.name}.certificate.npz"
-    files[name] = proven.data
-    return {"certificate": {"file": name, **proven.facts}}
+    files[name], facts = found.certificate
+    return {"certificate": {"file": name, **facts}}
 
 
 def field_bytes(field: CrossField) -> bytes:
@@ -117,23 +147,15 @@ def field_bytes(field: CrossField) -> bytes:
         return write_field(field, Path(folder) / "a.field.json").read_bytes()
 
 
-def _chosen(instance: Instance, task: Preparation, low: list[Known]) -> dict[str, Known]:
-    """The field of each role; not the ledger but the instance decides on the baseline, for `qp-fixed`.
-
-    low: fields of low 2-norm energy, the searched one first.
-    """
-    baseline = baseline_field(instance)
-    found = better_in_1norm(low[0].field, task.recipe.rung)
-    staged = [Known(fitted(each.field), ours("two stages")) for each in found]
+def _chosen(instance: Instance, task: Preparation, found: _Found) -> dict[str, Known]:
+    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`."""
     submitted = [each.known() for each in task.submitted]
     known = [
-        baseline,
-        *low,
-        *found,
-        *staged,
+        found.baseline,
+        *found.low,
         *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
     ]
-    return {"baseline": baseline, "least_1": least_energy(known, 1), "least_2": least_energy(known, 2)}
+    return {"baseline": found.baseline, "least_1": least_energy(known, 1), "least_2": least_energy(known, 2)}
 
 
 def _same(first: CrossField, second: CrossField) -> bool:
@@ -142,7 +164,8 @@ def _same(first: CrossField, second: CrossField) -> bool:
 
 
 def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files: Files) -> dict[str, Any]:
-    return {
+    given = {} if task.given is None else {"given": task.given.sha256}
+    return given | {
         "format": ABOUT_FORMAT,
         "version": VERSION,
         "name": task.name,

@@ -6,7 +6,9 @@ Nothing that a file says is believed: problems are formulated again from their i
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
@@ -21,15 +23,16 @@ from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
 from ..building.entry_task import Entry
+from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..building.instance_task import about_file
 from ..documents import check_point
 from ..documents.archive import opened
 from ..documents.citation import cited
-from ..documents.documents import INDEX, Library, read_about, read_library, read_sidecar
+from ..documents.documents import INDEX, Library, about_file, read_about, read_library, read_sidecar
 from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
+from ..ledger.given import points_of
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
@@ -44,33 +47,36 @@ REMOVE: Final = "remove it"
 PLAIN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 """Names of files that a library may hold."""
 
+Checked = tuple[dict[str, Any] | None, list[Finding]]
+
+_AHEAD: Final = 16  # entries a process that are handed out at once: the first one may be the slowest
 _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 _FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
 
 
-def verify_library(folder: str | Path, *, progress: Progress = silent) -> list[Finding]:
+def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
     """What is wrong with a library in a folder or an archive; nothing when all is as it should be.
 
-    progress: called with a line for each step. Nobody changes the folder meanwhile. Raises InputError when
-    there is no library, OutputError when another process works on it for too long.
+    jobs: processes; progress: called with a line for each step. Nobody changes the folder meanwhile. Raises
+    InputError when there is no library, OutputError when another process works on it for too long.
     """
     with opened(folder) as place:
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
             raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
         with unchanged(place, "a verification of the library", progress):
-            return list(findings_in(place, progress))
+            return list(findings_in(place, jobs=jobs, progress=progress))
 
 
-def findings_in(folder: Path, progress: Progress = silent) -> Iterator[Finding]:
+def findings_in(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Iterator[Finding]:
     """As `verify_library`, of a folder whose lock the caller holds."""
-    return _Verification(folder, progress).findings()
+    return _Verification(folder, jobs, progress).findings()
 
 
 class _Verification:
     """A verification under way: files that are there, that are damaged, and that belong."""
 
-    def __init__(self, folder: Path, progress: Progress) -> None:
-        self.folder, self.progress = folder, progress
+    def __init__(self, folder: Path, jobs: int, progress: Progress) -> None:
+        self.folder, self.jobs, self.progress = folder, jobs, progress
         self.present: set[str] = set()
         self.damaged: set[str] = set()
         self.known = {SUMS, INDEX, LEDGER, SOLU, CHECKER, *TEXTS}
@@ -194,18 +200,9 @@ class _Verification:
         yield from self._ledger(ledger, library)
         inputs, sidecars, sound = self._inputs(library, ledger), [], True
         names = library.document["entries"]
-        for number, name in enumerate(names, 1):
-            self.progress(f"{number} of {len(names)}: {name}")
-            self.known.add(f"{name}.json")
-            try:
-                sidecar = read_sidecar(self.folder / f"{name}.json")
-            except CrossfieldError as error:
-                yield of_error(error, f"{name}.json")
-                continue
-            sidecars.append(sidecar)
-            self.known |= {file["name"] for file in sidecar["files"]}
-            wrong = list(self._entry(name, sidecar, ledger, inputs))
+        for sidecar, wrong in self._each(names, ledger, inputs):
             yield from wrong
+            sidecars += [] if sidecar is None else [sidecar]
             sound = sound and not wrong
         yield from self._instances(sidecars, inputs)
         if CERTIFICATES in self.known:
@@ -217,7 +214,7 @@ class _Verification:
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
         """What the library was made of; None when its specification is damaged, told with the index."""
         try:
-            return Inputs(ledger, plan(library.spec))
+            return Inputs(ledger, plan(library.spec), points_of(self.folder))
         except CrossfieldError:
             return Inputs(ledger, ())
 
@@ -246,16 +243,40 @@ class _Verification:
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")
 
-    def _entry(self, name: str, sidecar: dict[str, Any], ledger: Ledger, inputs: Inputs) -> Iterator[Finding]:
-        if sidecar["name"] != name:
-            yield Finding(f"{name}.json", f"says that it is of {sidecar['name']}")
-        lost = list(self._listed(f"{name}.json", sidecar["files"]))
-        yield from lost
+    def _each(self, names: list[str], ledger: Ledger, inputs: Inputs) -> Iterator[Checked]:
+        """Each entry in order: its sidecar, None where it is damaged, and what is wrong with it."""
+        most = 1 if self.jobs == 1 else _AHEAD * self.jobs
+        under_way: deque[tuple[Checked, Future[list[Finding]] | None]] = deque()
+        with executor(self.jobs, None) as chosen:
+            for number, name in enumerate(names, 1):
+                self.progress(f"{number} of {len(names)}: {name}")
+                sidecar, wrong = self._sidecar(name)
+                future = None
+                if sidecar is not None and self._has_all(name, sidecar, wrong):
+                    task = self._task(name, inputs)
+                    future = chosen.submit(_verified, self.folder, sidecar, ledger, task)
+                under_way.append(((sidecar, wrong), future))
+                if len(under_way) >= most:
+                    yield _ended(*under_way.popleft())
+            while under_way:
+                yield _ended(*under_way.popleft())
+
+    def _sidecar(self, name: str) -> Checked:
+        """The sidecar of an entry, and what is wrong with it by itself."""
+        self.known.add(f"{name}.json")
         try:
-            if not lost:
-                yield from verify_entry(self.folder, sidecar, ledger, self._task(name, inputs))
-        except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
-            yield Finding(f"{name}.json", "holds values that no entry can have")
+            sidecar = read_sidecar(self.folder / f"{name}.json")
+        except CrossfieldError as error:
+            return None, [of_error(error, f"{name}.json")]
+        self.known |= {file["name"] for file in sidecar["files"]}
+        of = sidecar["name"]
+        return sidecar, [] if of == name else [Finding(f"{name}.json", f"says that it is of {of}")]
+
+    def _has_all(self, name: str, sidecar: dict[str, Any], wrong: list[Finding]) -> bool:
+        """Whether all files of an entry are there as listed; those that are not are told."""
+        lost = list(self._listed(f"{name}.json", sidecar["files"]))
+        wrong += lost
+        return not lost
 
     def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
         """Every file that a document lists is there, with the size and the checksum that it says."""
@@ -386,6 +407,22 @@ class _Verification:
                 expected[sidecar["name"], "bestdual"] = sidecar["bound"]
         for name, tag in sorted({key for key, _ in told.items() ^ expected.items()}):
             yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says")
+
+
+def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None) -> list[Finding]:
+    """What is wrong with an entry, whatever its sidecar says."""
+    found: list[Finding] = []
+    try:
+        found.extend(verify_entry(folder, sidecar, ledger, task))
+    except (ArithmeticError, LookupError, ValueError):  # obeys the schema, and is nonsense all the same
+        found.append(Finding(f"{sidecar['name']}.json", "holds values that no entry can have"))
+    return found
+
+
+def _ended(known: Checked, future: Future[list[Finding]] | None) -> Checked:
+    """The same with what a process found, once it has."""
+    sidecar, wrong = known
+    return sidecar, [*wrong, *(future.result() if future else [])]
 
 
 def _text(path: Path) -> str:

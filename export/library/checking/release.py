@@ -90,7 +90,7 @@ def _top(library: Library) -> str:
 
 
 def _check(folder: Path, progress: Progress) -> None:
-    found = list(findings_in(folder, progress))
+    found = list(findings_in(folder, progress=progress))
     if found:
         more = f" ({len(found) - 1} more)" if found[1:] else ""
         raise InputError(

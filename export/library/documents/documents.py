@@ -87,6 +87,11 @@ def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
     return read_document(path, form, VERSION, schema, __package__, remedy="build the library again")
 
 
+def about_file(instance: str) -> str:
+    """Name of the file that says what is known of an instance; it is written last."""
+    return f"{instance}.about.json"
+
+
 def as_bytes(document: dict[str, Any]) -> bytes:
     """A document as the bytes of its file."""
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

@@ -31,6 +31,11 @@ def sizes(instance: Instance) -> dict[str, int]:
     }
 
 
+def density(instance: Instance) -> float:
+    """The share of the pixels that are strokes, to four decimals."""
+    return round(len(instance.theta) / instance.grid.size, 4)
+
+
 def counts(problem: Problem) -> dict[str, int]:
     """Numbers of columns, rows, nonzeros and terms by kind."""
     return _columns(problem) | _rows(problem) | _terms(problem)

@@ -8,6 +8,7 @@ Read from TOML and checked.
     formulations = ["..."]             all by default
     gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
     ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
+    points = "points.zip"              fields and certificates by `crossfield library points`; may be left out
 
     [release]                          what is cited; may be left out
     version = "1.0", date = "2026-11-22", authors = ["A. Name"]
@@ -145,13 +146,18 @@ class Sketch:
 
 @dataclass(frozen=True)
 class Spec:
-    """A checked specification. ledger: the file of a ledger that the build takes as input, or None."""
+    """A checked specification.
+
+    ledger: the file of a ledger that the build takes as input, or None; points: a folder or an archive of
+    fields and certificates that are not to be searched for, or None.
+    """
 
     title: str
     formulations: tuple[str, ...]
     rungs: tuple[Rung, ...]
     sketches: tuple[Sketch, ...]
     ledger: Path | None = None
+    points: Path | None = None
     release: Release | None = None
 
     def document(self) -> dict[str, Any]:
@@ -266,8 +272,11 @@ def _spec(document: dict[str, Any], folder: Path) -> Spec:
     ledger = folder / document["ledger"] if "ledger" in document else None
     if ledger is not None and not ledger.is_file():
         raise InputError(f"ledger: there is no file {ledger.name}; leave the key out, or give a ledger.json")
+    points = folder / document["points"] if "points" in document else None
+    if points is not None and not points.exists():
+        raise InputError(f"points: there is no {points.name}; leave the key out, or give a library's points")
     release = Release.of(document["release"]) if "release" in document else None
-    return Spec(document["title"], formulations, rungs, sketches, ledger, release)
+    return Spec(document["title"], formulations, rungs, sketches, ledger, points, release)
 
 
 def _formulations(document: dict[str, Any]) -> tuple[str, ...]:

@@ -31,8 +31,7 @@ from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
 from ...pictures.svg import field_picture, instance_picture, thumbnail, told
 from ..building.index import SOLU, SUMS
-from ..building.instance_task import about_file
-from ..documents.documents import Library, read_about, read_library
+from ..documents.documents import Library, about_file, read_about, read_library
 from ..documents.mathematics import model
 from ..plan.spec import RUNGS
 from .study import study

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents.documents import read_library
+from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.ledger.ledger import Record, read_ledger, write_ledger
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
@@ -49,13 +50,17 @@ def test_a_build_tells_of_records_that_do_not_count(tmp_path, capsys, sha256, to
 def test_every_record_that_ships_counts():
     spec = default_spec()
     ledger = read_ledger(spec.ledger.parent, spec.ledger.name)
+    points = read_points(spec.points)
     shas = {record.entry: record.problem_sha256 for record in ledger.records}
     counted = 0
     for each in plan(spec):
         recorded = [entry for entry in each.entries if entry.name in shas]
         instance = instance_from(each.recipe) if recorded else None
         for entry in recorded:
-            options = {"facet": entry.facet} if "facet" in FORMULATIONS[entry.formulation].settable else {}
+            recipe = FORMULATIONS[entry.formulation]
+            options = {"facet": entry.facet} if "facet" in recipe.settable else {}
+            if recipe.fixed:
+                options["p"] = points(each.recipe.name).field("baseline").field.p
             assert formulate(instance, entry.formulation, **options).sha256 == shas[entry.name], entry.name
             counted += 1
     assert counted == len(shas) > 50

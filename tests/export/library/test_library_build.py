@@ -28,6 +28,7 @@ from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.contributions.solve import solve_library
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.documents.statistics import tangent_bound
+from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point, field_of
 from crossfield.export.library.ledger.search_1norm import better_in_1norm
@@ -781,13 +782,15 @@ def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothi
     spec = default_spec()
     ledger = read_ledger(spec.ledger.parent)
     recipes = {entry.name: (each.recipe, entry) for each in plan(spec) for entry in each.entries}
-    instances = {}
+    points, instances = read_points(spec.points), {}
     assert len(ledger.records) > 50
     for record in ledger.records:
         recipe, entry = recipes[record.entry]
         instance = instances.setdefault(recipe.name, instance_from(recipe))
-        facet = {"facet": entry.facet} if "facet" in FORMULATIONS[entry.formulation].settable else {}
-        problem = formulate(instance, entry.formulation, **facet)
+        options = {"facet": entry.facet} if "facet" in FORMULATIONS[entry.formulation].settable else {}
+        if FORMULATIONS[entry.formulation].fixed:
+            options["p"] = points(recipe.name).field("baseline").field.p
+        problem = formulate(instance, entry.formulation, **options)
         assert record.problem_sha256 == problem.sha256
         assert record.bound is None or record.bound <= record.primal * (1 + 1e-6) + 1e-9
         if record.point is not None:
@@ -795,7 +798,7 @@ def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothi
             assert problem.violation(point).worst <= 1e-12
             assert problem.objective_value(point) == pytest.approx(record.primal, rel=1e-12)
     named = {record.point for record in ledger.records if record.point is not None}
-    assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json"}
+    assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json", "points.zip"}
 
 
 @pytest.mark.slow

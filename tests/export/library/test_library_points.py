@@ -1,0 +1,275 @@
+"""Points that a specification brings: a build with them searches for nothing and is the same everywhere."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building.build import build
+from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.contributions.submit import submit_point
+from crossfield.export.library.documents.documents import read_about, read_library
+from crossfield.export.library.ledger.difficulty import EASY, difficulty
+from crossfield.export.library.ledger.given import ROLES, read_points
+from crossfield.export.library.ledger.ledger import Record
+from crossfield.export.library.plan.recipe import plan
+from crossfield.export.library.plan.sources import instance_from
+from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.models.errors import InputError
+from processors import PROCESSORS
+
+pytestmark = pytest.mark.usefixtures("short_searches")
+
+SPEC = """
+format = "crossfield-library-spec"
+version = 1
+title = "A test"
+{more}
+
+[rungs.tiny]
+sizes = [3]
+gauges = ["strokes", "box"]
+facets = ["hull", "printed"]
+compress = true
+
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+
+[[sketches]]
+name = "saddle"
+sample = "saddle"
+sizes = {{ tiny = [4] }}
+"""
+STEM, SADDLE = "cf_rand_n003_s1", "cf_saddle_n004_box"
+
+
+def write_spec(folder, more=""):
+    path = folder / "spec.toml"
+    path.write_text(SPEC.format(more=more))
+    return path
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def worsened(path):
+    """The 2-norm energy of the greedy field, now told to be the best known one; it is not."""
+    about = read_about(path)
+    poor = about["fields"]["baseline"]
+    assert poor["energy_2norm"] > about["fields"]["least_2"]["energy_2norm"] + 1e-6
+    about["fields"] = dict.fromkeys(ROLES, poor)
+    path.write_text(json.dumps(about))
+    return poor["energy_2norm"]
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """A library whose points were searched for; not to be changed."""
+    folder = tmp_path_factory.mktemp("searched")
+    return build(read_spec(write_spec(folder)), folder / "lib").folder
+
+
+@pytest.fixture(scope="module")
+def spec(searched, tmp_path_factory):
+    """A specification with the points of that library."""
+    folder = tmp_path_factory.mktemp("points")
+    command = ["library", "points", str(searched), "-o", str(folder / "points.zip"), "--quiet"]
+    assert invoke(command) == 0
+    return write_spec(folder, 'points = "points.zip"')
+
+
+def on(processor, *arguments):
+    """Nothing, after a command ran as on another processor."""
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor
+    command = [sys.executable, "-W", "ignore", "-m", "crossfield", "library", *map(str, arguments)]
+    subprocess.run(command, env=environment, check=True, capture_output=True)
+
+
+@pytest.mark.slow
+def test_a_library_with_points_is_the_same_on_every_processor_and_verifies_there(spec, tmp_path):
+    first, *others = (tmp_path / str(number) for number in range(len(PROCESSORS)))
+    for processor, folder in zip(PROCESSORS, (first, *others), strict=True):
+        on(processor, "build", spec, "-o", folder, "--quiet")
+    for folder in others:
+        assert content(folder) == content(first)
+    on(PROCESSORS[-1], "verify", first)
+
+
+@pytest.mark.slow
+def test_what_is_given_is_what_is_told_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
+    made = build(read_spec(spec), tmp_path / "lib").folder
+    assert verify_library(made) == []
+    before, after = content(searched), content(made)
+    assert before.keys() == after.keys()
+    told = {name for name in before if before[name] != after[name]}
+    assert all(name.endswith(".json") or name == "SHA256SUMS" for name in told)
+    about = read_about(made / f"{STEM}.about.json")
+    old = read_about(searched / f"{STEM}.about.json")
+    assert all(about[key] == old[key] for key in ("fields", "certificate", "files"))
+    assert "given" in about
+    assert "given" not in old
+
+
+@pytest.mark.slow
+def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
+    """Given the greedy field as the best, it stays the best, and nothing is proven."""
+    known = shutil.copytree(searched, tmp_path / "known")
+    poor = worsened(known / f"{SADDLE}.about.json")
+    about = read_about(known / f"{STEM}.about.json")
+    del about["certificate"]
+    (known / f"{STEM}.about.json").write_text(json.dumps(about))
+    made = build(read_spec(write_spec(tmp_path, 'points = "known"')), tmp_path / "lib").folder
+    fields = read_about(made / f"{SADDLE}.about.json")["fields"]
+    assert {each["energy_2norm"] for each in fields.values()} == {poor}
+    assert read_library(made).entry(f"{STEM}_exact")["bounds"] == []
+
+
+@pytest.mark.slow
+def test_a_submission_keeps_what_was_given_and_another_build_comes_to_the_same(searched, tmp_path):
+    """A library of poor points takes a better one; its own points are then those that are given."""
+    known = shutil.copytree(searched, tmp_path / "known")
+    worsened(known / f"{SADDLE}.about.json")
+    spec = write_spec(tmp_path, 'points = "known"')
+    made = build(read_spec(spec), tmp_path / "lib").folder
+    assert submit_point(searched / f"{SADDLE}_exact.sol", made).better
+    assert verify_library(made) == []
+    other = tmp_path / "other"
+    other.mkdir()
+    for path in (made / "ledger.json", *made.glob("cf_*_exact.field.json")):
+        shutil.copy(path, other)
+    assert content(build(read_spec(spec), other).folder) == content(made)
+
+
+@pytest.mark.slow
+def test_points_of_another_instance_do_not_count_and_are_told(spec, searched, tmp_path):
+    text = spec.read_text().replace("seeds = [1]", "seeds = [2]").replace("points.zip", "known")
+    known = shutil.copytree(searched, tmp_path / "known")
+    other = "cf_rand_n003_s2"
+    for path in [*known.glob(f"{STEM}.*"), *known.glob(f"{STEM}_box.*")]:
+        renamed = path.read_bytes()
+        if path.name.endswith(".about.json"):
+            renamed = renamed.replace(STEM.encode(), other.encode())
+        path.with_name(path.name.replace(STEM, other)).write_bytes(renamed)
+    (tmp_path / "spec.toml").write_text(text)
+    lines = []
+    made = build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib", progress=lines.append).folder
+    assert [line for line in lines if "another instance" in line] == [
+        f"{name}: the points given are of another instance; searched for others"
+        for name in (f"{other}_box", other)
+    ]
+    assert verify_library(made) == []
+
+
+@pytest.mark.slow
+def test_points_that_are_missing_or_damaged_are_refused(searched, spec, tmp_path):
+    with pytest.raises(InputError, match=r"points: there is no points\.zip"):
+        read_spec(write_spec(tmp_path, 'points = "points.zip"'))
+    archive = tmp_path / "points.zip"
+    archive.write_bytes((spec.parent / "points.zip").read_bytes()[:-40])
+    with pytest.raises(InputError, match=r"points\.zip: is no archive, or damaged"):
+        build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
+    assert not (tmp_path / "lib").exists()
+    known = shutil.copytree(searched, tmp_path / "known")
+    (known / f"{STEM}.field.json").write_text("{}")
+    with pytest.raises(InputError, match=rf"lists {STEM}\.field\.json, which is missing or another file"):
+        read_points(known)
+
+
+@pytest.mark.slow
+def test_the_same_points_are_the_same_archive(searched, spec, tmp_path):
+    assert invoke(["library", "points", str(searched), "-o", str(tmp_path / "again.zip"), "--quiet"]) == 0
+    assert (tmp_path / "again.zip").read_bytes() == (spec.parent / "points.zip").read_bytes()
+    with zipfile.ZipFile(tmp_path / "again.zip") as archive:
+        assert {name.split(".", 1)[1] for name in archive.namelist()} >= {"about.json", "certificate.npz"}
+        assert not [name for name in archive.namelist() if name.endswith((".instance.json", ".mps.gz"))]
+
+
+# The library that ships
+
+
+@pytest.mark.slow
+def test_the_points_that_ship_are_about_the_shipped_instances():
+    """None has to be searched for, and every instance whose optimum is to be proven has its certificate."""
+    spec = default_spec()
+    assert spec.points.stat().st_size < 3_000_000
+    points = read_points(spec.points)
+    for each in plan(spec):
+        given = points(each.recipe.name)
+        assert given.instance == instance_from(each.recipe).sha256
+        for role in ROLES:
+            field, facts = given.field(role).field, given.about["fields"][role]
+            assert field.instance.sha256 == given.instance
+            assert [field.energy(2).total, field.energy(1).total] == [
+                facts["energy_2norm"],
+                facts["energy_1norm"],
+            ]
+        assert each.recipe.prove == (given.certificate is not None)
+        assert not each.recipe.prove or given.certificate[1]["status"] == "optimal"
+
+
+@pytest.mark.slow
+def test_there_is_something_to_extrapolate_on_every_rung():
+    shares = {"tiny": [], "small": [], "medium": [], "large": []}
+    for each in plan(default_spec()):
+        instance = instance_from(each.recipe)
+        shares[each.recipe.rung].append(len(instance.theta) / instance.grid.size)
+    assert max(map(max, shares.values())) <= 0.5
+    means = {rung: sum(found) / len(found) for rung, found in shares.items()}
+    assert max(means.values()) < 0.35
+    assert means["large"] < 0.25
+
+
+# Grades
+
+
+def run(**more):
+    facts = {"status": "optimal", "threads": 1, "seconds": EASY} | more
+    return Record("cf_a_n004_milp", "0" * 64, "HiGHS", "1", **facts)
+
+
+@pytest.mark.parametrize(
+    "status, runs, tangent, grade",
+    [
+        ("best known", [run(status="limit")], False, "open"),
+        ("optimal", [run()], False, "easy"),
+        ("claimed", [run()], False, "easy"),
+        ("optimal", [], True, "easy"),
+        ("optimal", [], False, "hard"),
+        ("optimal", [run(seconds=EASY + 1), run(threads=4), run(seconds=None)], False, "hard"),
+        ("optimal", [run(status="limit", seconds=1.0)], False, "hard"),
+    ],
+)
+def test_grades_follow_the_runs_on_an_entry(status, runs, tangent, grade):
+    assert difficulty(status, runs, tangent=tangent) == grade
+
+
+@pytest.mark.slow
+def test_sidecars_tell_density_and_difficulty(searched):
+    entry = read_library(searched).entry(f"{STEM}_exact")
+    assert entry["density"] == round(entry["instance"]["strokes"] / entry["instance"]["pixels"], 4)
+    assert entry["difficulty"] == "hard"
+    assert read_library(searched).entry(f"{STEM}_qp")["difficulty"] == "easy"
+    assert read_library(searched).entry(f"{STEM}_milp")["difficulty"] == "open"
+
+
+@pytest.mark.slow
+def test_two_processes_find_what_one_finds(searched, tmp_path):
+    lib = shutil.copytree(searched, tmp_path / "lib")
+    (lib / f"{STEM}_milp.sol").unlink()
+    (lib / f"{SADDLE}_exact.json").write_text("{}")
+    path = lib / f"{STEM}_cubic.json"
+    path.write_text(path.read_text().replace('"difficulty": "hard"', '"difficulty": "easy"'))
+    one, two = [], []
+    found = verify_library(lib, progress=one.append)
+    assert verify_library(lib, jobs=2, progress=two.append) == found
+    assert one == two
+    told = {(finding.file, finding.what) for finding in found}
+    words = "tells another difficulty than follows from its instance and the ledger"
+    assert (f"{STEM}_cubic.json", words) in told
