@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.library.building.build import build
-from crossfield.export.library.documents import documents
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import write_site
@@ -121,10 +120,7 @@ def told(library, tmp_path_factory):
     }
     (folder / "library.json").write_text(json.dumps(index | {"release": release}))
     seal(folder)
-    with pytest.MonkeyPatch.context() as patch:
-        # The keys are those of later schemas, too.
-        patch.setattr(documents, "read_document", lambda path, *_, **__: json.loads(Path(path).read_text()))
-        write_site(folder, folder.parent / "site")
+    write_site(folder, folder.parent / "site")
     return folder.parent / "site"
 
 
