@@ -175,7 +175,6 @@ class Work:
     norm: ClassVar[Norm] = 2
     first = staticmethod(first_of)
     improve = staticmethod(improve)
-    improved = staticmethod(improved)
     forced = staticmethod(forced)
 
     instance: Instance
@@ -189,6 +188,10 @@ class Work:
     searched: bool = False
     searches: int = 0
     began: float = 0.0
+
+    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+        """The field, with jumps and angles improved."""
+        return improved(field, over)
 
     def energy(self, field: CrossField) -> float:
         """The energy that the proof is of."""

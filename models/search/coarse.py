@@ -22,7 +22,7 @@ from .free_field import FreeField
 from .improvement import improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
-_CREEP: Final = 5e-4  # relative fall of the energy in a round: less is not worth a round on a fine grid
+_CREEP: Final = 1e-3  # relative fall of the energy in a round: less is not worth a round on a fine grid
 
 
 def halved(instance: Instance) -> Instance | None:
@@ -55,7 +55,7 @@ def halved(instance: Instance) -> Instance | None:
 
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
-    return improved(grown(coarse, instance, over), over)
+    return improved(grown(coarse, instance, over), over, enough=_CREEP)
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:

@@ -24,14 +24,16 @@ from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
 from .nearest_stroke import chamfer, nearest_strokes
 
+FALL: Final = 1e-9
+"""Of the energy, relative to 1 + energy: less may be rounding."""
+
 _SETTLED: Final = 1e-4  # slope left while jumps still change
-_FALL: Final = 1e-9  # of the energy, relative to 1 + energy: less may be rounding
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
 _MOST_CURVES: Final = 40  # that may change their family, those first that miss their strokes most
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
 
 
-def improved(field: CrossField, over: Over = never) -> CrossField:
+def improved(field: CrossField, over: Over = never, *, enough: float = FALL) -> CrossField:
     """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
 
     Its 2-norm energy is at most that of the one given.
@@ -39,18 +41,18 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
     turning seldom pays.
     At most 40 curves are tried, the worst first. over: says whether the time is over; then the best field so
-    far comes back.
+    far comes back. enough: as for `settle`, before curves are turned.
     The energy is that of docs/mathematics.md, 5; deterministic.
     """
     state, solver = FreeField.of(field), LinearSolver()
-    settle(state, solver, over)
+    settle(state, solver, over, enough=enough)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)
     found = state.bounded(over)
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = _FALL) -> None:
+def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
     """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts.
 
     enough: relative fall of the energy in a round below which no more rounds follow. Singularities creep by a
@@ -65,7 +67,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
         state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
         fall = (least - reached) / (1 + reached)
-        if fall >= _FALL:
+        if fall >= FALL:
             kept, least = (state.x, state.p), reached
         if fall < enough:
             break
