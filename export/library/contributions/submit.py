@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError, SolutionError
+from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem, Violation
 from ....models.processes.progress import Progress, silent
 from ....models.storage import read_bytes
@@ -108,12 +109,7 @@ def _submitted(
     progress: Progress,
 ) -> Submission:
     """What happened to a point, by a caller who holds the lock of the library."""
-    sidecar, problem, solution = found_in(file, library, entry)
-    check_feasible(file, sidecar["name"], problem, solution)
-    assert solution.point is not None
-    field = field_of(solution.problem, solution.point)
-    objective = problem.objective_value(complete_point(problem, field))
-    check_bound(file, sidecar, objective)
+    sidecar, problem, field, objective = checked_point(file, library, entry)
     known = sidecar["best"]["objective"]
     better = is_better(objective, known)
     if better:
@@ -150,7 +146,23 @@ def settled(library: Library, progress: Progress) -> Library:
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
-def found_in(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:
+def checked_point(
+    file: Path, library: Library, entry: str | None
+) -> tuple[dict[str, Any], Problem, CrossField, float]:
+    """The entry of a solution file, its problem, the field of its point, and the objective of that.
+
+    Raises SolutionError for a point that is not feasible, or that a dual bound of the library contradicts.
+    """
+    sidecar, problem, solution = _found_in(file, library, entry)
+    _check_feasible(file, sidecar["name"], problem, solution)
+    assert solution.point is not None
+    field = field_of(solution.problem, solution.point)
+    objective = problem.objective_value(complete_point(problem, field))
+    _check_bound(file, sidecar, objective)
+    return sidecar, problem, field, objective
+
+
+def _found_in(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:
     """The sidecar and the problem of the entry that a file is of, and the solution that it holds."""
     raw = read_raw(file)
     if not raw.has_point:
@@ -203,7 +215,7 @@ def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Librar
     return found.unknown == 0 and (beyond or not found.problem.formulation.lifted)
 
 
-def check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
+def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
     """Nothing, when angles and jumps are feasible. Raises SolutionError with the worst violations.
 
     Every other column follows from them and is computed again, so that a solver's tolerance in those rows
@@ -229,7 +241,7 @@ def _violation(problem: Problem, solution: Solution) -> Violation:
     return replace(completed, integrality=solution.violation.integrality)
 
 
-def check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
+def _check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
     """Nothing, when no dual bound lies above the objective of a feasible point. Raises SolutionError."""
     bound = sidecar["bound"]
     if bound is not None and contradicts(bound, objective):

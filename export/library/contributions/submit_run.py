@@ -30,15 +30,12 @@ from ..documents.documents import Library, problem_of
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts, slack
 from ..ledger.ledger import Evidence, Record, RunStatus, add_record, log_file, read_ledger
-from ..ledger.points import complete_point, field_of
 from ..ledger.standing import MAKERS, best_of_each
 from .submit import (
     UNKNOWN,
     by_name,
-    check_bound,
-    check_feasible,
     check_texts,
-    found_in,
+    checked_point,
     is_better,
     settled,
     writable_library,
@@ -154,7 +151,7 @@ def _checked(
     name = entry or (None if said is None or point is not None else _entry_of(Path(str(log)), said, library))
     objective, field = None, None
     if point is not None:
-        sidecar, problem, field, objective = _point(Path(point), library, name)
+        sidecar, problem, field, objective = checked_point(Path(point), library, name)
     elif name is None:
         raise InputError("say of which entry it is: --entry NAME")
     else:
@@ -171,19 +168,6 @@ def _checked(
     record = _record(sidecar["name"], problem, told, said, content, found=(objective, bound, evidence))
     better = objective is not None and is_better(objective, known)
     return record, field if better else None, content, sidecar
-
-
-def _point(
-    file: Path, library: Library, entry: str | None
-) -> tuple[dict[str, Any], Problem, CrossField, float]:
-    """The entry of a solution file, its problem, the field of its point, and the objective of that."""
-    sidecar, problem, solution = found_in(file, library, entry)
-    check_feasible(file, sidecar["name"], problem, solution)
-    assert solution.point is not None
-    field = field_of(solution.problem, solution.point)
-    objective = problem.objective_value(complete_point(problem, field))
-    check_bound(file, sidecar, objective)
-    return sidecar, problem, field, objective
 
 
 def _entry_of(file: Path, said: RunLog, library: Library) -> str | None:
