@@ -19,10 +19,11 @@ from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
 from .energy import LinearSolver
 from .free_field import FreeField
-from .improvement import improved, settle
+from .improvement import FALL, improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
-_CREEP: Final = 1e-3  # relative fall of the energy in a round: less is not worth a round on a fine grid
+CREEP: Final = 1e-3
+"""Relative fall of the energy in a round: less is not worth a round on a fine grid."""
 
 
 def halved(instance: Instance) -> Instance | None:
@@ -53,9 +54,14 @@ def halved(instance: Instance) -> Instance | None:
     )
 
 
-def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
-    return improved(grown(coarse, instance, over), over, enough=_CREEP)
+def prolonged(
+    coarse: CrossField, instance: Instance, over: Over = never, *, enough: float = FALL
+) -> CrossField:
+    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
+
+    enough: as for `improved`.
+    """
+    return improved(grown(coarse, instance, over), over, enough=enough)
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
@@ -68,7 +74,7 @@ def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossFi
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
-    settle(state, LinearSolver(), over, enough=_CREEP)
+    settle(state, LinearSolver(), over, enough=CREEP)
     return state.bounded(over)
 
 

@@ -15,7 +15,7 @@ from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from .box_qp import fitted
-from .coarse import grown, halved, prolonged
+from .coarse import CREEP, grown, halved, prolonged
 from .greedy import greedy, rough_greedy
 from .improvement import improved
 
@@ -62,7 +62,7 @@ def _from_coarsest(instance: Instance, over: Over) -> CrossField:
     coarse = _coarser(instance)
     if coarse is None:
         return _best_start(instance, over)
-    return prolonged(_from_coarsest(coarse, over), instance, over)
+    return prolonged(_from_coarsest(coarse, over), instance, over, enough=CREEP)
 
 
 def _best_start(instance: Instance, over: Over) -> CrossField:
