@@ -73,7 +73,8 @@ def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
 
     Step k of the method reaches k pixels far: what is smooth over longer distances stays as it is.
     """
-    scaled = sparse.diags_array(1 / energy.stiffness)
+    inverse = 1 / energy.stiffness
+    scaled = LinearOperator(energy.matrix.shape, matvec=lambda v: inverse * v, dtype=np.float64)
     step: Floats = cg(energy.matrix, right, rtol=tolerance, maxiter=_MOST_LOCAL_STEPS, M=scaled)[0]
     return step
 

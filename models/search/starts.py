@@ -22,6 +22,7 @@ from .improvement import improved
 _COARSE: Final = 4096  # pixels up to which the greedy strategy costs little
 _HELD: Final = (1.0, 0.3, 0.1, 0.03)  # factors of the stroke weights for the greedy strategy
 _IMPROVED: Final = 2  # of the starts: improving one takes as long as finding three
+_CLOSE: Final = 0.03  # relative energy above the lowest start up to which another one is improved too
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
@@ -70,7 +71,8 @@ def _best_start(instance: Instance, over: Over) -> CrossField:
     starts = [polyvector_start(instance, over)]
     starts += [_held(instance, factor, over) for factor in _HELD if not over()]
     lowest = sorted(starts, key=_energy)[:_IMPROVED]
-    return min((improved(start, over) for start in lowest), key=_energy)
+    close = [start for start in lowest if _energy(start) <= (1 + _CLOSE) * _energy(lowest[0])]
+    return min((improved(start, over) for start in close), key=_energy)
 
 
 def _held(instance: Instance, factor: float, over: Over) -> CrossField:
