@@ -156,7 +156,8 @@ class Solver:
     start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
     that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
     problems for which others come first. patch: how it solves patches, where it does. vendor: who makes it,
-    where others of its maker stand here too: what they find is one opinion.
+    where others of its maker stand here too: what they find is one opinion. feasible_within: how far a row
+    may be broken by the points that it tells.
     """
 
     name: str
@@ -171,6 +172,7 @@ class Solver:
     not_for: tuple[str, ...] = ()
     patch: PatchUse | None = None
     vendor: str = ""
+    feasible_within: float = 5e-6  # solvers keep to 1e-6 in rows that they scale
 
     @property
     def maker(self) -> str:
@@ -278,7 +280,8 @@ SOLVERS: Final = {
             vendor="IBM",
         ),
         Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY, vendor="COIN-OR"),
-        Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY),
+        # What is 1e-5 from a whole number it takes for whole and tells rounded: times pi/2 and pi in rows.
+        Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY, feasible_within=5e-5),
     )
 }  # fmt: skip
 """The table of solvers. Those that are driven here stand in the order in which they are preferred."""

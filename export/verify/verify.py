@@ -46,8 +46,6 @@ FEASIBLE: Final = 2
 """Complete points of random fields at which files are evaluated as well."""
 TOLERANCE: Final = 1e-6
 """Relative difference up to which optima agree (absolute below 1)."""
-FEASIBLE_WITHIN: Final = 5e-6
-"""Violation up to which a point is feasible: solvers keep to 1e-6 in rows that they scale."""
 READING_SECONDS: Final = 60.0
 
 
@@ -338,7 +336,7 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     worst = held.violation(point)
     leeway = worst.worst * float(np.sum(np.abs(held.merged_objective(1)[1])))
     numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
-    if not wrong and worst.worst > FEASIBLE_WITHIN:
+    if not wrong and worst.worst > SOLVERS[solver].feasible_within:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
     proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
     claim = answer.objective
