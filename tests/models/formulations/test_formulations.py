@@ -370,8 +370,8 @@ def test_convex_miqp_is_exactly_8(gauge, tmp_path):
 
 
 def test_options_that_a_formulation_lacks_are_refused():
-    with pytest.raises(FormulationError, match="no formulation 'milp'; choose one of minlp-parity"):
-        declare("milp")
+    with pytest.raises(FormulationError, match="no formulation 'milo'"):
+        declare("milo")
     with pytest.raises(FormulationError, match="no option 'norm'"):
         declare("milp-mccormick", norm=1)
     with pytest.raises(FormulationError, match="minlp-cubic has no option facet"):
