@@ -1,8 +1,8 @@
 """Fields to start from: the greedy one, PolyVector fields, and what grows out of the best on a coarse grid.
 
 Which jumps a strategy finds is a matter of luck, and on a coarse grid luck is cheap: there several are tried,
-curves of the best two change their family, and what is found grows to the fine grid, where angles and jumps
-only settle.
+curves of the best, or of two that are close, change their family, and what is found grows to the fine grid,
+where angles and jumps only settle.
 """
 
 from __future__ import annotations
