@@ -1,0 +1,1 @@
+"""From crosses to heights: the surface whose curvature lines they are."""

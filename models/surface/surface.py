@@ -1,0 +1,63 @@
+"""A surface over the mask of an instance: heights at the corners of its pixels.
+
+x runs to the right, y up, z towards the viewer; all three are in pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..instance.grid import Floats
+from ..instance.instance import Instance
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The heights that a cross field was lifted to, and how far they can be trusted.
+
+    field: the cross field, its pixels in the order of `instance.grid`. heights: float (height + 1, width + 1)
+    at the corners of pixels, [0, 0] the upper left one, in pixels; NaN at a corner of no pixel of the mask.
+    confidence: float (n,) in [0, 1], how well the equations hold at each pixel. doubts: sentences that say
+    why the surface should not be trusted; empty where nothing speaks against it.
+    """
+
+    field: CrossField
+    heights: Floats
+    confidence: Floats
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def instance(self) -> Instance:
+        """The instance of its field."""
+        return self.field.instance
+
+    @cached_property
+    def corners(self) -> Floats:
+        """Heights at the corners of each pixel, shape (n, 4): upper left and right, lower left and right."""
+        row, column = self.instance.grid.rows, self.instance.grid.columns
+        return np.stack(
+            [self.heights[row + down, column + right] for down in (0, 1) for right in (0, 1)], axis=1
+        )
+
+    @cached_property
+    def gradient(self) -> Floats:
+        """Slopes (dz/dx, dz/dy) at the pixels' centres, y up, shape (n, 2)."""
+        upper_left, upper_right, lower_left, lower_right = self.corners.T
+        across = (upper_right - upper_left + lower_right - lower_left) / 2
+        upward = (upper_left - lower_left + upper_right - lower_right) / 2
+        return np.stack([across, upward], axis=1)
+
+    @cached_property
+    def normals(self) -> Floats:
+        """Unit normals towards the viewer at the pixels' centres, shape (n, 3)."""
+        normal = np.column_stack([-self.gradient, np.ones(len(self.gradient))])
+        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        return unit
+
+    def flipped(self) -> Surface:
+        """The same surface turned inside out, z to -z: the crosses are the same."""
+        return replace(self, heights=-self.heights)
