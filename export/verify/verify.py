@@ -35,6 +35,7 @@ from ..solutions.solution import ROUND
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
+from .leeway import saved
 from .programs.reading import Evaluation, Meaning, Points, load, save
 from .programs.worker import Worker
 
@@ -69,9 +70,9 @@ class Check:
 
     problem: instance and formulation. program: its name, or that of the solver. objective: recomputed at the
     solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
-    that follows from angles and jumps; leeway: how much the rows that the point breaks, by no more than it
-    may, can have lowered its objective. group: where it is equal, so is the optimum; relaxes: the group of
-    which the file holds a relaxation, whose optimum is no higher.
+    that follows from angles and jumps; leeway: how much the rows that the point breaks can have lowered its
+    objective (`saved`). group: where it is equal, so is the optimum; relaxes: the group of which the file
+    holds a relaxation, whose optimum is no higher.
     """
 
     problem: str
@@ -334,7 +335,7 @@ def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float)
     objective = held.objective_value(point)
     energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
     worst = held.violation(point)
-    leeway = worst.worst * float(np.sum(np.abs(held.merged_objective(1)[1])))
+    leeway = saved(held, point)
     numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
     if not wrong and worst.worst > SOLVERS[solver].feasible_within:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
@@ -357,7 +358,7 @@ def _energy_difference(
     options = problem.formulation.options
     if options.relax or options.facet == "printed":
         return ""  # z need not be p1 beta, and the field is another point
-    if same(energy, objective) or objective < energy <= objective + leeway:
+    if same(energy, objective) or (objective < energy and not _above(energy, objective + leeway)):
         return ""
     if not proven and energy < objective:
         return ""

@@ -168,6 +168,13 @@ class PlacedFamily:
         given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
 
+    def excess(self, point: Floats) -> Floats:
+        """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
+        values = self.values(point)
+        if self.family.sense == "==":
+            return np.abs(values)
+        return values if self.family.sense == "<=" else -values
+
 
 @dataclass(frozen=True)
 class Violation:
@@ -437,10 +444,7 @@ class Problem:
 
     def violation(self, point: Floats) -> Violation:
         """The worst violations of rows, bounds and integrality at a point (columns,)."""
-        worst = {
-            family.family.tag: float(np.max(_excess(family.family.sense, family.values(point))))
-            for family in self.rows
-        }
+        worst = {family.family.tag: float(np.max(family.excess(point))) for family in self.rows}
         tag = max(worst, key=lambda name: worst[name], default="")
         bounds = np.maximum(np.maximum(self.lower - point, point - self.upper), 0.0)
         gaps = np.abs(point - np.round(point))[self.integer]
@@ -514,12 +518,6 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
     return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
-
-
-def _excess(sense: str, values: Floats) -> Floats:
-    if sense == "==":
-        return np.abs(values)
-    return values if sense == "<=" else -values
 
 
 def _costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
