@@ -48,20 +48,30 @@ _CODES: Final = {
     "USER_INTERRUPT": 400,
 }
 _FAILURE: Final = 500
+_LIMIT: Final = 400
 _STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
 _NO_POINT: Final = 1e49
 """Bonmin's objective when it has no incumbent is 1e50."""
 
 
-class Stop(ca.Callback):
-    """Called by Ipopt at every iterate; asks it to stop once an interrupt has come."""
+class Watch(ca.Callback):
+    """Called by Ipopt at every iterate: keeps the best feasible point, and asks it to stop on an interrupt.
 
-    def __init__(self, columns: int, rows: int) -> None:
-        """A callback for a problem of that size."""
+    best: the lowest feasible point so far, the start to begin with; None where there is none. value: its
+    objective.
+    """
+
+    def __init__(self, model: NlModel) -> None:
+        """A callback for a model."""
         ca.Callback.__init__(self)
+        self.model = model
+        columns, rows = len(model.start), len(model.row_lower)
         self.sizes = {"x": columns, "f": 1, "g": rows, "lam_x": columns, "lam_g": rows, "lam_p": 0}
         self.wanted = False
-        self.construct("stop", {})
+        start = model.feasible_value(model.start)
+        self.value = np.inf if start is None else start
+        self.best = None if start is None else model.start
+        self.construct("watch", {})
 
     def on_signal(self, _number: int, _frame: FrameType | None) -> None:
         """Remember the interrupt."""
@@ -87,9 +97,16 @@ class Stop(ca.Callback):
         """Shape of an input."""
         return ca.Sparsity.dense(self.sizes[str(ca.nlpsol_out(i))], 1)
 
-    def eval(self, _arguments: Sequence[Any]) -> list[int]:
+    def eval(self, arguments: Sequence[Any]) -> list[int]:
         """1 to stop, 0 to go on."""
+        by_name = dict(zip(self.sizes, arguments, strict=True))
+        self.see(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
         return [int(self.wanted)]
+
+    def see(self, point: Floats, value: Floats, rows: Floats) -> None:
+        """Keep a point (n,) with its objective (1,) and rows (m,) if it is feasible and lower."""
+        if value[0] < self.value and self.model.holds(point, rows):
+            self.value, self.best = float(value[0]), point
 
 
 class AmplAnswer(NamedTuple):
@@ -131,15 +148,13 @@ def solve(
     Must run in the main thread of a process of its own: it takes over the handling of SIGINT.
     """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
-    stop = Stop(len(model.start), len(model.row_lower))
-    signal.signal(signal.SIGINT, stop.on_signal)  # Bonmin puts a handler of its own in its place
-    best = None
+    watch = Watch(model)
+    signal.signal(signal.SIGINT, watch.on_signal)  # Bonmin puts a handler of its own in its place
     if solver == "ipopt":
-        chosen["iteration_callback"] = stop
+        chosen["iteration_callback"] = watch
     else:
         chosen["discrete"] = model.discrete.tolist()
-        best = model.value_of_start
-        chosen |= {} if best is None else {"bonmin.cutoff": best}
+        chosen |= {} if watch.best is None else {"bonmin.cutoff": watch.value}
     run = ca.nlpsol("solver", solver, model.problem, chosen)
     started()
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
@@ -147,16 +162,21 @@ def solve(
     words = str(run.stats()["return_status"])
     code = _CODES.get(words, _FAILURE)
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
-    if solver == "bonmin" and float(answer["f"]) >= _NO_POINT:
-        return _without_better(words, code, model, best)
-    return AmplAnswer(words, code, np.zeros(0) if code == 300 else np.array(answer["x"]).ravel())
+    point, value = np.array(answer["x"]).ravel(), float(answer["f"])
+    if solver == "bonmin" and value >= _NO_POINT:
+        return _without_better(words, code, watch)
+    if solver == "ipopt" and code == _LIMIT and watch.best is not None:
+        watch.see(point, np.array([value]), np.array(answer["g"]).ravel())
+        words += "" if watch.best is point else ", the best feasible point before it"
+        return AmplAnswer(words, code, watch.best)
+    return AmplAnswer(words, code, np.zeros(0) if code == 300 else point)
 
 
-def _without_better(words: str, code: int, model: NlModel, best: float | None) -> AmplAnswer:
+def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
     """The answer of a search by Bonmin that found nothing: the start, where it is feasible."""
-    if best is None:
-        return AmplAnswer(words, 470 if code == 400 else code, np.zeros(0))
-    return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, model.start)
+    if watch.best is None:
+        return AmplAnswer(words, 470 if code == _LIMIT else code, np.zeros(0))
+    return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, watch.best)
 
 
 def main(arguments: list[str]) -> int:

@@ -17,8 +17,8 @@ from ...models.instance.grid import Bools, Floats
 
 __all__ = ["NlModel", "ca", "read_nl"]
 
-_FEASIBLE: Final = 1e-6
-"""Violation up to which a start counts as feasible: the solvers' own tolerance."""
+FEASIBLE: Final = 1e-6
+"""Violation up to which a point counts as feasible: the solvers' own tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +45,16 @@ class NlModel:
         objective, rows = self._function(point)
         return float(objective), np.array(rows).ravel()
 
-    @property
-    def value_of_start(self) -> float | None:
-        """The objective at the start, or None when the start is not feasible."""
-        objective, rows = self.evaluate(self.start)
-        excess = (
-            self.lower - self.start,
-            self.start - self.upper,
-            self.row_lower - rows,
-            rows - self.row_upper,
-            np.abs(self.start - np.round(self.start))[self.discrete],
-        )
-        return objective if max(part.max(initial=0.0) for part in excess) <= _FEASIBLE else None
+    def feasible_value(self, point: Floats) -> float | None:
+        """The objective at a point (n,), or None when the point is not feasible."""
+        objective, rows = self.evaluate(point)
+        whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBLE
+        return objective if whole and self.holds(point, rows) else None
+
+    def holds(self, point: Floats, rows: Floats) -> bool:
+        """Whether a point (n,) and the values of its rows (m,) keep their limits."""
+        excess = (self.lower - point, point - self.upper, self.row_lower - rows, rows - self.row_upper)
+        return all(float(part.max(initial=0.0)) <= FEASIBLE for part in excess)
 
 
 def read_nl(path: Path) -> NlModel:

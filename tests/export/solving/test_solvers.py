@@ -542,8 +542,7 @@ def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
 
 CTRL_C = {
     "highs": ["solve", "mouse", "-f", "milp-mccormick"],
-    # Over bounds alone, every iterate is a point.
-    "ipopt": ["solve", "mouse", "-f", "qp-fixed", "--solver", "ipopt", "--size", "128"],
+    "ipopt": ["solve", "mouse", "-f", "miqcp-bilinear", "--relax", "--size", "64"],
     "bonmin": ["solve", "mouse", "-f", "miqp-exact", "--size", "12"],
 }
 AT_WORK = {"highs": "MIP start solution is feasible", "ipopt": "^iter +objective", "bonmin": "NLP0014I"}

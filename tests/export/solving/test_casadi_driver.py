@@ -1,0 +1,59 @@
+"""What Ipopt leaves when it is stopped: the best feasible point that it came by."""
+
+import signal
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.formats.nl import Layout
+from crossfield.export.solving.casadi_driver import Watch, solve
+from crossfield.export.solving.nl_model import FEASIBLE, ca, read_nl
+
+
+@pytest.fixture
+def relaxed(tmp_path):
+    """A relaxed problem with rows, its model with the greedy field as start, and the order of its columns."""
+    problem = cf.formulate(cf.sample("skew", 6), "miqcp-bilinear", relax=True)
+    cf.write(problem, tmp_path / "model.nl", start=cf.greedy(problem.instance))
+    return problem, read_nl(tmp_path / "model.nl"), Layout(problem).order
+
+
+@pytest.fixture
+def own_interrupt():
+    """The driver takes over SIGINT; give it back."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_only_feasible_points_that_are_lower_are_kept(relaxed):
+    problem, model, order = relaxed
+    watch = Watch(model)
+    assert watch.value == pytest.approx(problem.objective_value(problem.point(cf.greedy(problem.instance))))
+
+    def seen(point):
+        value, rows = model.evaluate(point)
+        told = {"x": point, "f": value, "g": rows}
+        multipliers = [np.zeros(watch.sizes[name]) for name in list(watch.sizes)[3:]]
+        assert watch.eval([ca.DM(each) for each in (*told.values(), *multipliers)]) == [0]
+        return watch.value
+
+    lower = problem.point(cf.power_field(problem.instance))
+    worse, broken = problem.point(cf.greedy(problem.instance)), lower.copy()
+    worse[problem.blocks["s"].columns] += 0.1
+    broken[problem.blocks["s"].columns] -= 10 * FEASIBLE
+    start = watch.value
+    assert seen(worse[order]) == seen(broken[order]) == start
+    assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))
+    assert watch.value < start
+    watch.on_signal(signal.SIGINT, None)
+    assert watch.wanted
+
+
+def test_a_stop_at_an_iterate_that_breaks_rows_leaves_the_start(relaxed, own_interrupt):
+    """At its first iterate Ipopt has moved the start away from its bounds, and rows are broken."""
+    _, model, _ = relaxed
+    answer = solve("ipopt", model, 1e-9, 0.0)
+    assert answer.code == 400
+    assert "the best feasible point before it" in answer.words
+    assert np.array_equal(answer.point, model.start)
