@@ -156,6 +156,7 @@ def release_command(
         Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write: .tar.gz or .zip.")
     ],
     *,
+    jobs: Processes = 1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -167,7 +168,7 @@ def release_command(
     from ..library.checking.release import release_library
 
     with progress(quiet=quiet) as show:
-        frozen = release_library(folder, output, progress=show)
+        frozen = release_library(folder, output, jobs=jobs, progress=show)
     if as_json:
         say_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
     elif not quiet:

@@ -48,11 +48,14 @@ class Frozen:
         return self.file.with_name(f"{self.file.name}.sha256")
 
 
-def release_library(folder: str | Path, output: str | Path, *, progress: Progress = silent) -> Frozen:
+def release_library(
+    folder: str | Path, output: str | Path, *, jobs: int = 1, progress: Progress = silent
+) -> Frozen:
     """The release of a library as an archive, .tar.gz or .zip, now in `output`, its checksum beside it.
 
-    Nobody changes the library meanwhile. Raises InputError for another suffix, for a library that states no
-    version and day, and for one that does not verify; OutputError where nothing can be written.
+    jobs: processes that verify it first. Nobody changes the library meanwhile. Raises InputError for another
+    suffix, for a library that states no version and day, and for one that does not verify; OutputError where
+    nothing can be written.
     """
     folder, output = Path(folder), Path(output)
     pack = _packer(output)
@@ -60,7 +63,7 @@ def release_library(folder: str | Path, output: str | Path, *, progress: Progres
         raise OutputError("lies inside the library, whose files are its own; choose another", file=output)
     with unchanged(folder, "a release of the library", progress):
         top = _top(read_library(folder))
-        _check(folder, progress)
+        _check(folder, jobs, progress)
         names = [SUMS, *(line[66:] for line in read_bytes(folder / SUMS).decode().splitlines())]
         progress(f"{len(names)} files")
         make_folder(output.parent)
@@ -89,8 +92,8 @@ def _top(library: Library) -> str:
     return f"{slug(stated['title'])[:_LONGEST]}-{slug(stated['version'])[:_LONGEST]}"
 
 
-def _check(folder: Path, progress: Progress) -> None:
-    found = list(findings_in(folder, progress=progress))
+def _check(folder: Path, jobs: int, progress: Progress) -> None:
+    found = list(findings_in(folder, jobs=jobs, progress=progress))
     if found:
         more = f" ({len(found) - 1} more)" if found[1:] else ""
         raise InputError(
