@@ -19,15 +19,16 @@ def normal_map(surface: Surface, scale: int = 1) -> Bytes:
     between, and a smooth outline. Outside it looks at the viewer. Raises InputError for another scale.
     """
     if scale_of(surface, scale) > 1:
-        return eight_bit(_coloured(raster(surface, scale)))
+        return eight_bit(coloured(raster(surface, scale)))
     mask = surface.instance.mask
     normals = np.zeros((*mask.shape, 3))
     normals[..., 2] = 1.0
     normals[mask] = surface.normals
-    return eight_bit(_coloured(Raster(normals, mask.astype(np.float64))))
+    return eight_bit(coloured(Raster(normals, mask.astype(np.float64))))
 
 
-def _coloured(found: Raster) -> Floats:
+def coloured(found: Raster) -> Floats:
+    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the normals."""
     return np.concatenate([(found.normals + 1) / 2, found.opacity[..., None]], axis=-1)
 
 

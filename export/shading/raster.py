@@ -16,13 +16,15 @@ import numpy as np
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS
 from ...models.instance.grid import Bools, Floats
+from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
 
-SIDE: Final = 800
+SIDE: Final = 1000
 """About as many pixels has the longer side of a picture unless a scale is given."""
 _BLUR: Final = 2.0  # pixels of the grid by which stairs are smoothed
 _MOVED: Final = 0.33  # at most, of the inside of a place, which changes by 2/3 a pixel across the outline
 _MOVED_THIN: Final = 0.12  # where something is one pixel thin
+_DRAWN: Final = 0.3  # of the inside: strokes that are the border run through the middle of its pixels
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 
@@ -55,8 +57,9 @@ def raster(surface: Surface, scale: int | None = None) -> Raster:
     length = np.linalg.norm(summed, axis=-1, keepdims=True)
     viewer = np.array([0.0, 0.0, 1.0])
     normals = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
-    free = spread(np.where(_thin(mask), _MOVED_THIN, _MOVED))
-    return Raster(normals, _opacity(inside, spread(_blurred(mask)), free))
+    thin = spread(_thin(mask).astype(np.float64))
+    level = inside + np.clip(spread(_blurred(mask)) - inside, *_moved(thin))
+    return Raster(normals, _opacity(level - (1 - thin) * _DRAWN * drawn_border(surface.instance)))
 
 
 def scale_of(surface: Surface, scale: int | None) -> int:
@@ -111,13 +114,24 @@ def _thin(mask: Bools) -> Bools:
     return thin
 
 
-def _opacity(inside: Floats, blurred: Floats, free: Floats) -> Floats:
-    """The part of each pixel inside of the outline.
+def _moved(thin: Floats) -> tuple[Floats, Floats]:
+    """How far the inside may be corrected, down and up; less where something is thin, a number in [0, 1]."""
+    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
+    return -most, most
 
-    inside, blurred: what a narrow and a wide blur of the mask are at its centre; free: how far the narrow one
-    may be corrected.
-    """
-    level = np.pad(inside + np.clip(blurred - inside, -free, free) - 0.5, 1, mode="edge")
-    steepness = np.hypot(*np.gradient(level))
-    part: Floats = np.clip(0.5 + level / np.maximum(steepness, 1e-9), 0.0, 1.0)
+
+def drawn_border(instance: Instance) -> float:
+    """The part of the pixels at the border of the mask that carry strokes, 0 to 1."""
+    from scipy import ndimage
+
+    mask = np.pad(instance.mask, 1)
+    border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
+    return float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
+
+
+def _opacity(level: Floats) -> Floats:
+    """The part of each pixel inside of the outline, which runs where the level is a half."""
+    depth = np.pad(level - 0.5, 1, mode="edge")
+    steepness = np.hypot(*np.gradient(depth))
+    part: Floats = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
     return part[1:-1, 1:-1]
