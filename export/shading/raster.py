@@ -22,9 +22,12 @@ from ...models.surface.surface import Surface
 SIDE: Final = 1000
 """About as many pixels has the longer side of a picture unless a scale is given."""
 _BLUR: Final = 2.0  # pixels of the grid by which stairs are smoothed
-_MOVED: Final = 0.33  # at most, of the inside of a place, which changes by 2/3 a pixel across the outline
+_MOVED: Final = 0.33  # at most, of the inside of a place
 _MOVED_THIN: Final = 0.12  # where something is one pixel thin
-_DRAWN: Final = 0.3  # of the inside: strokes that are the border run through the middle of its pixels
+_SLOPE: Final = 2 / 3
+"""By how much the inside of a place changes a pixel across a straight outline."""
+_BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
+_DRAWN: Final = 0.4  # pixels that strokes at the border are within it: they run through its pixels' middles
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 
@@ -58,8 +61,9 @@ def raster(surface: Surface, scale: int | None = None) -> Raster:
     viewer = np.array([0.0, 0.0, 1.0])
     normals = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
     thin = spread(_thin(mask).astype(np.float64))
-    level = inside + np.clip(spread(_blurred(mask)) - inside, *_moved(thin))
-    return Raster(normals, _opacity(level - (1 - thin) * _DRAWN * drawn_border(surface.instance)))
+    within = _DRAWN * drawn_border(surface.instance) * (1 - thin)
+    narrow, wide = inside - _SLOPE * within, spread(_blurred(mask)) - _BLURRED_SLOPE * within
+    return Raster(normals, _opacity(narrow + np.clip(wide - narrow, *_moved(thin))))
 
 
 def scale_of(surface: Surface, scale: int | None) -> int:

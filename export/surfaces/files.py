@@ -98,7 +98,7 @@ def write_shaded(surface: Surface, path: str | Path) -> Path:
 
 
 def png_of(picture: NDArray[np.uint8]) -> bytes:
-    """A picture (h, w, 4) of red, green, blue and opacity as PNG."""
+    """A picture (h, w, 3 or 4) of red, green, blue and, if it has one, opacity as PNG."""
     from PIL import Image
 
     stream = io.BytesIO()

@@ -36,5 +36,5 @@ def over(above: Floats, below: Floats) -> Floats:
 
 
 def on_paper(drawn: Floats) -> Floats:
-    """The strokes on paper without gaps, as what a mesh is covered with."""
-    return over(drawn, np.broadcast_to((*PAPER, 1.0), drawn.shape))
+    """Red, green and blue (h, w, 3) of the strokes on paper, as what a mesh is covered with."""
+    return over(drawn, np.broadcast_to((*PAPER, 1.0), drawn.shape))[..., :3]
