@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
+    from .export.shading.light import Light as Light
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .export.solving.run import run as run
     from .export.solving.two_stage import fit_angles as fit_angles
     from .export.solving.two_stage import two_stage as two_stage
+    from .export.surfaces.files import write_surface as write_surface
     from .models.errors import CrossfieldError as CrossfieldError
     from .models.field.field import CrossField as CrossField
     from .models.field.file import read_field as read_field
@@ -59,6 +61,7 @@ _HOME: Final = {
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",
     "Instance": ".models.instance.instance",
+    "Light": ".export.shading.light",
     "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
     "Proof": ".models.proof.record",
@@ -97,6 +100,7 @@ _HOME: Final = {
     "write_instance": ".models.instance.file",
     "write_mask": ".export.pictures.mask",
     "write_problem": ".export.bundle.manifest",
+    "write_surface": ".export.surfaces.files",
 }
 """Every public name and the module it comes from."""
 

@@ -46,7 +46,7 @@ def pixels_of(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
     dots = 72 * max(width, height) / _SIDE
     figure.set_dpi(dots)
     figure.set_size_inches((width + _TIP) / dots, (height + _TIP) / dots)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 

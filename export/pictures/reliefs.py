@@ -34,7 +34,7 @@ def _draw(axes: Any, picture: Picture, colours: Callable[[Raster], Floats]) -> N
         return
     height, width = picture.instance.mask.shape
     axes.imshow(
-        colours(raster(picture.surface)),
+        colours(raster(picture.instance, picture.surface.normals)),
         extent=(-0.5, width - 0.5, 0.5 - height, 0.5),
         origin="upper",
         interpolation="hanning",

@@ -6,25 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Floats
-from ...models.surface.surface import Surface
+from ...models.instance.instance import Instance
 from .raster import Raster, raster, scale_of
 
 Bytes = NDArray[np.uint8]
 
 
-def normal_map(surface: Surface, scale: int = 1) -> Bytes:
+def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
     """Red, green, blue and opacity, uint8 (h, w, 4), in the manner of OpenGL and Blender (green up).
 
-    scale: 1: one texel for each pixel of the grid, its own normal, opaque in the mask alone; more: normals in
-    between, and a smooth outline. Outside it looks at the viewer. Raises InputError for another scale.
+    normals: (n, 3) at the pixels. scale: 1: one texel for each pixel of the grid, its own normal, opaque in
+    the mask alone; more: normals in between, and a smooth outline. Outside it looks at the viewer. Raises
+    InputError for another scale.
     """
-    if scale_of(surface, scale) > 1:
-        return eight_bit(coloured(raster(surface, scale)))
-    mask = surface.instance.mask
-    normals = np.zeros((*mask.shape, 3))
-    normals[..., 2] = 1.0
-    normals[mask] = surface.normals
-    return eight_bit(coloured(Raster(normals, mask.astype(np.float64))))
+    if scale_of(instance, scale) > 1:
+        return eight_bit(coloured(raster(instance, normals, scale)))
+    image = np.zeros((*instance.mask.shape, 3))
+    image[..., 2] = 1.0
+    image[instance.mask] = normals
+    return eight_bit(coloured(Raster(image, instance.mask.astype(np.float64))))
 
 
 def coloured(found: Raster) -> Floats:

@@ -2,8 +2,8 @@
 
 Normals of the pixels are spread by cubic B-splines over the pixels of the mask alone, so that nothing from
 outside of it tints the border. The same splines of the mask itself say how much of a place is inside; where
-that is a half runs the outline. The stairs of the mask are smoothed by a wider blur, which may move the outline
-by a fifth of a pixel only: thin parts stay.
+that is a half runs the outline. The stairs of the mask are smoothed by a wider blur, which may move the
+outline by half a pixel, and by less where the mask or a gap in it is thin, so that these stay.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
-from ...models.surface.surface import Surface
 
 SIDE: Final = 1000
 """About as many pixels has the longer side of a picture unless a scale is given."""
@@ -43,34 +42,34 @@ class Raster:
     opacity: Floats
 
 
-def raster(surface: Surface, scale: int | None = None) -> Raster:
-    """The surface on a raster with `scale` x `scale` pixels for each pixel of the grid.
+def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
+    """The normals of a surface, (n, 3) at the pixels, with `scale` x `scale` pixels for each of the grid.
 
     scale: 1 or more; None: as many as make the longer side about SIDE. Raises InputError for another one.
     """
-    scale = scale_of(surface, scale)
-    mask = surface.instance.mask
-    up, across = (_splines(count, scale) for count in mask.shape)
+    scale = scale_of(instance, scale)
+    mask = np.pad(instance.mask, _REACH)
+    up, across = (_splines(count, scale)[_REACH * scale : -_REACH * scale] for count in mask.shape)
 
     def spread(values: Floats) -> Floats:
         return np.asarray(up @ (across @ values.T).T)
 
     inside = spread(mask.astype(np.float64))
-    summed = np.stack([spread(_on_grid(surface, part)) for part in surface.normals.T], axis=-1)
+    summed = np.stack([spread(_on_grid(mask, part)) for part in normals.T], axis=-1)
     length = np.linalg.norm(summed, axis=-1, keepdims=True)
     viewer = np.array([0.0, 0.0, 1.0])
-    normals = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
+    unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
     thin = spread(_thin(mask).astype(np.float64))
-    within = _DRAWN * drawn_border(surface.instance) * (1 - thin)
+    within = _DRAWN * drawn_border(instance) * (1 - thin)
     narrow, wide = inside - _SLOPE * within, spread(_blurred(mask)) - _BLURRED_SLOPE * within
-    return Raster(normals, _opacity(narrow + np.clip(wide - narrow, *_moved(thin))))
+    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, *_moved(thin))))
 
 
-def scale_of(surface: Surface, scale: int | None) -> int:
+def scale_of(instance: Instance, scale: int | None) -> int:
     """The pixels of a picture a pixel of the grid. Raises InputError for a scale that cannot be."""
-    height, width = surface.instance.mask.shape
+    height, width = instance.mask.shape
     if scale is None:
-        return max(1, round(SIDE / max(height, width)))
+        return max(1, round(SIDE / int(max(height, width))))
     if scale < 1 or height * width * scale**2 > MAX_PIXELS:
         raise InputError(
             f"the scale {scale} makes no picture of {width} x {height} pixels: it has to be 1 or more, "
@@ -79,10 +78,10 @@ def scale_of(surface: Surface, scale: int | None) -> int:
     return scale
 
 
-def _on_grid(surface: Surface, values: Floats) -> Floats:
+def _on_grid(mask: Bools, values: Floats) -> Floats:
     """Values of the pixels [height, width], 0 outside of the mask."""
-    image = np.zeros(surface.instance.mask.shape)
-    image[surface.instance.mask] = values
+    image = np.zeros(mask.shape)
+    image[mask] = values
     return image
 
 
@@ -112,9 +111,8 @@ def _thin(mask: Bools) -> Bools:
     from scipy import ndimage
 
     block = np.ones((2, 2), dtype=bool)
-    wide = np.pad(mask, 2)
-    changed = (ndimage.binary_opening(wide, block) != wide) | (ndimage.binary_closing(wide, block) != wide)
-    thin: Bools = ndimage.binary_dilation(changed, np.ones((3, 3), dtype=bool))[2:-2, 2:-2]
+    changed = (ndimage.binary_opening(mask, block) != mask) | (ndimage.binary_closing(mask, block) != mask)
+    thin: Bools = ndimage.binary_dilation(changed, np.ones((3, 3), dtype=bool))
     return thin
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -46,41 +45,32 @@ FILES: Final = {
 """The files of a surface, and what each holds."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """How a surface is shown. scale: pixels of a picture a pixel of the grid, of the normal map too.
-
-    None: one texel a pixel in the normal map, and pictures of about 1000 pixels.
-    """
-
-    light: Light = UPPER_LEFT
-    scale: int | None = None
-
-
 def write_surface(
     surface: Surface,
     folder: str | Path,
     *,
     drawing: str | Path | Drawing | None = None,
-    look: Look | None = None,
+    light: Light = UPPER_LEFT,
+    scale: int | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """The folder, which now holds all of FILES: pictures, heights, a mesh and a report. Same surface, same bytes.
+    """The folder, which now holds all of FILES: pictures, heights, a mesh and a report.
 
+    Same surface, same bytes.
     drawing: file or sample that the instance was read from, for the strokes; None: pieces of line at the
-    stroke pixels. about: facts for the report on how the surface was made. Every file stands whole or not at
-    all; the report is written last. Raises InputError for a drawing that is unreadable or lies elsewhere and
-    a scale that cannot be, and OutputError.
+    stroke pixels. scale: pixels of a picture a pixel of the grid; None: one in the normal map, and in the
+    others as many as make about 1000 on the longer side. about: facts for the report on how the surface was
+    made. Every file stands whole or not at all; the report is written last. Raises InputError for a drawing
+    that is unreadable or lies elsewhere and a scale that cannot be, and OutputError.
     """
-    look = look or Look()
     if drawing is not None and not isinstance(drawing, Drawing):
         drawing = read_drawing(drawing, on=surface.instance)
-    scale = scale_of(surface, look.scale)
+    fine = scale_of(surface.instance, scale)
     folder = make_folder(folder)
     (folder / REPORT).unlink(missing_ok=True)
-    found = raster(surface, scale)
-    shaded, ink = lit(found, look.light), strokes(surface.instance, drawing, scale)
-    write_bytes(folder / NORMALS, png_of(normal_map(surface, look.scale or 1)))
+    found = raster(surface.instance, surface.normals, fine)
+    shaded, ink = lit(found, light), strokes(surface.instance, drawing, fine)
+    write_bytes(folder / NORMALS, png_of(normal_map(surface.instance, surface.normals, scale or 1)))
     pictures = {SHADED: shaded, MATCAP: matcap(found), OVERLAY: over(ink, shaded), DRAWING: on_paper(ink)}
     for name, picture in pictures.items():
         write_bytes(folder / name, png_of(eight_bit(picture)))
@@ -94,7 +84,7 @@ def write_surface(
 
 def write_shaded(surface: Surface, path: str | Path) -> Path:
     """The path of the PNG that now shows the surface in the light of a lamp. Raises OutputError."""
-    return write_bytes(path, png_of(eight_bit(lit(raster(surface)))))
+    return write_bytes(path, png_of(eight_bit(lit(raster(surface.instance, surface.normals)))))
 
 
 def png_of(picture: NDArray[np.uint8]) -> bytes:

@@ -1,8 +1,8 @@
 """A surface as a mesh (.obj): a quad for each pixel, with texture coordinates and normals.
 
-x runs to the right, y up, z towards the viewer, all in pixels, the lower left corner of the grid at x = y = 0.
-Texture coordinates cover the grid, so that any picture of the grid lies on the mesh where it was drawn.
-Pixels that meet in a corner only have a vertex each there.
+x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
+x = y = 0. Texture coordinates cover the grid, so that any picture of the grid lies on the mesh where it was
+drawn. Pixels that meet in a corner only have a vertex each there.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def to_obj(surface: Surface, materials: str) -> bytes:
     faces = corners[:, _WALK] + 1
     return "".join(
         [
-            f"# {instance.name}: quad k is pixel k = 1, 2, ... of the mask, row by row; y up, z to the viewer\n",
+            f"# {instance.name}: quad k is pixel k = 1, 2, ... of the mask, row by row; y up, z to you\n",
             f"mtllib {materials}\n",
             _lines("v", points),
             _lines("vt", texture),
