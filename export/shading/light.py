@@ -13,9 +13,10 @@ from .raster import Raster
 
 CLAY: Final = (0.80, 0.77, 0.73)
 """Part of red, green and blue light that the surface gives back."""
-_AMBIENT: Final = 0.07  # light from all sides, on any surface
-_VIEWER: Final = 0.13  # light from the viewer, so that forms in the lamp's shade are seen
-_LAMP: Final = 0.85
+_AMBIENT: Final = 0.04  # light from all sides, on any surface
+_VIEWER: Final = 0.10  # light from the viewer
+_LAMP: Final = 0.95
+_FILL: Final = 0.08  # from the other side than the lamp, so that forms in its shade are seen
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Light:
     """
 
     azimuth: float = np.radians(130.0)
-    elevation: float = np.radians(42.0)
+    elevation: float = np.radians(38.0)
 
     def __post_init__(self) -> None:
         """Check both angles."""
@@ -44,6 +45,11 @@ class Light:
         flat = np.cos(self.elevation)
         return np.array([flat * np.cos(self.azimuth), flat * np.sin(self.azimuth), np.sin(self.elevation)])
 
+    @property
+    def opposite(self) -> Light:
+        """The lamp on the other side, lower."""
+        return Light(self.azimuth + np.pi, self.elevation / 2)
+
 
 UPPER_LEFT: Final = Light()
 """The lamp unless another one is given."""
@@ -55,7 +61,8 @@ def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, f
     What comes back of the lamp is the cosine between its direction and the normal, 0 in its own shade.
     """
     lamp = np.maximum(raster.normals @ light.direction, 0.0)
-    energy = _AMBIENT + _VIEWER * raster.normals[..., 2] + _LAMP * lamp
+    fill = np.maximum(raster.normals @ light.opposite.direction, 0.0)
+    energy = _AMBIENT + _VIEWER * raster.normals[..., 2] + _LAMP * lamp + _FILL * fill
     return with_opacity(energy[..., None] * np.array(colour), raster)
 
 

@@ -14,12 +14,13 @@ from ...models.instance.grid import Floats
 from .light import with_opacity
 from .raster import Raster
 
-_BODY: Final = np.array([0.62, 0.22, 0.12])  # glaze
+_BODY: Final = np.array([0.66, 0.19, 0.09])  # glaze
 _KEY: Final = np.array([-0.52, 0.60, 0.61])  # direction of the window
-_KEY_COLOUR: Final = np.array([1.00, 0.95, 0.86])
+_KEY_COLOUR: Final = np.array([1.05, 0.98, 0.88])
 _FILL: Final = np.array([0.75, -0.40, 0.53])  # of the wall
-_FILL_COLOUR: Final = np.array([0.20, 0.30, 0.48])
-_FLOOR: Final = np.array([0.10, 0.07, 0.06])
+_FILL_COLOUR: Final = np.array([0.10, 0.18, 0.34])
+_FLOOR: Final = np.array([0.05, 0.04, 0.04])
+_ROUND: Final = 0.25  # how far a window reaches round the ball
 _SHINE: Final = 38.0  # how narrow the gloss is
 _RIM: Final = 3.0  # how narrow the light along the border of the ball is
 
@@ -34,10 +35,10 @@ def ball(normals: Floats) -> Floats:
     key, fill = (vector / np.linalg.norm(vector) for vector in (_KEY, _FILL))
     viewer = np.array([0.0, 0.0, 1.0])
     half = (key + viewer) / np.linalg.norm(key + viewer)
-    wrapped = ((normals @ key + 0.35) / 1.35)[..., None]  # a window reaches round the ball
-    soft = np.maximum(wrapped, 0.0) ** 1.4 * _KEY_COLOUR
+    wrapped = ((normals @ key + _ROUND) / (1 + _ROUND))[..., None]
+    soft = np.maximum(wrapped, 0.0) ** 1.5 * _KEY_COLOUR
     side = np.maximum(normals @ fill, 0.0)[..., None] * _FILL_COLOUR
     gloss = np.maximum(normals @ half, 0.0)[..., None] ** _SHINE * _KEY_COLOUR
     rim = np.maximum(1 - normals[..., 2:], 0.0) ** _RIM * (_FILL_COLOUR + 0.25 * soft)
-    energy: Floats = _BODY * (soft + side + _FLOOR) + 0.45 * gloss + 0.5 * rim
+    energy: Floats = _BODY * (soft + side + _FLOOR) + 0.4 * gloss + 0.55 * rim
     return energy

@@ -22,11 +22,12 @@ SIDE: Final = 1000
 """About as many pixels has the longer side of a picture unless a scale is given."""
 _BLUR: Final = 2.0  # pixels of the grid by which stairs are smoothed
 _MOVED: Final = 0.33  # at most, of the inside of a place
-_MOVED_THIN: Final = 0.12  # where something is one pixel thin
+_MOVED_THIN: Final = 0.12  # where something is one or two pixels thin
 _SLOPE: Final = 2 / 3
 """By how much the inside of a place changes a pixel across a straight outline."""
 _BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
 _DRAWN: Final = 0.4  # pixels that strokes at the border are within it: they run through its pixels' middles
+_TIP: Final = 8  # pixels of a tip at most; what is thin and larger is a part
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 
@@ -107,12 +108,15 @@ def _blurred(mask: Bools) -> Floats:
 
 
 def _thin(mask: Bools) -> Bools:
-    """Pixels in or beside a part of the mask, or a gap in it, that holds no 2 x 2 pixels."""
+    """Pixels in or beside a part of the mask, or a gap in it, too thin for 3 x 3 pixels and no mere tip."""
     from scipy import ndimage
 
-    block = np.ones((2, 2), dtype=bool)
-    changed = (ndimage.binary_opening(mask, block) != mask) | (ndimage.binary_closing(mask, block) != mask)
-    thin: Bools = ndimage.binary_dilation(changed, np.ones((3, 3), dtype=bool))
+    block = np.ones((3, 3), dtype=bool)
+    wide = np.pad(mask, 3)
+    changed = (ndimage.binary_opening(wide, block) != wide) | (ndimage.binary_closing(wide, block) != wide)
+    part, _ = ndimage.label(changed, block)
+    long = np.bincount(part.ravel()) > _TIP
+    thin: Bools = ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3]
     return thin
 
 

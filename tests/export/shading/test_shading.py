@@ -91,6 +91,12 @@ def test_strokes_at_the_border_are_the_border():
     assert drawn[80].sum() == pytest.approx(152, abs=1.5)
 
 
+def encoded(energy):
+    """What a screen is told of clay in light of that energy."""
+    light = np.minimum(energy * np.array(CLAY), 1.0)
+    return 1.055 * light ** (1 / 2.4) - 0.055
+
+
 def test_light_comes_back_with_the_cosine_and_mirrored_light_is_mirrored():
     one = np.ones((1, 1))
     for azimuth, elevation in ((0.3, 0.4), (2.2, 1.5), (-1.0, 0.0)):
@@ -100,8 +106,9 @@ def test_light_comes_back_with_the_cosine_and_mirrored_light_is_mirrored():
         away = lit(Raster((light.direction * (-1, -1, 1))[None, None], one), light)
         assert (facing >= away).all()
     frontal = lit(Raster(np.array([[[0.0, 0.0, 1.0]]]), one), Light(0.0, np.pi / 2))[0, 0]
-    energy = (0.07 + 0.13 + 0.85) * np.array(CLAY)
-    assert frontal[:3] == pytest.approx(1.055 * energy ** (1 / 2.4) - 0.055)
+    assert frontal[:3] == pytest.approx(encoded(1.09 + 0.08 * np.sqrt(0.5)))
+    side = lit(Raster(np.array([[[0.8, 0.0, 0.6]]]), one), Light(np.pi, 0.0))[0, 0]
+    assert side[:3] == pytest.approx(encoded(0.04 + 0.06 + 0.08 * 0.8))  # in the lamp's shade
     found = fine(ball(16), 4)
     left, right = lit(found, Light(2.0, 0.7)), lit(found, Light(np.pi - 2.0, 0.7))
     assert np.abs(left - right[:, ::-1]).max() < 1e-9
