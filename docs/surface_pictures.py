@@ -1,4 +1,4 @@
-"""The pictures of docs/surface.md and the README: strokes, normal map and shaded surface in a row.
+"""Pictures of surfaces for pages and the README: strokes, normal map and shaded surface in a row.
 
 A row is a surface; where the truth is known, it is shaded beside. All rows are under the same lamp.
 """

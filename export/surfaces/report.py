@@ -12,8 +12,8 @@ from ...models.surface.surface import Surface
 from ..formats.registry import generator
 
 SIGN: Final = (
-    "inside or outside: a bump and a hollow have the same crosses; here normals point outward at the border"
-    " of the mask, --flip turns the surface inside out"
+    "inside or outside: a bump and a hollow have the same crosses; without hints normals point outward at the"
+    " border of the mask, and --flip turns the surface inside out"
 )
 DEPTH: Final = (
     "depth: parts that bend in one direction only (cylinders, cones, waves) can be deeper or flatter with the"
