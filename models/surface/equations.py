@@ -1,0 +1,184 @@
+"""What a surface over crosses minimises, and its slope and curvature for a descent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+
+from ..instance.grid import Floats
+from .crosses import Crosses
+from .stencils import Stencils, scaled
+
+CONJUGACY: Final = 0.1
+"""Weight of conjugacy: from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree."""
+FORGIVEN: Final = 0.007
+"""Cosine of the angle in space, of what should be a right one, from which a cross counts less and less."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """How much is asked of a surface beside the equations of its crosses.
+
+    even: of the normals of neighbours, times the number of pixels, to be alike. facing: of every normal to
+    point to the viewer. forgiven: as FORGIVEN; infinity for plain squares.
+    """
+
+    even: float
+    facing: float
+    forgiven: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Squares that are linear in the heights: sum of (matrix z - goal)^2."""
+
+    matrix: Any
+    goal: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The energy of heights z (N,) over the crosses at n pixels.
+
+    With g = grad z, sums over pixels, blocks of 2 x 2 pixels and pairs of neighbours:
+
+        right angles   r = (u.v + (u.g)(v.g)) / sqrt((1 + (u.g)^2)(1 + (v.g)^2)),  s^2 log(1 + r^2 / s^2)
+        conjugacy      CONJUGACY n / 2 ((u . d_v g)^2 + (v . d_u g)^2)
+        even           even n |N_i - N_j|^2 of unit normals
+        facing         facing log(1 + |g|^2), which is -2 log N_z
+
+    r is the cosine of the angle between both lines in space; s is `forgiven`. extra: more squares, of hints.
+    """
+
+    stencils: Stencils
+    crosses: Crosses
+    weights: Weights
+    extra: Sequence[Rows] = ()
+
+    @cached_property
+    def _lines(self) -> tuple[Floats, Floats]:
+        return self.crosses.lines
+
+    @cached_property
+    def _along(self) -> tuple[Any, Any]:
+        """The matrices (n, N) of the slopes along u and v."""
+        first, second = (_along(self.stencils.slopes, line) for line in self._lines)
+        return first, second
+
+    @cached_property
+    def conjugacy(self) -> Any:
+        """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks.
+
+        There all derivatives are central ones: at the border, where a surface is steep, one-sided ones of
+        pixels spoil more than the crosses do.
+        """
+        blocks = self.stencils.blocks
+        count = blocks.shape[1]
+        at = (np.tile(np.arange(count), 4), blocks.ravel())
+        mean = sparse.csr_array((np.full(4 * count, 0.25), at), shape=(count, self.stencils.grid.size))
+        u, v = self.crosses.averaged(mean).lines
+        return sparse.vstack([self._second(u, v), self._second(v, u)])
+
+    def _second(self, line: Floats, other: Floats) -> Any:
+        """The matrix (b, N) of line . d_other g."""
+        return sum(
+            scaled(_along(self.stencils.changes, other) @ slope, line[:, axis])
+            for axis, slope in enumerate(self.stencils.slopes)
+        )
+
+    @cached_property
+    def _squares(self) -> tuple[Rows, Any]:
+        """All squares that are linear, and the matrix (N, N) of their sum."""
+        size = self.stencils.grid.size
+        conjugacy = np.sqrt(CONJUGACY * size / 2) * self.conjugacy
+        twist = np.sqrt(self.weights.even * size / 10) * self.stencils.twist
+        matrix = sparse.vstack([conjugacy, twist, *(rows.matrix for rows in self.extra)]).tocsr()
+        plain = np.zeros(conjugacy.shape[0] + twist.shape[0])
+        goal = np.concatenate([plain, *(rows.goal for rows in self.extra)])
+        return Rows(matrix, goal), matrix.T @ matrix
+
+    def right_angles(self, z: Floats) -> Floats:
+        """The cosines r (n,) of the angles in space between both lines."""
+        u, v = self._lines
+        a, b = (along @ z for along in self._along)
+        cosine: Floats = (np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b))
+        return cosine
+
+    def energy(self, z: Floats) -> float:
+        """The energy of heights."""
+        linear, _ = self._squares
+        x, y = (slope @ z for slope in self.stencils.slopes)
+        normals = _normals(x, y)
+        uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
+        return float(
+            self._loss(self.right_angles(z))
+            + np.sum((linear.matrix @ z - linear.goal) ** 2)
+            + self.weights.even * len(x) * uneven
+            + self.weights.facing * np.sum(np.log1p(x * x + y * y))
+        )
+
+    def _loss(self, cosine: Floats) -> float:
+        scale = self.weights.forgiven
+        if np.isinf(scale):
+            return float(np.sum(cosine**2))
+        return float(scale**2 * np.sum(np.log1p((cosine / scale) ** 2)))
+
+    def model(self, z: Floats) -> tuple[Floats, Any]:
+        """Half the slope (N,) of the energy at z, and half a curvature (N, N) that is nowhere negative.
+
+        The curvature is that of Gauss and Newton; of `facing`, that of |g|^2 weighed as at z.
+        """
+        slope, curvature = self._of_angles(z)
+        for more, curved in (self._of_squares(z), self._of_normals(z)):
+            slope, curvature = slope + more, curvature + curved
+        return slope, curvature
+
+    def _of_angles(self, z: Floats) -> tuple[Floats, Any]:
+        cosine = self.right_angles(z)
+        a, b = (along @ z for along in self._along)
+        long_a, long_b = 1 + a * a, 1 + b * b
+        both = np.sqrt(long_a * long_b)
+        change = scaled(self._along[0], b / both - cosine * a / long_a)
+        change += scaled(self._along[1], a / both - cosine * b / long_b)
+        counts = 1 / (1 + (cosine / self.weights.forgiven) ** 2)
+        weighed = scaled(change, counts)
+        return weighed.T @ cosine, weighed.T @ change
+
+    def _of_squares(self, z: Floats) -> tuple[Floats, Any]:
+        linear, curvature = self._squares
+        return linear.matrix.T @ (linear.matrix @ z - linear.goal), curvature
+
+    def _of_normals(self, z: Floats) -> tuple[Floats, Any]:
+        across, upward = self.stencils.slopes
+        x, y = across @ z, upward @ z
+        long = 1 + x * x + y * y
+        cube = long**-1.5
+        changes = (
+            scaled(upward, x * y * cube) - scaled(across, (1 + y * y) * cube),
+            scaled(across, x * y * cube) - scaled(upward, (1 + x * x) * cube),
+            -scaled(across, x * cube) - scaled(upward, y * cube),
+        )
+        even = self.weights.even * len(x) * self.stencils.unevenness
+        parts = [(change.T @ even, change) for change in changes]
+        slope = sum(part @ normal for (part, _), normal in zip(parts, _normals(x, y), strict=True))
+        curvature = sum(part @ change for part, change in parts)
+        for matrix, value in ((across, x), (upward, y)):
+            weighed = scaled(matrix, self.weights.facing / long)
+            slope, curvature = slope + weighed.T @ value, curvature + weighed.T @ matrix
+        return slope, curvature
+
+
+def _along(matrices: tuple[Any, Any], line: Floats) -> Any:
+    """The derivative along a line of directions (k, 2), from those by x and y."""
+    return scaled(matrices[0], line[:, 0]) + scaled(matrices[1], line[:, 1])
+
+
+def _normals(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """The parts of the unit normals of slopes x and y."""
+    upright = 1 / np.sqrt(1 + x * x + y * y)
+    return -x * upright, -y * upright, upright

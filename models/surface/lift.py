@@ -1,0 +1,103 @@
+"""From a cross field to the surface whose curvature lines its crosses look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from scipy import ndimage
+
+from ..field.field import CrossField
+from ..instance.grid import Bools, Floats, Grid
+from ..processes.deadline import Over, never
+from ..processes.progress import Progress, silent
+from .crosses import Crosses
+from .descent import descended
+from .equations import FORGIVEN, Equations, Weights
+from .hints import Disc, Hint, check_hints
+from .levels import Level, levels_of
+from .stencils import Stencils
+from .surface import Surface
+from .trust import judged
+
+FIRST: Final = Weights(even=1e-4, facing=1e-2)
+"""The first pass from a start: stiff, so that starts come together."""
+WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
+"""Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
+
+_LEVEL: Final = 0.05  # share of what leans at the border to which the leanings cancel, where none is outward
+
+
+def surface(
+    field: CrossField,
+    hints: Iterable[Hint] = (),
+    *,
+    flip: bool = False,
+    over: Over = never,
+    progress: Progress = silent,
+) -> Surface:
+    """The surface that the crosses of a field are the curvature lines of, as nearly as there is one.
+    """
+    instance, given = field.instance, tuple(hints)
+    check_hints(given, instance)
+    part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
+    heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
+    for number in range(1, parts + 1):
+        progress("surface" if parts == 1 else f"surface: part {number} of {parts}")
+        level = _part(field, part_of == number)
+        own = [hint for hint in given if part_of[hint.row, hint.column] == number]
+        z = _oriented(level, _solved(level, own, over), own, flip=flip)
+        used, (top, left) = level.stencils.used, level.corner
+        heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
+    return judged(field, heights)
+
+
+def _part(field: CrossField, mask: Bools) -> Level:
+    """The finest level of a part of the mask, cut out."""
+    window = ndimage.find_objects(mask.astype(np.int8))[0]
+    crosses = Crosses.of(field).at(mask[field.instance.mask])
+    return Level(Stencils(Grid(mask[window])), crosses, (window[0].start, window[1].start))
+
+
+def _solved(part: Level, hints: Sequence[Hint], over: Over) -> Floats:
+    """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
+    coarse, *finer = levels_of(part)
+    found = [each for z in coarse.starts for each in _from_start(coarse, z, hints, over)]
+    _, z = min(found, key=lambda each: each[0])
+    for level in finer:
+        z = _settled(level, level.refined(coarse, z), hints, over)[1]
+        coarse = level
+    return z
+
+
+def _from_start(
+    level: Level, z: Floats, hints: Sequence[Hint], over: Over
+) -> Iterator[tuple[float, Floats]]:
+    """Energies and heights to which a start leads; with hints, which tell z from -z, from both."""
+    _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
+    for side in (z, -z) if hints else (z,):
+        yield _settled(level, side, hints, over)
+
+
+def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
+    """The energy and heights to which z leads down, with the hints."""
+    extra = [Disc.of(hint, level).rows for hint in hints]
+    return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
+
+
+def _oriented(level: Level, z: Floats, hints: Sequence[Hint], *, flip: bool) -> Floats:
+    """The heights or their negatives: as hints say, else leaning outward at the border, or upwards."""
+    if any(hint.slant > 0 for hint in hints):
+        return z
+    across, upward = (-(slope @ z) for slope in level.stencils.slopes)
+    upright = 1 / np.sqrt(1 + across**2 + upward**2)
+    lean = np.stack([across * upright, upward * upright], axis=1)
+    inside = np.pad(level.grid.mask, 1)
+    row, column = level.grid.rows + 1, level.grid.columns + 1
+    sides = [(0, 1, 1, 0), (0, -1, -1, 0), (-1, 0, 0, 1), (1, 0, 0, -1)]
+    outward = np.concatenate([(lean @ (x, y))[~inside[row + r, column + c]] for r, c, x, y in sides])
+    total = outward.sum()
+    if abs(total) <= _LEVEL * np.abs(outward).sum():
+        total = lean[:, 1].sum()
+    return -z if (total < 0) != flip else z
