@@ -13,10 +13,11 @@ import numpy as np
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..instance.instance import Instance
+from ..previews import Pictured
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Pictured):
     """The heights that a cross field was lifted to, and how far they can be trusted.
 
     field: the cross field, its pixels in the order of `instance.grid`. heights: float (height + 1, width + 1)

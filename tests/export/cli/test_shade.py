@@ -90,7 +90,7 @@ REFUSED = [
     (["--size", "12"], "is a field, which has its own grid"),
     (["--method", "greedy"], "is a field, which has its own grid"),
     (["--crossings"], "is a field, which has its own grid"),
-    (["--over", "bottle"], "lies elsewhere"),
+    (["--over", "nothing.svg"], "cannot be read"),
 ]
 
 

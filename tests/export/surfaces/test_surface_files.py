@@ -175,6 +175,7 @@ def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):
     assert cf.draw(surface, tmp_path / "b.svg", kind="matcap", title="A ball").stat().st_size > 10_000
     for kind in ("normals", "relief"):
         assert cf.draw(surface, tmp_path / "b.png", kind=kind).read_bytes() != default
+    assert surface._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="choose one of shaded"):
         cf.draw(surface, tmp_path / "b.png", kind="crosses")
     with pytest.raises(InputError, match="is one of a surface"):
