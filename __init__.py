@@ -52,18 +52,23 @@ if TYPE_CHECKING:
     from .models.smooth.bend import bend_field as bend_field
     from .models.smooth.polyvector import polyvector_field as polyvector_field
     from .models.smooth.power_field import power_field as power_field
+    from .models.surface.hints import Hint as Hint
+    from .models.surface.lift import surface as surface
+    from .models.surface.surface import Surface as Surface
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",
+    "Hint": ".models.surface.hints",
     "Instance": ".models.instance.instance",
     "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
     "Proof": ".models.proof.record",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
+    "Surface": ".models.surface.surface",
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
@@ -87,6 +92,7 @@ _HOME: Final = {
     "samples": ".models.sketch.samples",
     "search": ".models.proof.dual_start",
     "solve": ".export.solving.local",
+    "surface": ".models.surface.lift",
     "to_pyomo": ".export.formats.pyomo_model",
     "two_stage": ".export.solving.two_stage",
     "with_integers_fixed": ".models.formulations.problem",
