@@ -88,7 +88,10 @@ def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
 
 
 def _revolved(
-    profile: tuple[Profile, Profile], slopes: tuple[Profile, Profile], t_range: tuple[float, float], cut: float
+    profile: tuple[Profile, Profile],
+    slopes: tuple[Profile, Profile],
+    t_range: tuple[float, float],
+    cut: float,
 ) -> CurvaturePatch:
     """The front of a surface of revolution about the y axis, up to `cut` radians from its sides.
 
@@ -182,7 +185,10 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
         share=0.2,
     ),
     "cone": _revolved(
-        (lambda t: 0.9 - 0.3 * t, lambda t: t), (lambda t: -0.3 + 0 * t, lambda t: 1 + 0 * t), (-1.3, 1.3), 0.45
+        (lambda t: 0.9 - 0.3 * t, lambda t: t),
+        (lambda t: -0.3 + 0 * t, lambda t: 1 + 0 * t),
+        (-1.3, 1.3),
+        0.45,
     ),
     "vase": _revolved(
         (lambda t: 1 + 0.2 * sine(2 * t), lambda t: t),

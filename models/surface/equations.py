@@ -113,13 +113,14 @@ class Equations:
         """The energy of heights."""
         linear, _ = self._squares
         x, y = (slope @ z for slope in self.stencils.slopes)
-        normals = _normals(x, y)
+        upright = 1 / np.sqrt(1 + x * x + y * y)
+        normals = (x * upright, y * upright, upright)
         uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
         return float(
             self._loss(self.right_angles(z))
             + np.sum((linear.matrix @ z - linear.goal) ** 2)
             + self.weights.even * len(x) * uneven
-            + self.weights.facing * np.sum(np.log1p(x * x + y * y))
+            - 2 * self.weights.facing * np.sum(np.log(upright))
         )
 
     def _loss(self, cosine: Floats) -> float:
@@ -154,31 +155,32 @@ class Equations:
         return linear.matrix.T @ (linear.matrix @ z - linear.goal), curvature
 
     def _of_normals(self, z: Floats) -> tuple[Floats, Any]:
-        across, upward = self.stencils.slopes
-        x, y = across @ z, upward @ z
-        long = 1 + x * x + y * y
-        cube = long**-1.5
-        changes = (
-            scaled(upward, x * y * cube) - scaled(across, (1 + y * y) * cube),
-            scaled(across, x * y * cube) - scaled(upward, (1 + x * x) * cube),
-            -scaled(across, x * cube) - scaled(upward, y * cube),
-        )
-        even = self.weights.even * len(x) * self.stencils.unevenness
-        parts = [(change.T @ even, change) for change in changes]
-        slope = sum(part @ normal for (part, _), normal in zip(parts, _normals(x, y), strict=True))
-        curvature = sum(part @ change for part, change in parts)
-        for matrix, value in ((across, x), (upward, y)):
-            weighed = scaled(matrix, self.weights.facing / long)
-            slope, curvature = slope + weighed.T @ value, curvature + weighed.T @ matrix
+        even = self.weights.even * len(self.crosses.product) * self.stencils.unevenness
+        normals, changes = normals_of(self.stencils, z)
+        parts = [change.T @ even for change in changes]
+        slope = sum(part @ normal for part, normal in zip(parts, normals, strict=True))
+        curvature = sum(part @ change for part, change in zip(parts, changes, strict=True))
+        upright = normals[2] ** 2
+        for matrix in self.stencils.slopes:
+            weighed = scaled(matrix, self.weights.facing * upright).T
+            slope, curvature = slope + weighed @ (matrix @ z), curvature + weighed @ matrix
         return slope, curvature
+
+
+def normals_of(stencils: Stencils, z: Floats) -> tuple[tuple[Floats, ...], tuple[Any, ...]]:
+    """The parts x, y, z of the unit normals (n,), and how each changes with the heights, matrices (n, N)."""
+    across, upward = stencils.slopes
+    x, y = across @ z, upward @ z
+    upright = 1 / np.sqrt(1 + x * x + y * y)
+    cube = upright**3
+    changes = (
+        scaled(upward, x * y * cube) - scaled(across, (1 + y * y) * cube),
+        scaled(across, x * y * cube) - scaled(upward, (1 + x * x) * cube),
+        -scaled(across, x * cube) - scaled(upward, y * cube),
+    )
+    return (-x * upright, -y * upright, upright), changes
 
 
 def _along(matrices: tuple[Any, Any], line: Floats) -> Any:
     """The derivative along a line of directions (k, 2), from those by x and y."""
     return scaled(matrices[0], line[:, 0]) + scaled(matrices[1], line[:, 1])
-
-
-def _normals(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """The parts of the unit normals of slopes x and y."""
-    upright = 1 / np.sqrt(1 + x * x + y * y)
-    return -x * upright, -y * upright, upright

@@ -37,7 +37,8 @@ class Hint:
     @property
     def slopes(self) -> Floats:
         """The slopes (dz/dx, dz/dy) of a surface with this normal."""
-        return -np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)])
+        lean: Floats = np.array([np.cos(self.tilt), np.sin(self.tilt)])
+        return -np.tan(self.slant) * lean
 
 
 def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
@@ -72,7 +73,8 @@ class Disc:
         """The disc of a hint; one pixel at least."""
         grid, (top, left) = level.grid, level.corner
         away = np.hypot(
-            grid.rows - ((hint.row - top) >> level.halved), grid.columns - ((hint.column - left) >> level.halved)
+            grid.rows - ((hint.row - top) >> level.halved),
+            grid.columns - ((hint.column - left) >> level.halved),
         )
         return cls(level, away <= max(1.0, _DISC * np.sqrt(grid.size)), hint.slopes)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy import sparse
 
 from ..instance.grid import Bools, Floats, Grid
 from .crosses import Crosses
@@ -37,15 +38,11 @@ class Level:
     def coarser(self) -> Level:
         """The level of pixels twice as large: one for each 2 x 2 that holds any, with their mean cross."""
         grid = self.grid
-        number = Grid(_halved(grid.mask))
-        at = number.number[grid.rows // 2, grid.columns // 2]
-        pixels = np.bincount(at, minlength=number.size)
-
-        def mean(values: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-            return (np.bincount(at, values.real) + 1j * np.bincount(at, values.imag)) / pixels
-
-        crosses = Crosses(mean(self.crosses.product), mean(self.crosses.total))
-        return Level(Stencils(number), crosses, self.corner, self.halved + 1)
+        larger = Grid(_halved(grid.mask))
+        at = larger.number[grid.rows // 2, grid.columns // 2]
+        share = 1 / np.bincount(at, minlength=larger.size)[at]
+        mean = sparse.csr_array((share, (at, np.arange(grid.size))), shape=(larger.size, grid.size))
+        return Level(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
 
     def refined(self, coarse: Level, heights: Floats) -> Floats:
         """The heights (N,) between those of the coarser level, which is made of this one."""
@@ -81,5 +78,4 @@ def levels_of(level: Level) -> list[Level]:
 def _halved(mask: Bools) -> Bools:
     """Whether any pixel of each 2 x 2 is in the mask, from the upper left corner on."""
     even = np.pad(mask, [(0, size % 2) for size in mask.shape])
-    found: Bools = even.reshape(even.shape[0] // 2, 2, -1, 2).any(axis=(1, 3))
-    return found
+    return np.logical_or.reduce([even[down::2, right::2] for down in (0, 1) for right in (0, 1)])

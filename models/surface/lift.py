@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from .hints import Disc, Hint, check_hints
 from .levels import Level, levels_of
 from .stencils import Stencils
 from .surface import Surface
-from .trust import judged
+from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)
 """The first pass from a start: stiff, so that starts come together."""
@@ -37,20 +38,58 @@ def surface(
     over: Over = never,
     progress: Progress = silent,
 ) -> Surface:
-    """The surface that the crosses of a field are the curvature lines of, as nearly as there is one.
+    """The surface whose curvature lines the crosses of a field look most like, seen from the front.
+
+    One height at each corner of a pixel, found by minimising the energy of `Equations` from three starts on
+    a coarse grid, and then on finer ones. Neither the order of the two lines nor jumps matter. Parts of the
+    mask that share no corner are independent; the mean height of each is 0. Deterministic.
+
+    Turned inside out, z to -z, a surface has the same crosses. So each part leans outward at its border on
+    the whole, or where that is undecided upward, as a floor seen from above. hints: normals that are known at
+    some pixels; a part with one that is not straight at the viewer takes its side from there. flip: turns
+    all other parts inside out. Hints also choose among surfaces of different depth with the same crosses.
+    over: says whether the time is over; then the best heights so far come back, and a doubt says so.
+
+    Raises InputError for a hint outside the mask, or with angles that no normal has. See docs/surface.md.
     """
-    instance, given = field.instance, tuple(hints)
+    instance, given, cut = field.instance, tuple(hints), Cut(over)
     check_hints(given, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
+    found = []
     for number in range(1, parts + 1):
-        progress("surface" if parts == 1 else f"surface: part {number} of {parts}")
+        progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
         level = _part(field, part_of == number)
         own = [hint for hint in given if part_of[hint.row, hint.column] == number]
-        z = _oriented(level, _solved(level, own, over), own, flip=flip)
+        z = _oriented(level, _solved(level, own, cut), own, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
-    return judged(field, heights)
+        found.append((level.grid.size, level, z, own))
+    _, level, z, own = max(found, key=lambda each: each[0])
+    firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
+    return _judged(field, heights, firm, hinted=_tells(own), cut=cut.off)
+
+
+def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cut: bool) -> Surface:
+    """The surface of heights, with what is to be said of it."""
+    off = off_right_angles(field, heights)
+    found = Surface(field, heights, confidence_of(field, off), (), freedom_of(firm, hinted=hinted), firm)
+    slant = np.arccos(np.minimum(found.normals[:, 2], 1.0))
+    late = ("time was over before it had settled",) if cut else ()
+    return replace(found, doubts=(*doubts_of(field, off, slant), *late))
+
+
+@dataclass
+class Cut:
+    """Whether time is over, asked of another; keeps in mind that it once was."""
+
+    over: Over
+    off: bool = False
+
+    def __call__(self) -> bool:
+        """Whether time is over."""
+        self.off = self.off or self.over()
+        return self.off
 
 
 def _part(field: CrossField, mask: Bools) -> Level:
@@ -71,9 +110,7 @@ def _solved(part: Level, hints: Sequence[Hint], over: Over) -> Floats:
     return z
 
 
-def _from_start(
-    level: Level, z: Floats, hints: Sequence[Hint], over: Over
-) -> Iterator[tuple[float, Floats]]:
+def _from_start(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> Iterator[tuple[float, Floats]]:
     """Energies and heights to which a start leads; with hints, which tell z from -z, from both."""
     _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
     for side in (z, -z) if hints else (z,):
@@ -88,7 +125,7 @@ def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tupl
 
 def _oriented(level: Level, z: Floats, hints: Sequence[Hint], *, flip: bool) -> Floats:
     """The heights or their negatives: as hints say, else leaning outward at the border, or upwards."""
-    if any(hint.slant > 0 for hint in hints):
+    if _tells(hints):
         return z
     across, upward = (-(slope @ z) for slope in level.stencils.slopes)
     upright = 1 / np.sqrt(1 + across**2 + upward**2)
@@ -101,3 +138,8 @@ def _oriented(level: Level, z: Floats, hints: Sequence[Hint], *, flip: bool) -> 
     if abs(total) <= _LEVEL * np.abs(outward).sum():
         total = lean[:, 1].sum()
     return -z if (total < 0) != flip else z
+
+
+def _tells(hints: Sequence[Hint]) -> bool:
+    """Whether hints tell z from -z."""
+    return any(hint.slant > 0 for hint in hints)

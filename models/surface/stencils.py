@@ -54,7 +54,7 @@ class Stencils:
 
     @cached_property
     def changes(self) -> tuple[Any, Any]:
-        """The matrices (b, n) of the derivatives by x and y, at the centres of blocks, of what pixels have."""
+        """The matrices (b, n) of the derivatives by x and y, at the centres of blocks, of values of pixels."""
         size = self.grid.size
         return _sums(self.blocks, size, -0.5, 0.5, -0.5, 0.5), _sums(self.blocks, size, 0.5, 0.5, -0.5, -0.5)
 
