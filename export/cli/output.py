@@ -263,14 +263,19 @@ def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None)
         say(f"field: {field}")
 
 
+_SENTENCES: Final = ("doubts", "freedom")
+
+
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print how well a surface fits, what it leaves open, why it may be wrong, and where its files are."""
-    from ..surfaces.report import DEPTH, SIGN, surface_facts
+    from ..surfaces.report import surface_facts
 
     facts = surface_facts(surface)
-    show_facts(surface.instance.summary, {key: value for key, value in facts.items() if key != "doubts"})
-    for text in (SIGN, DEPTH):
+    show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})
+    for text in surface.freedom:
         say(_wrapped(f"open: {text}"))
+    if surface.freedom:
+        say(_wrapped("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT says how it lies at a pixel"))
     for doubt in surface.doubts:
         complain(f"in doubt: {doubt}")
     say(f"pictures, heights, mesh: {folder}")

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from ...models.instance.grid import Floats
 from ...models.surface.surface import Surface
+from ...models.surface.trust import off_right_angles
 from ..formats.registry import generator
-
-SIGN: Final = (
-    "inside or outside: a bump and a hollow have the same crosses; without hints normals point outward at the"
-    " border of the mask, and --flip turns the surface inside out"
-)
-DEPTH: Final = (
-    "depth: parts that bend in one direction only (cylinders, cones, waves) can be deeper or flatter with the"
-    " same crosses; --hint ROW,COLUMN,SLANT,TILT settles it"
-)
 
 
 def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -39,17 +30,18 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
         },
         **(about or {}),
         **surface_facts(surface),
-        "open": [SIGN, DEPTH],
     }
 
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
-    """Whether a surface can be trusted, and why not; its heights in pixels and angles in degrees."""
-    off = np.degrees(right_angle_error(surface))
+    """Whether a surface can be trusted, why not, and what stays open; pixels and degrees."""
+    off = np.degrees(off_right_angles(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     return {
         "trusted": not surface.doubts,
         "doubts": list(surface.doubts),
+        "freedom": list(surface.freedom),
+        "firmness": _rounded(surface.firmness),
         "confidence_mean": _rounded(surface.confidence.mean()),
         "confidence_least_tenth": _rounded(np.percentile(surface.confidence, 10)),
         "right_angle_error_mean_degrees": _rounded(off.mean()),
@@ -58,19 +50,6 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
         "slant_most_degrees": _rounded(slant.max()),
         "height_range_pixels": _rounded(np.ptp(surface.corners)),
     }
-
-
-def right_angle_error(surface: Surface) -> Floats:
-    """Radians by which the two lines of each cross, lifted to the surface, miss a right angle; shape (n,).
-
-    Lines u and v become the tangents (u, u.g) and (v, v.g), with g the slopes of the surface.
-    """
-    field, slopes = surface.field, surface.gradient
-    rise_u, rise_v = (np.sum(line * slopes, axis=1) for line in (field.u, field.v))
-    product = np.sum(field.u * field.v, axis=1) + rise_u * rise_v
-    cosine = product / np.sqrt((1 + rise_u**2) * (1 + rise_v**2))
-    error: Floats = np.arcsin(np.clip(np.abs(cosine), 0.0, 1.0))
-    return error
 
 
 def _rounded(value: Any) -> float:

@@ -31,7 +31,8 @@ def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
     assert invoke(given) == 0
     out = capsys.readouterr().out
     assert "mouse: 12 x 11" in out
-    assert "inside or outside" in out
+    assert "open: inside out it has the same crosses" in out
+    assert "--flip" in out
     assert str(tmp_path / "out") in out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "field.npz"}
     assert told(tmp_path / "out")["method"] == "bend"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from crossfield.export.surfaces.files import FILES, write_surface
 from crossfield.export.surfaces.mesh import to_obj
-from crossfield.export.surfaces.report import right_angle_error, surface_facts
+from crossfield.export.surfaces.report import surface_facts
 from crossfield.models.errors import InputError, OutputError
 from hypothesis import given
 from hypothesis import strategies as st
@@ -152,20 +152,17 @@ def test_what_fails_leaves_no_report_of_an_earlier_surface(tmp_path):
     assert not list((tmp_path / "there").glob("*.part"))
 
 
-def test_right_angles_on_the_surface_have_no_error():
+def test_facts_are_those_of_a_plane():
     slope = np.array([0.6, 0.8])
     u, v = (1.0, 0.0), (-0.48, 1.36)  # u . v + (u . g)(v . g) = 0
     assert u[0] * v[0] + (u[0] * slope[0]) * np.dot(v, slope) == pytest.approx(0)
-    exact = plane(6, *slope, u=0.0, v=np.arctan2(v[1], v[0]))
-    assert right_angle_error(exact).max() < 1e-9
-    square = plane(6, *slope)
-    assert np.sin(right_angle_error(square)) == pytest.approx(0.48 / np.sqrt(1.36 * 1.64))
-    told = surface_facts(square)
+    exact = surface_facts(plane(6, *slope, u=0.0, v=np.arctan2(v[1], v[0])))
+    assert exact["right_angle_error_90_percent_degrees"] == pytest.approx(0, abs=1e-4)
+    told = surface_facts(plane(6, *slope))
+    error = np.degrees(np.arcsin(0.48 / np.sqrt(1.36 * 1.64)))
+    assert told["right_angle_error_mean_degrees"] == pytest.approx(error, abs=1e-3)
     assert told["slant_mean_degrees"] == pytest.approx(45.0)
     assert told["height_range_pixels"] == pytest.approx(0.6 * 8 + 0.8 * 6)
-    assert told["right_angle_error_mean_degrees"] == pytest.approx(
-        np.degrees(np.arcsin(0.48 / np.sqrt(1.36 * 1.64))), abs=1e-4
-    )
 
 
 def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):
