@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from ...models.instance.grid import Floats
 from ..shading.light import lit
@@ -11,6 +11,8 @@ from ..shading.matcap import matcap
 from ..shading.normal_map import coloured
 from ..shading.raster import Raster, raster
 from .panels import Picture
+
+_DOTS_A_POINT: Final = 3  # as in a PNG
 
 
 def draw_shaded(axes: Any, picture: Picture) -> None:
@@ -33,8 +35,9 @@ def _draw(axes: Any, picture: Picture, colours: Callable[[Raster], Floats]) -> N
     if picture.surface is None:
         return
     height, width = picture.instance.mask.shape
+    scale = max(1, round(_DOTS_A_POINT * picture.unit))
     axes.imshow(
-        colours(raster(picture.instance, picture.surface.normals)),
+        colours(raster(picture.instance, picture.surface.normals, scale)),
         extent=(-0.5, width - 0.5, 0.5 - height, 0.5),
         origin="upper",
         interpolation="hanning",

@@ -169,9 +169,8 @@ def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):
     surface = ball(10)
     default = cf.draw(surface, tmp_path / "a.png").read_bytes()
     assert cf.draw(surface, tmp_path / "b.png", kind="shaded").read_bytes() == default
-    assert cf.draw(surface, tmp_path / "b.svg", kind="matcap", title="A ball").stat().st_size > 10_000
-    for kind in ("normals", "relief"):
-        assert cf.draw(surface, tmp_path / "b.png", kind=kind).read_bytes() != default
+    assert cf.draw(surface, tmp_path / "b.svg", kind="normals", title="A ball").stat().st_size > 10_000
+    assert cf.draw(surface, tmp_path / "b.png", kind="relief").read_bytes() != default
     assert surface._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="choose one of shaded"):
         cf.draw(surface, tmp_path / "b.png", kind="crosses")
