@@ -64,8 +64,8 @@ class CurvaturePatch:
 class AnalyticInstance:
     """An instance with the exact line angles of both projected curvature lines, and the surface itself.
 
-    At the centre of each pixel of the grid: u_angle, v_angle: float (n,) in [0, pi) radians, counter-clockwise
-    with y up; normals: unit vectors towards the viewer, (n, 3); heights: z in pixels, (n,).
+    At the centre of each pixel of the grid: u_angle, v_angle: float (n,) in [0, pi) radians,
+    counter-clockwise with y up; normals: unit vectors towards the viewer, (n, 3); heights: z in pixels, (n,).
     """
 
     instance: Instance

@@ -13,7 +13,7 @@ from .equations import Equations
 
 _ROUNDS: Final = 60  # 5 to 25 are usual
 _TRIALS: Final = 12  # of a damping in a round
-_FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
+_FALL: Final = 2e-4  # share of the energy that a round has to take off for another one to be made
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
 _UP: Final = 5.0

@@ -112,15 +112,13 @@ class Equations:
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
         linear, _ = self._squares
-        x, y = (slope @ z for slope in self.stencils.slopes)
-        upright = 1 / np.sqrt(1 + x * x + y * y)
-        normals = (x * upright, y * upright, upright)
+        normals = normals_of(self.stencils, z)
         uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
         return float(
             self._loss(self.right_angles(z))
             + np.sum((linear.matrix @ z - linear.goal) ** 2)
-            + self.weights.even * len(x) * uneven
-            - 2 * self.weights.facing * np.sum(np.log(upright))
+            + self.weights.even * normals.shape[1] * uneven
+            - 2 * self.weights.facing * np.sum(np.log(normals[2]))
         )
 
     def _loss(self, cosine: Floats) -> float:
@@ -134,51 +132,64 @@ class Equations:
 
         The curvature is that of Gauss and Newton; of `facing`, that of |g|^2 weighed as at z.
         """
-        slope, curvature = self._of_angles(z)
-        for more, curved in (self._of_squares(z), self._of_normals(z)):
-            slope, curvature = slope + more, curvature + curved
-        return slope, curvature
+        linear, squares = self._squares
+        down, angles = self._of_angles(z)
+        even, bend = self._of_normals(z)
+        upright = self.weights.facing * normals_of(self.stencils, z)[2] ** 2
+        to_slopes = sparse.vstack(self.stencils.slopes).tocsr()
+        facing = np.concatenate([upright, upright])
+        inner = angles + bend + sparse.diags_array(facing)
+        slope = to_slopes.T @ (down + even + facing * (to_slopes @ z))
+        slope += linear.matrix.T @ (linear.matrix @ z - linear.goal)
+        return slope, to_slopes.T @ (inner @ to_slopes) + squares
 
     def _of_angles(self, z: Floats) -> tuple[Floats, Any]:
+        """Slope (2n,) and curvature (2n, 2n) of the right angles by dz/dx, then dz/dy, of all pixels."""
+        u, v = self._lines
         cosine = self.right_angles(z)
         a, b = (along @ z for along in self._along)
         long_a, long_b = 1 + a * a, 1 + b * b
         both = np.sqrt(long_a * long_b)
-        change = scaled(self._along[0], b / both - cosine * a / long_a)
-        change += scaled(self._along[1], a / both - cosine * b / long_b)
-        counts = 1 / (1 + (cosine / self.weights.forgiven) ** 2)
-        weighed = scaled(change, counts)
-        return weighed.T @ cosine, weighed.T @ change
-
-    def _of_squares(self, z: Floats) -> tuple[Floats, Any]:
-        linear, curvature = self._squares
-        return linear.matrix.T @ (linear.matrix @ z - linear.goal), curvature
+        change = u.T * (b / both - cosine * a / long_a) + v.T * (a / both - cosine * b / long_b)
+        weighed = change / (1 + (cosine / self.weights.forgiven) ** 2)
+        every = np.arange(len(cosine))
+        return (weighed * cosine).ravel(), _in_blocks(weighed[:, None] * change, every, every)
 
     def _of_normals(self, z: Floats) -> tuple[Floats, Any]:
-        even = self.weights.even * len(self.crosses.product) * self.stencils.unevenness
-        normals, changes = normals_of(self.stencils, z)
-        parts = [change.T @ even for change in changes]
-        slope = sum(part @ normal for part, normal in zip(parts, normals, strict=True))
-        curvature = sum(part @ change for part, change in zip(parts, changes, strict=True))
-        upright = normals[2] ** 2
-        for matrix in self.stencils.slopes:
-            weighed = scaled(matrix, self.weights.facing * upright).T
-            slope, curvature = slope + weighed @ (matrix @ z), curvature + weighed @ matrix
-        return slope, curvature
+        """The same of the unevenness of the normals."""
+        normals, change = normals_of(self.stencils, z), changes_of_normals(self.stencils, z)
+        weight = self.weights.even * normals.shape[1]
+        uneven = self.stencils.unevenness.tocoo()
+        row, column = uneven.coords
+        pulls = weight * (self.stencils.unevenness @ normals.T).T
+        blocks = np.einsum("cak,cbk->abk", change[:, :, row], change[:, :, column])
+        slope: Floats = np.einsum("cak,ck->ak", change, pulls).ravel()
+        return slope, _in_blocks(weight * uneven.data * blocks, row, column)
 
 
-def normals_of(stencils: Stencils, z: Floats) -> tuple[tuple[Floats, ...], tuple[Any, ...]]:
-    """The parts x, y, z of the unit normals (n,), and how each changes with the heights, matrices (n, N)."""
-    across, upward = stencils.slopes
-    x, y = across @ z, upward @ z
-    upright = 1 / np.sqrt(1 + x * x + y * y)
-    cube = upright**3
-    changes = (
-        scaled(upward, x * y * cube) - scaled(across, (1 + y * y) * cube),
-        scaled(across, x * y * cube) - scaled(upward, (1 + x * x) * cube),
-        -scaled(across, x * cube) - scaled(upward, y * cube),
-    )
-    return (-x * upright, -y * upright, upright), changes
+def normals_of(stencils: Stencils, z: Floats) -> Floats:
+    """The unit normals of the pixels, their parts x, y and z one below the other: shape (3, n)."""
+    x, y = (slope @ z for slope in stencils.slopes)
+    normals: Floats = np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y)
+    return normals
+
+
+def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
+    """How the parts of the normals change with dz/dx and dz/dy at the same pixel: shape (3, 2, n)."""
+    x, y = (slope @ z for slope in stencils.slopes)
+    changes: Floats = np.array([[-1 - y * y, x * y], [x * y, -1 - x * x], [-x, -y]])
+    changes *= (1 + x * x + y * y) ** -1.5
+    return changes
+
+
+def _in_blocks(values: Floats, row: Any, column: Any) -> Any:
+    """The matrix (2n, 2n) of 2 x 2 blocks of (n, n), that hold values (2, 2, k) at these places."""
+    size = int(row.max()) + 1
+    places = [
+        np.concatenate([each + size * block[axis] for block in np.ndindex(2, 2)])
+        for axis, each in enumerate((row, column))
+    ]
+    return sparse.csr_array((values.ravel(), tuple(places)), shape=(2 * size, 2 * size))
 
 
 def _along(matrices: tuple[Any, Any], line: Floats) -> Any:

@@ -37,8 +37,8 @@ class Hint:
     @property
     def slopes(self) -> Floats:
         """The slopes (dz/dx, dz/dy) of a surface with this normal."""
-        lean: Floats = np.array([np.cos(self.tilt), np.sin(self.tilt)])
-        return -np.tan(self.slant) * lean
+        rise: Floats = -np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)])
+        return rise
 
 
 def check_hints(hints: Iterable[Hint], instance: Instance) -> None:

@@ -78,4 +78,5 @@ def levels_of(level: Level) -> list[Level]:
 def _halved(mask: Bools) -> Bools:
     """Whether any pixel of each 2 x 2 is in the mask, from the upper left corner on."""
     even = np.pad(mask, [(0, size % 2) for size in mask.shape])
-    return np.logical_or.reduce([even[down::2, right::2] for down in (0, 1) for right in (0, 1)])
+    found: Bools = np.any([even[down::2, right::2] for down in (0, 1) for right in (0, 1)], axis=0)
+    return found

@@ -27,7 +27,7 @@ class Stencils:
         """Which corners [height + 1, width + 1] belong to a pixel of the mask."""
         used = np.zeros((self.grid.height + 1, self.grid.width + 1), dtype=bool)
         for corner in around(used):
-            corner |= self.grid.mask
+            corner[self.grid.mask] = True
         return used
 
     @cached_property
@@ -54,7 +54,7 @@ class Stencils:
 
     @cached_property
     def changes(self) -> tuple[Any, Any]:
-        """The matrices (b, n) of the derivatives by x and y, at the centres of blocks, of values of pixels."""
+        """The matrices (b, n) from values of pixels to derivatives by x and y at the centres of blocks."""
         size = self.grid.size
         return _sums(self.blocks, size, -0.5, 0.5, -0.5, 0.5), _sums(self.blocks, size, 0.5, 0.5, -0.5, -0.5)
 

@@ -12,9 +12,9 @@ from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..smooth.systems import factored, one_thread
 from .crosses import Crosses
-from .equations import Equations, Rows, Weights, normals_of
+from .equations import Equations, Rows, Weights, changes_of_normals
 from .levels import Level
-from .stencils import Stencils, around
+from .stencils import Stencils, around, scaled
 
 OFF: Final = np.radians(10)
 """Lines whose angle in space is further than this from a right one do not fit."""
@@ -58,7 +58,7 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
     if unfit > UNFIT:
         found.append(
             f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
-            "no one surface has these curvature lines, as where hidden lines are drawn, or lines of other kinds"
+            "no one surface has all these curvature lines, as where hidden lines are drawn"
         )
     if spots > SPOTS:
         found.append(f"the crosses turn round {spots} singular spots, more than a smooth surface shows")
@@ -76,7 +76,7 @@ def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
     if firm < LOOSE:
         found.append(
             "other surfaces fit as well, steeper or leaning otherwise: "
-            f"turning the normals by 10 degrees changes the angles between its lines by {10 * firm:.2f} degrees; "
+            f"when its normals turn by 10 degrees the angles between its lines change by {10 * firm:.2f}; "
             "a hint settles it"
         )
     return tuple(found)
@@ -95,8 +95,9 @@ def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     twist = level.stencils.twist
     _, curvature = Equations(level.stencils, level.crosses, _PLAIN, extra).model(z)
     curvature = curvature + _TWIST * (twist.T @ twist)
-    _, changes = normals_of(level.stencils, z)
-    turning = sum(change.T @ change for change in changes)
+    change, slopes = changes_of_normals(level.stencils, z), level.stencils.slopes
+    turns = [scaled(slopes[0], part[0]) + scaled(slopes[1], part[1]) for part in change]
+    turning = sum(turn.T @ turn for turn in turns)
     solve = factored(curvature + _PULL * turning)
     vectors = np.random.default_rng(0).standard_normal((count, _VECTORS))
     least = np.zeros(_VECTORS)
