@@ -19,7 +19,7 @@ GROUND: Final = "models"
 
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field",
-    "models/smooth", "models/formulations",
+    "models/smooth", "models/surface", "models/formulations",
     "models/search", "models/proof", "models/evaluation", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions/logs",
     "export/solutions",
