@@ -153,7 +153,7 @@ class Equations:
         change = u.T * (b / both - cosine * a / long_a) + v.T * (a / both - cosine * b / long_b)
         weighed = change / (1 + (cosine / self.weights.forgiven) ** 2)
         every = np.arange(len(cosine))
-        return (weighed * cosine).ravel(), _in_blocks(weighed[:, None] * change, every, every)
+        return (weighed * cosine).ravel(), _in_blocks(weighed[:, None] * change, every, every, len(every))
 
     def _of_normals(self, z: Floats) -> tuple[Floats, Any]:
         """The same of the unevenness of the normals."""
@@ -164,7 +164,7 @@ class Equations:
         pulls = weight * (self.stencils.unevenness @ normals.T).T
         blocks = np.einsum("cak,cbk->abk", change[:, :, row], change[:, :, column])
         slope: Floats = np.einsum("cak,ck->ak", change, pulls).ravel()
-        return slope, _in_blocks(weight * uneven.data * blocks, row, column)
+        return slope, _in_blocks(weight * uneven.data * blocks, row, column, normals.shape[1])
 
 
 def normals_of(stencils: Stencils, z: Floats) -> Floats:
@@ -182,9 +182,8 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
     return changes
 
 
-def _in_blocks(values: Floats, row: Any, column: Any) -> Any:
-    """The matrix (2n, 2n) of 2 x 2 blocks of (n, n), that hold values (2, 2, k) at these places."""
-    size = int(row.max()) + 1
+def _in_blocks(values: Floats, row: Any, column: Any, size: int) -> Any:
+    """The matrix (2n, 2n) of 2 x 2 blocks of (n, n), that hold values (2, 2, k) at these places; n = size."""
     places = [
         np.concatenate([each + size * block[axis] for block in np.ndindex(2, 2)])
         for axis, each in enumerate((row, column))

@@ -15,7 +15,7 @@ from ..processes.deadline import Over, never
 from ..processes.progress import Progress, silent
 from .crosses import Crosses
 from .descent import descended
-from .equations import FORGIVEN, Equations, Weights
+from .equations import FORGIVEN, Equations, Weights, normals_of
 from .hints import Disc, Hint, check_hints
 from .levels import Level, levels_of
 from .stencils import Stencils
@@ -27,6 +27,11 @@ FIRST: Final = Weights(even=1e-4, facing=1e-2)
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
 """Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
 
+CLEARLY: Final = 0.8
+"""Share of the energy from a dome below which that from a plane is preferred: bodies bulge more often."""
+
+TELLING: Final = np.radians(10)
+"""Least slant of a hint that tells z from -z: with less slant, both sides fit it nearly alike."""
 _LEVEL: Final = 0.05  # share of what leans at the border to which the leanings cancel, where none is outward
 
 
@@ -46,7 +51,7 @@ def surface(
 
     Turned inside out, z to -z, a surface has the same crosses. So each part leans outward at its border on
     the whole, or where that is undecided upward, as a floor seen from above. hints: normals that are known at
-    some pixels; a part with one that is not straight at the viewer takes its side from there. flip: turns
+    some pixels; a part with one that is slanted by 10 degrees or more takes its side from there. flip: turns
     all other parts inside out. Hints also choose among surfaces of different depth with the same crosses.
     over: says whether the time is over; then the best heights so far come back, and a doubt says so.
 
@@ -61,7 +66,7 @@ def surface(
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
         level = _part(field, part_of == number)
         own = [hint for hint in given if part_of[hint.row, hint.column] == number]
-        z = _oriented(level, _solved(level, own, cut), own, flip=flip)
+        z = _solved(level, own, cut, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         found.append((level.grid.size, level, z, own))
@@ -99,22 +104,34 @@ def _part(field: CrossField, mask: Bools) -> Level:
     return Level(Stencils(Grid(mask[window])), crosses, (window[0].start, window[1].start))
 
 
-def _solved(part: Level, hints: Sequence[Hint], over: Over) -> Floats:
+def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
-    found = [each for z in coarse.starts for each in _from_start(coarse, z, hints, over)]
-    _, z = min(found, key=lambda each: each[0])
+    dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
+    _, z = min([*dome, *((energy / CLEARLY, z) for found in planes for energy, z in found)], key=_energy)
     for level in finer:
         z = _settled(level, level.refined(coarse, z), hints, over)[1]
         coarse = level
-    return z
+    return z if hints else _oriented(part, z, flip=flip)
 
 
-def _from_start(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> Iterator[tuple[float, Floats]]:
-    """Energies and heights to which a start leads; with hints, which tell z from -z, from both."""
+def _energy(found: tuple[float, Floats]) -> float:
+    return found[0]
+
+
+def _from_start(
+    level: Level, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
+) -> Iterator[tuple[float, Floats]]:
+    """Energies and heights to which a start leads, with hints from the sides that are possible."""
     _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
-    for side in (z, -z) if hints else (z,):
+    z = _oriented(level, z, flip=flip)
+    for side in (z, -z) if _tells(hints) else (z,):
         yield _settled(level, side, hints, over)
+
+
+def _tells(hints: Sequence[Hint]) -> bool:
+    """Whether hints tell z from -z."""
+    return any(hint.slant >= TELLING for hint in hints)
 
 
 def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
@@ -123,13 +140,9 @@ def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tupl
     return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
 
 
-def _oriented(level: Level, z: Floats, hints: Sequence[Hint], *, flip: bool) -> Floats:
-    """The heights or their negatives: as hints say, else leaning outward at the border, or upwards."""
-    if _tells(hints):
-        return z
-    across, upward = (-(slope @ z) for slope in level.stencils.slopes)
-    upright = 1 / np.sqrt(1 + across**2 + upward**2)
-    lean = np.stack([across * upright, upward * upright], axis=1)
+def _oriented(level: Level, z: Floats, *, flip: bool) -> Floats:
+    """The heights or their negatives: that lean outward at the border, else upwards; or those that do not."""
+    lean = normals_of(level.stencils, z)[:2].T
     inside = np.pad(level.grid.mask, 1)
     row, column = level.grid.rows + 1, level.grid.columns + 1
     sides = [(0, 1, 1, 0), (0, -1, -1, 0), (-1, 0, 0, 1), (1, 0, 0, -1)]
@@ -138,8 +151,3 @@ def _oriented(level: Level, z: Floats, hints: Sequence[Hint], *, flip: bool) -> 
     if abs(total) <= _LEVEL * np.abs(outward).sum():
         total = lean[:, 1].sum()
     return -z if (total < 0) != flip else z
-
-
-def _tells(hints: Sequence[Hint]) -> bool:
-    """Whether hints tell z from -z."""
-    return any(hint.slant > 0 for hint in hints)
