@@ -1,4 +1,6 @@
-"""Pictures of surfaces for pages and the README: strokes, normal map and shaded surface in a row.
+"""Pictures of surfaces, for docs/surface.md and the README: strokes, normal map, shaded surface in a row.
+
+`python docs/surface_pictures.py` draws docs/pictures/surface_known.png and surface_samples.png anew.
 
 A row is a surface; where the truth is known, it is shaded beside. All rows are under the same lamp.
 """
@@ -10,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import crossfield as cf
 import numpy as np
 from crossfield.export.pictures.drawing import read_drawing
 from crossfield.export.shading.light import lit
@@ -18,9 +21,11 @@ from crossfield.export.shading.normal_map import coloured, eight_bit
 from crossfield.export.shading.raster import raster
 from crossfield.export.surfaces.overlay import over, strokes
 from crossfield.models.instance.grid import Floats
+from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
 from matplotlib.figure import Figure
 from PIL import Image
+from surface import SURFACES, angles, field_by, normal_error
 
 CELL: Final = 2.1
 """Inches of a picture's longer side."""
@@ -28,6 +33,7 @@ DOTS: Final = 110
 HEADINGS: Final = ("strokes", "normal map", "shaded", "the true surface")
 
 
+SIZE: Final = 48
 WIDTH: Final = 1600
 """Pixels of a strip."""
 
@@ -98,3 +104,28 @@ def _cells(row: Row, scale: int) -> list[Floats]:
     faint[..., 3] = found.opacity
     cells = [over(strokes(instance, drawing, scale), faint), coloured(found), lit(found)]
     return cells if row.truth is None else [*cells, lit(raster(instance, row.truth, scale))]
+
+
+def known_rows() -> list[Row]:
+    """Surfaces with a known answer, from the bend fields of their strokes, on the side of the truth."""
+    rows = []
+    for name in SURFACES:
+        true = cf.analytic(name, SIZE)
+        found = cf.surface(field_by("bend", true.instance))
+        off = normal_error(found, true.normals)
+        if off.mean() < angles(found.normals, true.normals).mean():
+            found = found.flipped()
+        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", found, None, true.normals))
+    return rows
+
+
+def sample_rows() -> list[Row]:
+    """The drawn samples with the surfaces over their bend fields."""
+    drawn = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
+    return [Row(name, cf.surface(field_by("bend", cf.sample(name, SIZE))), name) for name in drawn]
+
+
+if __name__ == "__main__":
+    folder = Path(__file__).resolve().parent / "pictures"
+    draw_rows(known_rows(), folder / "surface_known.png")
+    draw_rows(sample_rows(), folder / "surface_samples.png")

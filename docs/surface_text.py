@@ -63,8 +63,8 @@ r^2 in the first line the torus from strokes at 48 pixels is 15 degrees off inst
   Crosses that agree and are wrong make a surface that is firm and wrong.
 - **A hint** settles both: `cf.Hint(row, column, slant, tilt)` says the normal at a pixel. Slant is its angle
   to the viewer, tilt the direction to which it leans in the picture, counter-clockwise from the right;
-  radians. Choose a place that is clearly slanted: below 10 degrees of slant a hint does not choose the side, because
-  both fit it nearly alike.
+  radians. Choose a place that is clearly slanted: below 10 degrees of slant a hint does not choose the side,
+  because both fit it nearly alike.
 
 ## Surfaces with a known answer
 
@@ -119,7 +119,19 @@ On one core:
 
 {times}
 
-<!-- pictures -->
+## Pictures
+
+`python docs/surface_pictures.py` draws them: bend fields at 48 pixels, strokes, normal map (red to the right,
+green up, blue towards the viewer) and the surface in the light of a lamp. Here the true surface is beside,
+and the side is that of the truth. The cone is too steep, as no hint says how deep it is.
+
+![Surfaces with a known answer: strokes, normal map, shaded, the true surface](pictures/surface_known.png)
+
+The samples, on the side that is taken by default. Mouse, cube, bottle, pipe and the flat sheet look like their
+objects. The ring does on its outer side; round the hole it is too flat. The saddle is bent in two directions
+where it is wide, and says little at its tip of a pixel or two.
+
+![The drawn samples: strokes, normal map, shaded](pictures/surface_samples.png)
 
 ## What fails
 
