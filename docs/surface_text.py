@@ -127,8 +127,8 @@ and the side is that of the truth. The cone is too steep, as no hint says how de
 
 ![Surfaces with a known answer: strokes, normal map, shaded, the true surface](pictures/surface_known.png)
 
-The samples, on the side that is taken by default. Mouse, cube, bottle, pipe and the flat sheet look like their
-objects. The ring does on its outer side; round the hole it is too flat. The saddle is bent in two directions
+The samples, on the side that is taken by default. Mouse, cube, bottle, pipe and the flat sheet look like what
+they are. The ring does on its outer side; round the hole it is too flat. The saddle is bent in two directions
 where it is wide, and says little at its tip of a pixel or two.
 
 ![The drawn samples: strokes, normal map, shaded](pictures/surface_samples.png)
