@@ -63,8 +63,8 @@ r^2 in the first line the torus from strokes at 48 pixels is 15 degrees off inst
   Crosses that agree and are wrong make a surface that is firm and wrong.
 - **A hint** settles both: `cf.Hint(row, column, slant, tilt)` says the normal at a pixel. Slant is its angle
   to the viewer, tilt the direction to which it leans in the picture, counter-clockwise from the right;
-  radians. Choose a place that is clearly slanted: below 10 degrees of slant a hint does not choose the side, because
-  both fit it nearly alike.
+  radians. Choose a place that is clearly slanted: below 10 degrees of slant a hint does not choose the side,
+  because both fit it nearly alike.
 
 ## Surfaces with a known answer
 
