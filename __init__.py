@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
+    from .export.shading.light import Light as Light
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .export.solving.run import run as run
     from .export.solving.two_stage import fit_angles as fit_angles
     from .export.solving.two_stage import two_stage as two_stage
+    from .export.surfaces.files import write_surface as write_surface
     from .models.errors import CrossfieldError as CrossfieldError
     from .models.field.field import CrossField as CrossField
     from .models.field.file import read_field as read_field
@@ -52,18 +54,24 @@ if TYPE_CHECKING:
     from .models.smooth.bend import bend_field as bend_field
     from .models.smooth.polyvector import polyvector_field as polyvector_field
     from .models.smooth.power_field import power_field as power_field
+    from .models.surface.hints import Hint as Hint
+    from .models.surface.lift import surface as surface
+    from .models.surface.surface import Surface as Surface
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",
+    "Hint": ".models.surface.hints",
     "Instance": ".models.instance.instance",
+    "Light": ".export.shading.light",
     "Limits": ".export.solving.job",
     "Problem": ".models.formulations.problem",
     "Proof": ".models.proof.record",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
+    "Surface": ".models.surface.surface",
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
@@ -87,6 +95,7 @@ _HOME: Final = {
     "samples": ".models.sketch.samples",
     "search": ".models.proof.dual_start",
     "solve": ".export.solving.local",
+    "surface": ".models.surface.lift",
     "to_pyomo": ".export.formats.pyomo_model",
     "two_stage": ".export.solving.two_stage",
     "with_integers_fixed": ".models.formulations.problem",
@@ -97,6 +106,7 @@ _HOME: Final = {
     "write_instance": ".models.instance.file",
     "write_mask": ".export.pictures.mask",
     "write_problem": ".export.bundle.manifest",
+    "write_surface": ".export.surfaces.files",
 }
 """Every public name and the module it comes from."""
 

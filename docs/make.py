@@ -22,6 +22,7 @@ from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.smooth.polyvector import HOLDS
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
@@ -305,6 +306,16 @@ def pictures() -> None:
     (DOCS / "samples.md").write_text("\n\n".join(parts) + "\n")
 
 
+def shaded() -> None:
+    """docs/pictures/mouse_surface.png, in the README: the surface over the bend field of the mouse."""
+    import surface_pictures
+
+    found = cf.surface(cf.bend_field(cf.polyvector_field(cf.sample("mouse", 48), hold=max(HOLDS))))
+    if found.doubts:
+        raise SystemExit(f"the mouse is not to be shown: {'; '.join(found.doubts)}")
+    surface_pictures.strip(found, "mouse", DOCS / "pictures" / "mouse_surface.png")
+
+
 def samples_in_short() -> str:
     """How many samples there are, of which kinds, and what the pictures show."""
     known = [entry.kind for entry in SAMPLES.values()].count("analytic")
@@ -370,7 +381,7 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 PAGES: dict[str, Callable[[], None]] = {
     page.__name__: page
-    for page in (formulations, errata, accuracy, pictures, figures, traps, architecture, readme)
+    for page in (formulations, errata, accuracy, pictures, shaded, figures, traps, architecture, readme)
 }
 
 

@@ -19,11 +19,12 @@ GROUND: Final = "models"
 
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field",
-    "models/smooth", "models/formulations",
+    "models/smooth", "models/surface", "models/formulations",
     "models/search", "models/proof", "models/evaluation", "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions/logs",
     "export/solutions",
-    "export/bundle", "export/pictures", "export/solving", "export/verify/programs", "export/verify",
+    "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/solving",
+    "export/verify/programs", "export/verify",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
     "export/library/building", "export/library/checking", "export/library/contributions",
     "export/library/site", "export/cli",

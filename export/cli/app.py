@@ -11,14 +11,24 @@ import signal
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, NoReturn
+from typing import Annotated, Final, NoReturn
 
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import choice_of, drawing_of, formulations_of, known, load, options_of
+from .inputs import (
+    SAVED,
+    choice_of,
+    drawing_of,
+    field_or_instance,
+    formulations_of,
+    known,
+    load,
+    options_of,
+    require_suffix,
+)
 from .library_command import library
 from .options import (
     BetaNorm,
@@ -35,8 +45,10 @@ from .options import (
     Mask,
     Names,
     NlForm,
+    On,
     Outline,
     Output,
+    Over,
     Quiet,
     Relax,
     SecondsEach,
@@ -62,12 +74,9 @@ from .output import (
     show_samples,
 )
 from .prove_command import prove_command
+from .shade_command import shade_command
 from .solve_command import solve_command, tell_solution
 from .verify_command import verify_command
-
-if TYPE_CHECKING:
-    from ...models.field.field import CrossField
-    from ...models.instance.instance import Instance
 
 app = typer.Typer(
     name="crossfield",
@@ -181,7 +190,7 @@ def instance_command(
     from ...models.instance.file import write_instance
     from ..pictures.mask import write_mask
 
-    _require_suffix(output, (".json", ".npz", ".png"))
+    require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view, crossings=crossings)
@@ -317,7 +326,7 @@ def read_command(
     from ..bundle.manifest import read_manifest
     from ..solutions.solution import read_solution
 
-    _require_suffix(output, (".npz", ".json", ".rawfield"))
+    require_suffix(output, SAVED)
     with progress(quiet=quiet) as show:
         show("reading the solution")
         described = read_manifest(manifest)
@@ -346,10 +355,7 @@ def draw_command(
     ],
     output: Output,
     *,
-    on: Annotated[
-        Path | None,
-        typer.Option("--on", metavar="INSTANCE", help="The instance (.npz, .json) of a .rawfield."),
-    ] = None,
+    on: On = None,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -359,14 +365,7 @@ def draw_command(
             " holds.",
         ),
     ] = None,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            "--over",
-            metavar="DRAWING|SAMPLE",
-            help="What the instance was read from (SVG, bitmap, .scap, sample): its strokes below the field.",
-        ),
-    ] = None,
+    over: Over = None,
     title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
     quiet: Quiet = False,
 ) -> None:
@@ -377,16 +376,17 @@ def draw_command(
     """
     from ..pictures.draw import SUFFIXES, draw
 
-    _require_suffix(output, tuple(SUFFIXES))
+    require_suffix(output, tuple(SUFFIXES))
     with progress(quiet=quiet) as show:
         show("reading")
-        subject = _field_or_instance(what, on)
+        subject = field_or_instance(what, on)
         show("drawing")
         draw(subject, output, kind=kind, over=over, title=title)
     if not quiet:
         say(str(output))
 
 
+command("shade")(shade_command)
 command("verify")(verify_command)
 
 
@@ -453,33 +453,6 @@ def _line(error: Exception) -> str:
         return f"{error.filename or 'a file'}: {what}; check the path and the free space"
     what = f"{type(error).__name__}: {shortened(error)}"
     return f"this should not happen, please report it: {what} (crossfield --debug ... shows where)"
-
-
-def _field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
-    from ...models.field.file import read_field
-    from ...models.instance.file import read_instance
-
-    if not path.is_file():
-        raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
-    _require_suffix(path, (".npz", ".json", ".rawfield"))
-    if on is not None:
-        return read_field(path, on=read_instance(on))
-    if path.suffix.lower() == ".rawfield":
-        raise InputError("holds no instance; give the one it is on by --on", file=path)
-    try:
-        return read_field(path)
-    except CrossfieldError as as_field:
-        try:
-            return read_instance(path)
-        except CrossfieldError as as_instance:
-            first, second = (str(error).removeprefix(f"{path}: ") for error in (as_field, as_instance))
-            raise InputError(f"is no field ({first}) and no instance ({second})", file=path) from as_field
-
-
-def _require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
-    if path.suffix.lower() not in allowed:
-        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
-        raise InputError(f"has {has}, which does not say what it is; use {', '.join(allowed)}", file=path)
 
 
 def _dialects(gams_layout: str | None, nl_form: str | None) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from importlib import import_module
@@ -28,6 +29,7 @@ NAMES: Final = {
         "METHODS",
         lambda methods: [each.name for each in methods.values() if each.in_runs],
     ),
+    "kept method": _of("..solving.run", "KEPT", lambda name: [name]),
     "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
     "solvers": _of("..solvers_table", "DRIVEN"),
     "all solvers": _of("..solvers_table", "SOLVERS"),
@@ -47,6 +49,12 @@ NAMES: Final = {
     "stroke weight": _of("...models.instance.weights", "STROKE_WEIGHT", lambda weight: [f"{weight:g}"]),
     "skew weight": _of("...models.instance.weights", "SKEW_WEIGHT", lambda weight: [f"{weight:g}"]),
     "pictures": _of("..pictures.draw", "KINDS"),
+    "picture side": _of("..shading.raster", "SIDE", lambda side: [str(side)]),
+    "light": _of(
+        "..shading.light",
+        "UPPER_LEFT",
+        lambda light: [f"{math.degrees(light.azimuth):.0f},{math.degrees(light.elevation):.0f}"],
+    ),
     "rungs": _of("..library.plan.spec", "RUNGS"),
 }
 """What stands in braces in a help, and where its names come from."""

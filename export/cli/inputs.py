@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from ...models.errors import InputError
+from ...models.errors import CrossfieldError, InputError
 from ...models.sketch.choice import AS_DRAWN, Choice, Silhouette
 from .output import warn_of
 
 if TYPE_CHECKING:
+    from ...models.field.field import CrossField
     from ...models.instance.instance import Gauge, Instance
+
+SAVED: Final = (".npz", ".json", ".rawfield")
+"""Suffixes of the files that hold a field."""
 
 
 def load(
@@ -92,6 +96,38 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
         )
     instance = read_instance(path)
     return instance if gauge is None else instance.with_gauge(gauge)
+
+
+def field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
+    """The field in a file, or else the instance; on: the file of the instance of a .rawfield.
+
+    Raises InputError for what is neither.
+    """
+    from ...models.field.file import read_field
+    from ...models.instance.file import read_instance
+
+    if not path.is_file():
+        raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
+    require_suffix(path, SAVED)
+    if on is not None:
+        return read_field(path, on=read_instance(on))
+    if path.suffix.lower() == ".rawfield":
+        raise InputError("holds no instance; give the one it is on by --on", file=path)
+    try:
+        return read_field(path)
+    except CrossfieldError as as_field:
+        try:
+            return read_instance(path)
+        except CrossfieldError as as_instance:
+            first, second = (str(error).removeprefix(f"{path}: ") for error in (as_field, as_instance))
+            raise InputError(f"is no field ({first}) and no instance ({second})", file=path) from as_field
+
+
+def require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
+    """Nothing, when a file has one of the suffixes. Raises InputError for another one."""
+    if path.suffix.lower() not in allowed:
+        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise InputError(f"has {has}, which does not say what it is; use {', '.join(allowed)}", file=path)
 
 
 def drawing_of(what: str) -> str | None:

@@ -42,6 +42,18 @@ Folder = Annotated[
 Output = Annotated[
     Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix says what kind.")
 ]
+On = Annotated[
+    Path | None,
+    typer.Option("--on", metavar="INSTANCE", help="The instance (.npz, .json) of a .rawfield."),
+]
+Over = Annotated[
+    str | None,
+    typer.Option(
+        "--over",
+        metavar="DRAWING|SAMPLE",
+        help="What the instance was read from (SVG, bitmap, .scap, sample): its strokes are drawn too.",
+    ),
+]
 Size = Annotated[
     int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
 ]

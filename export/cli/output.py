@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ...models.instance.instance import Instance
+    from ...models.surface.surface import Surface
     from ..bundle.manifest import Manifest
     from ..solutions.solution import Solution
     from ..solving.run import Report
@@ -171,19 +172,25 @@ def show_report(report: Report, folder: Path) -> None:
     if report.proven:
         bound = f"{best['bound_2_norm']:.10g}"
         say(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
-    if not report.interrupted:
+    if report.interrupted in ("", "surface"):
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
         say(f"  layers that fit on the drawing: {folder / 'overlay.svg'}")
+    if report.surface is not None:
+        doubts = "; ".join(report.surface.doubts)
+        shaded = f"shaded surface: {folder / 'shaded.png'}"
+        say(_wrapped(f"no shaded surface: {doubts}" if doubts else shaded))
     say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
-    say(
-        textwrap.fill(f"{report.seconds:.1f} s: {stages}", WIDTH, initial_indent="  ", subsequent_indent="  ")
-    )
+    say(_wrapped(f"{report.seconds:.1f} s: {stages}"))
     for candidate in report.candidates:
         if candidate.interrupted:
             complain(f"{candidate.method}: interrupted; its best field so far was kept")
     for method, reason in report.failures.items():
         complain(f"{method}: {reason}")
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
 def _gap(facts: dict[str, Any]) -> str:
@@ -254,6 +261,24 @@ def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None)
     show_facts(solution.problem.instance.summary, facts)
     if solution.point is not None and field is not None:
         say(f"field: {field}")
+
+
+_SENTENCES: Final = ("doubts", "freedom")
+
+
+def show_surface(surface: Surface, folder: Path) -> None:
+    """Print how well a surface fits, what it leaves open, why it may be wrong, and where its files are."""
+    from ..surfaces.report import surface_facts
+
+    facts = surface_facts(surface)
+    show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})
+    for text in surface.freedom:
+        say(_wrapped(f"open: {text}"))
+    if surface.freedom:
+        say(_wrapped("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT says how it lies at a pixel"))
+    for doubt in surface.doubts:
+        complain(f"in doubt: {doubt}")
+    say(f"pictures, heights, mesh: {folder}")
 
 
 def show_facts(title: str, facts: dict[str, Any]) -> None:

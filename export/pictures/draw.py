@@ -1,4 +1,4 @@
-"""Pictures of instances and cross fields as PNG, SVG or PDF: same input, same bytes.
+"""Pictures of instances, cross fields and surfaces as PNG, SVG or PDF: same input, same bytes.
 
 Most kinds are panels with words round them; `layers` is the bare field in the coordinates of its drawing.
 
@@ -23,7 +23,8 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
-from . import panels
+from ...models.surface.surface import Surface
+from . import panels, reliefs
 from .drawing import Drawing, read_drawing
 from .layers import sheet
 from .layers_page import page_of
@@ -77,7 +78,26 @@ KINDS: Final = {
     ),
     LAYERS: Kind("the field in the coordinates of its drawing, over it where --over names it", ()),
 }
-"""Every kind of picture, by the name under which it is asked for."""
+"""Every kind of picture of instances and fields, by the name under which it is asked for."""
+
+SURFACE_KINDS: Final = {
+    "shaded": Kind("surface in the light of a lamp", (("", reliefs.draw_shaded),)),
+    "matcap": Kind("surface in the material of a glazed ball", (("", reliefs.draw_matcap),)),
+    "normals": Kind("map of the normals of a surface as colours", (("", reliefs.draw_normals),)),
+    "relief": Kind(
+        "strokes, normal map, shaded surface and matcap in a row",
+        (
+            ("strokes", panels.draw_instance),
+            ("normal map", reliefs.draw_normals),
+            ("shaded", reliefs.draw_shaded),
+            ("matcap", reliefs.draw_matcap),
+        ),
+        size=170.0,
+    ),
+}
+"""Every kind of picture of surfaces."""
+
+Subject = CrossField | Instance | Surface
 
 SUFFIXES: Final = {
     ".png": {"Software": None},
@@ -97,7 +117,7 @@ _NARROWEST: Final = 52.0  # room for a heading
 
 
 def draw(
-    what: CrossField | Instance,
+    what: Subject,
     path: str | Path,
     *,
     kind: str | None = None,
@@ -107,8 +127,9 @@ def draw(
 ) -> Path:
     """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
 
-    kind: a name in KINDS; for an Instance only `instance` makes sense. By default `instance` for an Instance,
-    `layers` for a field as SVG or over a drawing, else `field`. sketch: polylines (k, 2) in the
+    kind: a name in KINDS, for a Surface in SURFACE_KINDS; for an Instance only `instance` makes sense. By
+    default `shaded` for a Surface, `instance` for an Instance, `layers` for a field as SVG or over a drawing,
+    else `field`. sketch: polylines (k, 2) in the
     coordinates of the sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to
     the grid; not of `layers`. over: the drawing (SVG, bitmap, .scap) or sample that the instance was read
     from, the bottom of `layers`: its strokes as they were found, nothing else of the file. title: above the
@@ -126,19 +147,21 @@ def draw(
         return write_bytes(path, _layers(what, suffix, over, title))
     if over is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
-    with _settings():
+    with own_settings():
         return write_bytes(path, _saved(_panels(what, chosen, sketch or (), title), suffix))
 
 
-def preview(what: CrossField | Instance) -> bytes:
+def preview(what: Subject) -> bytes:
     """A small picture for notebooks, as PNG."""
-    kind = KINDS["instance" if isinstance(what, Instance) else "field"]
-    with _settings():
+    kind = _kind(_fitting(what, ".png", over=False), what)
+    with own_settings():
         return _saved(_panels(what, kind, (), None), ".png", dots=_PREVIEW_DOTS)
 
 
-def _fitting(what: CrossField | Instance, suffix: str, *, over: bool) -> str:
+def _fitting(what: Subject, suffix: str, *, over: bool) -> str:
     """The kind of picture where none is asked for."""
+    if isinstance(what, Surface):
+        return "shaded"
     if isinstance(what, Instance):
         return "instance"
     return LAYERS if suffix == ".svg" or over else "field"
@@ -149,18 +172,20 @@ def _layers(field: CrossField, suffix: str, over: str | Path | Drawing | None, t
     layers = sheet(field, below)
     if suffix == ".svg":
         return svg_of(layers, title)
-    with _settings():
+    with own_settings():
         return _saved(page_of(layers), suffix, title=title)
 
 
-def _panels(what: CrossField | Instance, kind: Kind, sketch: Sequence[ArrayLike], title: str | None) -> Any:
-    instance, field = (what, None) if isinstance(what, Instance) else (what.instance, what)
-    return _page(panels.Picture(instance, field, _on_grid(sketch, instance), kind.size), kind, title)
+def _panels(what: Subject, kind: Kind, sketch: Sequence[ArrayLike], title: str | None) -> Any:
+    instance = what if isinstance(what, Instance) else what.instance
+    field = what if isinstance(what, CrossField) else None
+    surface = what if isinstance(what, Surface) else None
+    return _page(panels.Picture(instance, field, _on_grid(sketch, instance), kind.size, surface), kind, title)
 
 
 @contextmanager
-def _settings() -> Iterator[None]:
-    """Settings of matplotlib that are always the same."""
+def own_settings() -> Iterator[None]:
+    """Settings of matplotlib that are always the same, whatever the user's are."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -192,15 +217,22 @@ def _suffix(path: Path) -> str:
     return suffix
 
 
-def _kind(kind: str, what: CrossField | Instance) -> Kind:
-    if kind not in KINDS:
-        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
-    if KINDS[kind].needs_field and isinstance(what, Instance):
+def _kind(kind: str, what: Subject) -> Kind:
+    table, other = (SURFACE_KINDS, KINDS) if isinstance(what, Surface) else (KINDS, SURFACE_KINDS)
+    if kind in other:
+        raise InputError(
+            f"a picture of kind {kind} is one of a field; choose one of {', '.join(table)}"
+            if isinstance(what, Surface)
+            else f"a picture of kind {kind} is one of a surface, which `crossfield shade` makes of a field"
+        )
+    if kind not in table:
+        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(table)}")
+    if table[kind].needs_field and isinstance(what, Instance):
         raise InputError(
             f"{what.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
         )
-    return KINDS[kind]
+    return table[kind]
 
 
 def _on_grid(sketch: Sequence[ArrayLike], instance: Instance) -> tuple[Floats, ...]:

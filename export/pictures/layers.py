@@ -14,6 +14,7 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
+from ..shading.raster import drawn_border
 from .combing import combed
 from .cubics import fitted
 from .drawing import INK, Box, Drawing
@@ -91,6 +92,18 @@ def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
         Layer("singularities", _singularities(field, place)),
     )
     return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
+
+
+def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
+    """The strokes alone, on the part of the page that the grid covers.
+
+    They are those of the drawing, or pieces of line at the stroke pixels where none is given.
+    """
+    place = Place(instance)
+    layer = Layer("strokes", (_strokes(place),)) if drawing is None else _drawn(drawing, place)
+    size = instance.pixel_size
+    page = (*instance.origin, size * instance.grid.width, size * instance.grid.height)
+    return Sheet(page, (layer,), drawing)
 
 
 @dataclass(frozen=True)
@@ -179,11 +192,8 @@ def _depth(instance: Instance) -> Floats:
     """The blurred mask less its level at a smooth border, [height + 2, width + 2] with a rim of a pixel."""
     from scipy import ndimage
 
-    mask = np.pad(instance.mask, 1)
-    border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
-    drawn = float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
-    blurred: Floats = ndimage.gaussian_filter(mask.astype(np.float64), _BLUR)
-    return blurred - _BORDER - _DRAWN_BORDER * drawn
+    blurred: Floats = ndimage.gaussian_filter(np.pad(instance.mask, 1).astype(np.float64), _BLUR)
+    return blurred - _BORDER - _DRAWN_BORDER * drawn_border(instance)
 
 
 def trimmed(line: Floats, depth: Floats) -> list[Floats]:

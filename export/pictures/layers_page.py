@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .drawing import ink_colours
 from .layers import Lines, Sheet
 
 _SIDE: Final = 400.0
 """Points of the longer side of the page."""
+_TIP: Final = 1e-3  # of a pixel, lest a side is rounded down to the pixel before
 
 
 def page_of(sheet: Sheet) -> Any:
@@ -33,6 +35,20 @@ def page_of(sheet: Sheet) -> Any:
             else:
                 _dots(axes, part, scale)
     return figure
+
+
+def pixels_of(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
+    """Red, green, blue and opacity (height, width, 4) of the layers on a page without paper."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = page_of(sheet)
+    figure.patch.set_visible(False)
+    dots = 72 * max(width, height) / _SIDE
+    figure.set_dpi(dots)
+    figure.set_size_inches((width + _TIP) / dots, (height + _TIP) / dots)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
 def _ink(axes: Any, sheet: Sheet) -> None:

@@ -18,6 +18,7 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
+from ...models.surface.surface import Surface
 from .combing import combed
 from .streamlines import Streamline, streamlines
 
@@ -40,12 +41,14 @@ class Picture:
     """What a panel shows and how large it is.
 
     size: points of the longer side of the grid. sketch: polylines (k, 2) in pixel units, drawn faintly below.
+    surface: of its field, where the picture shows one.
     """
 
     instance: Instance
     field: CrossField | None
     sketch: tuple[Floats, ...]
     size: float
+    surface: Surface | None = None
 
     @property
     def openings(self) -> tuple[Floats, ...]:

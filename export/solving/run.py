@@ -15,11 +15,15 @@ from ...models.processes.deadline import Deadline
 from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
+from ...models.surface.lift import surface
+from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest, write_all
 from ..formats.registry import generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..solutions.solution import Solution
+from ..surfaces.files import SHADED, write_shaded
+from ..surfaces.report import surface_facts
 from .compiling import compiling
 from .job import Limits
 from .methods import METHODS, Candidate, Method, Request, field_facts, finite, solution_facts
@@ -29,6 +33,8 @@ from .stopwatch import Stopwatch
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
 """The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
+LONGEST_LIFT: Final = 10.0
+"""Seconds after which the surface is what it has become; grids up to 64 pixels take a few."""
 REPORT: Final = "report.json"
 MASK: Final = "mask.png"
 KEPT: Final = "bend"
@@ -52,9 +58,10 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 class Report:
     """What a run found. candidates: every field, the lowest 2-norm energy first.
 
-    Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate` or
-    `drawing`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of the 2-norm
-    energy of all fields, None where there is none. stages: the seconds of each stage, in turn.
+    Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate`,
+    `drawing` or `surface`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of
+    the 2-norm energy of all fields, None where there is none. stages: the seconds of each stage, in turn.
+    surface: over the kept field, None where it was not come to.
     """
 
     instance: Instance
@@ -64,6 +71,7 @@ class Report:
     interrupted: str = ""
     proven: Proven | None = None
     stages: dict[str, float] = field(default_factory=dict)
+    surface: Surface | None = None
 
     @property
     def best(self) -> Candidate:
@@ -74,6 +82,11 @@ class Report:
     def kept(self) -> Candidate:
         """The field that is kept and drawn: the bend field, or the best one where there is none."""
         return next((each for each in self.candidates if each.method == KEPT), self.best)
+
+    @property
+    def shaded(self) -> bool:
+        """Whether the surface can be trusted, and so is drawn."""
+        return self.surface is not None and not self.surface.doubts
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
         """What the report says of a field: its own facts, and the bound and the gap where they are proven."""
@@ -120,6 +133,8 @@ class Report:
             "best": self.best.method,
             "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
             "methods": [self.facts(candidate) for candidate in self.candidates],
+            "surface": self.surface
+            and surface_facts(self.surface) | {"picture": SHADED if self.shaded else None},
             "seconds": self.seconds,
             "stages": self.stages,
             "failures": self.failures,
@@ -162,6 +177,7 @@ def run(
         DIR/solve      what the local solvers read and left
         DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
         DIR/overview.png, ... pictures of it; overlay.svg, .png: over the drawing
+        DIR/shaded.png the surface over it, where that can be trusted; report.json says why not
         DIR/lowest.npz the field of least 2-norm energy
         DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
         DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
@@ -207,6 +223,9 @@ def run(
     if not report.interrupted:
         report = _drawn(report, folder, below, progress)
         watch.lap("pictures")
+    if not report.interrupted:
+        report = _shaded(report, folder, progress)
+        watch.lap("surface")
     report = replace(report, stages=watch.stages)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
     return report
@@ -214,7 +233,7 @@ def run(
 
 def _clear(folder: Path) -> None:
     """Take away what an earlier run has left that this one may not come to."""
-    for stale in (REPORT, CERTIFICATE, MASK, LOWEST, *OVERLAY, *map(_picture, PICTURES)):
+    for stale in (REPORT, CERTIFICATE, MASK, LOWEST, SHADED, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 
@@ -282,6 +301,21 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
             draw(report.kept.field, folder / name, kind=LAYERS, over=below)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
+    return report
+
+
+def _shaded(report: Report, folder: Path, progress: Progress) -> Report:
+    """The report with the surface over its field, which is drawn if nothing speaks against it."""
+    over = Deadline.after(LONGEST_LIFT).passed
+    try:
+        progress("surface over the kept field")
+        report = replace(report, surface=surface(report.kept.field, over=over, progress=progress))
+        if report.surface is not None and report.shaded:
+            write_shaded(report.surface, folder / SHADED)
+    except CrossfieldError as error:
+        report.failures["surface"] = str(error)
+    except KeyboardInterrupt:
+        return replace(report, interrupted="surface")
     return report
 
 

@@ -43,7 +43,7 @@ def to_rawfield(field: CrossField) -> bytes:
 
 def to_obj(instance: Instance) -> bytes:
     """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
-    places, corners = _corners(instance.grid)
+    places, corners = vertices_of(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
     vertices = _lines(np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0, "v ")
@@ -60,7 +60,7 @@ def to_sings(field: CrossField) -> bytes:
     Vertices count from 0 in the order of the .obj; the index, turns of the cross counter-clockwise, follows
     the field's jumps.
     """
-    places, _ = _corners(field.instance.grid)
+    places, _ = vertices_of(field.instance.grid)
     found = field.singularities
     across = field.instance.grid.width + 1
     at = np.searchsorted(places[:, 0] * across + places[:, 1], (found.row + 1) * across + found.column + 1)
@@ -69,8 +69,12 @@ def to_sings(field: CrossField) -> bytes:
     return f"4 {len(at)}\n{_lines(np.stack([at[order], index[order]], axis=1))}".encode()
 
 
-def _corners(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row."""
+def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
+    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row.
+
+    Row 0, column 0 is the upper left corner of the grid. Where pixels meet in a corner only, each has a
+    vertex of its own.
+    """
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)

@@ -54,6 +54,14 @@ SAMPLES: Final[dict[str, Sample]] = {
             "torus_patch", "analytic", "a quarter of a torus; exact answer, strokes on a fifth of the pixels"
         ),
         Sample("wave_sheet", "analytic", "a wavy sheet; exact answer, strokes on a fifth of the pixels"),
+        Sample("cone", "analytic", "half a truncated cone; exact answer, strokes on a quarter of the pixels"),
+        Sample("vase", "analytic", "half a vase; exact answer, strokes on a quarter of the pixels"),
+        Sample("spheroid", "analytic", "half a spheroid; exact answer, strokes on a quarter of the pixels"),
+        Sample(
+            "ellipsoid",
+            "analytic",
+            "an ellipsoid with three different axes; exact answer, strokes on a quarter of the pixels",
+        ),
     )
 }
 

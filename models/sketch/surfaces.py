@@ -30,10 +30,12 @@ _BISECTIONS: Final = 12
 
 Chart = Callable[[Floats, Floats], Floats]
 """From s, t of any common shape to points or vectors (..., 3)."""
+Profile = Callable[[Floats], Floats]
+"""From t to a radius, or to its derivative."""
 
 
 @dataclass(frozen=True)
-class Surface:
+class CurvaturePatch:
     """A patch of a surface, parametrised by its curvature lines and turned towards the viewer.
 
     position, along_s, along_t: the point and its derivatives by s and t, before turning, shape (..., 3).
@@ -60,15 +62,17 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class AnalyticInstance:
-    """An instance with the exact line angles of both projected curvature lines.
+    """An instance with the exact line angles of both projected curvature lines, and the surface itself.
 
-    u_angle, v_angle: float (n,) in [0, pi) radians, counter-clockwise with y up, at the centre of each pixel
-    of the grid.
+    At the centre of each pixel of the grid: u_angle, v_angle: float (n,) in [0, pi) radians,
+    counter-clockwise with y up; normals: unit vectors towards the viewer, (n, 3); heights: z in pixels, (n,).
     """
 
     instance: Instance
     u_angle: Floats
     v_angle: Floats
+    normals: Floats
+    heights: Floats
 
 
 def _turn(tilt: float, spin: float) -> Floats:
@@ -83,11 +87,71 @@ def _vectors(x: Floats, y: Floats, z: Floats) -> Floats:
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
 
 
+def _revolved(
+    profile: tuple[Profile, Profile],
+    slopes: tuple[Profile, Profile],
+    t_range: tuple[float, float],
+    cut: float,
+) -> CurvaturePatch:
+    """The front of a surface of revolution about the y axis, up to `cut` radians from its sides.
+
+    profile: radius and y by t; slopes: their derivatives.
+    """
+    (radius, y), (widening, rise) = profile, slopes
+    return CurvaturePatch(
+        position=lambda s, t: _vectors(radius(t) * cosine(s), y(t), radius(t) * sine(s)),
+        along_s=lambda s, t: _vectors(-radius(t) * sine(s), 0 * t, radius(t) * cosine(s)),
+        along_t=lambda s, t: _vectors(widening(t) * cosine(s), rise(t), widening(t) * sine(s)),
+        s_range=(cut, np.pi - cut),
+        t_range=t_range,
+        turn=_turn(-30, 15),
+        share=0.25,
+    )
+
+
+def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
+    """The front of an ellipsoid with semi-axes long > deep > short along x, z and y.
+
+    Its curvature lines are where it meets confocal quadrics: the roots m in [deep^2, long^2] and n in
+    [short^2, deep^2] of x^2 / (long^2 - m) + z^2 / (deep^2 - m) + y^2 / (short^2 - m) = 1 are constant on
+    them. They are m = long^2 - (long^2 - deep^2) cos^2 s and n = deep^2 - (deep^2 - short^2) sin^2 t, so
+    that nothing has to be chosen where a line passes a plane of symmetry. The four umbilics, where no
+    direction is principal, are at multiples of pi of both.
+    """
+    k = (long**2 - deep**2) / (long**2 - short**2)
+
+    def wide(t: Floats) -> Floats:
+        return length(sine(t), np.sqrt(k) * cosine(t))
+
+    def high(s: Floats) -> Floats:
+        return length(sine(s), np.sqrt(1 - k) * cosine(s))
+
+    return CurvaturePatch(
+        position=lambda s, t: _vectors(
+            long * cosine(s) * wide(t), short * cosine(t) * high(s), deep * sine(s) * sine(t)
+        ),
+        along_s=lambda s, t: _vectors(
+            -long * sine(s) * wide(t),
+            short * cosine(t) * k * sine(s) * cosine(s) / high(s),
+            deep * cosine(s) * sine(t),
+        ),
+        along_t=lambda s, t: _vectors(
+            long * cosine(s) * (1 - k) * sine(t) * cosine(t) / wide(t),
+            -short * sine(t) * high(s),
+            deep * sine(s) * cosine(t),
+        ),
+        s_range=(0.6, np.pi - 0.6),
+        t_range=(0.9, np.pi - 0.9),
+        turn=_turn(20, 20),
+        share=0.25,
+    )
+
+
 _TUBE: Final = 0.45  # radius of the torus's tube; its centre line has radius 1
 _WAVE: Final = 0.6  # height of the wave
 
-SURFACES: Final[dict[str, Surface]] = {
-    "tilted_cylinder": Surface(
+SURFACES: Final[dict[str, CurvaturePatch]] = {
+    "tilted_cylinder": CurvaturePatch(
         position=lambda s, t: _vectors(cosine(s), t, sine(s)),
         along_s=lambda s, t: _vectors(-sine(s), 0 * t, cosine(s)),
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
@@ -96,7 +160,7 @@ SURFACES: Final[dict[str, Surface]] = {
         turn=_turn(35, 20),
         share=1 / 3,
     ),
-    "torus_patch": Surface(
+    "torus_patch": CurvaturePatch(
         position=lambda s, t: _vectors(
             (1 + _TUBE * cosine(t)) * cosine(s), (1 + _TUBE * cosine(t)) * sine(s), _TUBE * sine(t)
         ),
@@ -111,7 +175,7 @@ SURFACES: Final[dict[str, Surface]] = {
         turn=_turn(30, -10),
         share=0.2,
     ),
-    "wave_sheet": Surface(
+    "wave_sheet": CurvaturePatch(
         position=lambda s, t: _vectors(s, t, _WAVE * sine(s)),
         along_s=lambda s, t: _vectors(1 + 0 * s, 0 * t, _WAVE * cosine(s)),
         along_t=lambda s, t: _vectors(0 * s, 1 + 0 * t, 0 * s),
@@ -120,8 +184,24 @@ SURFACES: Final[dict[str, Surface]] = {
         turn=_turn(50, 25),
         share=0.2,
     ),
+    "cone": _revolved(
+        (lambda t: 0.9 - 0.3 * t, lambda t: t),
+        (lambda t: -0.3 + 0 * t, lambda t: 1 + 0 * t),
+        (-1.3, 1.3),
+        0.45,
+    ),
+    "vase": _revolved(
+        (lambda t: 1 + 0.2 * sine(2 * t), lambda t: t),
+        (lambda t: 0.4 * cosine(2 * t), lambda t: 1 + 0 * t),
+        (-1.5, 1.5),
+        0.65,
+    ),
+    "spheroid": _revolved(
+        (cosine, lambda t: 1.5 * sine(t)), (lambda t: -sine(t), lambda t: 1.5 * cosine(t)), (-0.7, 0.7), 0.75
+    ),
+    "ellipsoid": _ellipsoid(1.5, 1.2, 1.0),
 }
-"""The surfaces by name: two developable ones and one that is not."""
+"""The surfaces by name. Cylinder, wave and cone are developable; the last one has no symmetry of rotation."""
 
 
 def analytic(
@@ -147,7 +227,8 @@ def analytic(
     surface = SURFACES[name]
     frame = _frame(surface, size)
     s, t, mask = _parameters(surface, frame)
-    u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in surface.tangents(s, t))
+    tangents = surface.tangents(s, t)
+    u_angle, v_angle = (wrap(arctangent(d[:, 1], d[:, 0]), 0.0, np.pi) for d in tangents)
     weight, on_u = _strokes(surface, frame, mask)
     stroke = weight >= LEAST_WEIGHT
     instance = Instance(
@@ -161,16 +242,31 @@ def analytic(
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
     )
-    return AnalyticInstance(instance.with_weights(w_strokes, w_beta), u_angle, v_angle)
+    return AnalyticInstance(
+        instance.with_weights(w_strokes, w_beta),
+        u_angle,
+        v_angle,
+        normals=_towards_viewer(*tangents),
+        heights=surface.point(s, t)[:, 2] / frame.pixel,
+    )
 
 
-def _frame(surface: Surface, size: int) -> Frame:
+def _towards_viewer(first: Floats, second: Floats) -> Floats:
+    """The unit normals (n, 3) of tangent planes, z above 0."""
+    (ax, ay, az), (bx, by, bz) = first.T, second.T
+    normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+    x, y, z = normal.T
+    unit: Floats = normal * (np.where(z < 0, -1.0, 1.0) / length(length(x, y), z))[:, None]
+    return unit
+
+
+def _frame(surface: CurvaturePatch, size: int) -> Frame:
     s, t = np.meshgrid(np.linspace(*surface.s_range, 400), np.linspace(*surface.t_range, 400))
     x, y, _ = np.moveaxis(surface.point(s, t), -1, 0)
     return fit_frame((float(x.min()), float(-y.max()), float(x.max()), float(-y.min())), size, margin=False)
 
 
-def _parameters(surface: Surface, frame: Frame) -> tuple[Floats, Floats, Bools]:
+def _parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, Bools]:
     """Parameters s, t (n,) of the pixels whose centre is on the patch, and the mask of these pixels."""
     row, column = np.indices(frame.shape).reshape(2, -1)
     wanted = np.stack([frame.x + (column + 0.5) * frame.pixel, -frame.y - (row + 0.5) * frame.pixel], axis=-1)
@@ -187,7 +283,7 @@ def _within(value: Floats, ends: tuple[float, float]) -> Bools:
     return (value >= ends[0] - 1e-9) & (value <= ends[1] + 1e-9)
 
 
-def _invert(surface: Surface, wanted: Floats) -> tuple[Floats, Floats]:
+def _invert(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats, Floats]:
     """Parameters whose projection is `wanted` (n, 2), by Newton's method from a near lattice point."""
     from scipy.spatial import cKDTree
 
@@ -210,7 +306,7 @@ def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
     return np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
 
 
-def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
+def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
     """Weight [height, width] of drawn lines; which pixels (n,) carry a line of family u.
 
     The spacing of the lines is bisected by ratio; the best share seen wins.
@@ -228,7 +324,7 @@ def _strokes(surface: Surface, frame: Frame, mask: Bools) -> tuple[Floats, Bools
     return best[1], best[2]
 
 
-def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
+def _drawn(surface: CurvaturePatch, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
     """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one a family."""
     u_lines, v_lines = _lines(surface, frame, spacing)
     of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
@@ -236,7 +332,7 @@ def _drawn(surface: Surface, frame: Frame, mask: Bools, *, spacing: float) -> tu
     return np.where(mask, both.weight, 0.0), (of_u.amount >= of_v.amount)[mask]
 
 
-def _lines(surface: Surface, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
+def _lines(surface: CurvaturePatch, frame: Frame, spacing: float) -> tuple[Floats, Floats]:
     """Segments (m, 2, 2), y down, of lines t = const (family u) and s = const (family v)."""
     middle_s, middle_t = np.mean(surface.s_range), np.mean(surface.t_range)
     along_s, along_t = np.linspace(*surface.s_range, _SAMPLES), np.linspace(*surface.t_range, _SAMPLES)
@@ -255,10 +351,10 @@ def _spread(ends: tuple[float, float], count: float) -> Floats:
     return middles
 
 
-def _length(surface: Surface, s: Floats, t: Floats) -> float:
+def _length(surface: CurvaturePatch, s: Floats, t: Floats) -> float:
     return float(length(*np.diff(surface.point(s, t)[:, :2], axis=0).T).sum())
 
 
-def _polylines(surface: Surface, s: Floats, t: Floats) -> Floats:
+def _polylines(surface: CurvaturePatch, s: Floats, t: Floats) -> Floats:
     points = surface.point(s, t)[..., :2] * (1, -1)
     return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 2)

@@ -44,7 +44,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
     where strokes contradict each other and a hard hold makes singularities between them, and a hard one on
     clean curves that cross.
     """
-    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in _lines(*_polynomials(instance, hold)))
+    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*_polynomials(instance, hold)))
     alpha, beta = label_of(u, v)
     start = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
     return start.with_best_jumps()
@@ -75,7 +75,7 @@ def _beside(alike: Any, cross: _Complex, skew: float) -> Any:
     )
 
 
-def _lines(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
+def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
     """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; those of z^2 = 1 where both are 0."""
     x0 = np.where((x0 == 0) & (x1 == 0), -1.0, x0)
     apart = np.sqrt(x1**2 - 4 * x0)

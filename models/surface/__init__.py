@@ -1,1 +1,1 @@
-"""From crosses to heights: the surface whose curvature lines they are."""
+"""From crosses to the surface that has them."""

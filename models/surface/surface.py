@@ -13,22 +13,28 @@ import numpy as np
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..instance.instance import Instance
+from ..previews import Pictured
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Pictured):
     """The heights that a cross field was lifted to, and how far they can be trusted.
 
     field: the cross field, its pixels in the order of `instance.grid`. heights: float (height + 1, width + 1)
     at the corners of pixels, [0, 0] the upper left one, in pixels; NaN at a corner of no pixel of the mask.
-    confidence: float (n,) in [0, 1], how well the equations hold at each pixel. doubts: sentences that say
-    why the surface should not be trusted; empty where nothing speaks against it.
+    confidence: float (n,) in [0, 1], how well the equations hold at each pixel, which is not how near the
+    surface is to the one that was meant. doubts: sentences that say why the surface should not be trusted;
+    empty where nothing speaks against it. freedom: sentences that say which other surfaces have the same
+    crosses. firmness: by how much the angles between its lines in space change when its normals turn, in
+    radians for each radian, where they change least (docs/surface.md); of the largest part of the mask.
     """
 
     field: CrossField
     heights: Floats
     confidence: Floats
     doubts: tuple[str, ...] = ()
+    freedom: tuple[str, ...] = ()
+    firmness: float = 0.0
 
     @property
     def instance(self) -> Instance:

@@ -148,7 +148,9 @@ def test_a_run_leaves_everything(two_parts):
     assert (done.returncode, without_progress(done.stderr)) == (0, "")
     report = json.loads((folder / "report.json").read_text())
     proven = {"certificate.npz"} if report["proof"] else set()  # in half a second perhaps nothing
-    assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven
+    shaded = {report["surface"]["picture"]} - {None}
+    assert bool(shaded) == report["surface"]["trusted"]
+    assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven | shaded
     models = {path.name for path in (folder / "models").iterdir()}
     assert {name.split(".")[1] for name in models} == {"instance", *FORMULATIONS}
     assert report["files"] == sum(Path(name).suffix[1:] in FORMATS for name in models) == 34

@@ -23,6 +23,7 @@ NAMED = {
     "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
     "draw": ["pictures"],
+    "shade": ["samples", "size", "methods", "kept method", "picture side", "light"],
     "verify": ["programs"],
     "library solve": ["all solvers", "rungs"],
     "library submit-run": ["logs", "run statuses"],
@@ -95,8 +96,8 @@ def test_choices_are_those_of_the_models_and_of_the_formats():
 
 def test_commands_are_listed_in_the_order_of_their_use():
     assert list(typer.main.get_command(app).commands) == [
-        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "verify", "list",
-        "samples", "library",
+        "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "shade", "verify",
+        "list", "samples", "library",
     ]  # fmt: skip
 
 

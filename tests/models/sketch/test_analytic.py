@@ -191,3 +191,27 @@ def test_the_gauge_is_handed_on_and_the_result_is_the_same_each_time():
     first, second = analytic("wave_sheet", 16, gauge="box"), analytic("wave_sheet", 16, gauge="box")
     assert first.instance.gauge == "box"
     assert first.instance.sha256 == second.instance.sha256
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lines_are_curvature_lines_the_normals_belong_to_them_and_the_heights_to_both(name):
+    """Tangents at right angles, and normals that turn along each line as the line goes: dN is along dp."""
+    made, surface = analytic(name, 20), SURFACES[name]
+    s, t, _ = _parameters(surface, _frame(surface, 20))
+    tangents = surface.tangents(s, t)
+    assert np.abs((tangents[0] * tangents[1]).sum(axis=1)).max() < 1e-9
+
+    def normal(s, t):
+        across = np.cross(*surface.tangents(s, t))
+        return across / (np.linalg.norm(across, axis=1) * np.sign(across[:, 2]))[:, None]
+
+    np.testing.assert_allclose(made.normals, normal(s, t), atol=1e-12)
+    step = 1e-5
+    for tangent, ds, dt in zip(tangents, (step, 0), (0, step), strict=True):
+        turn = (normal(s + ds, t + dt) - normal(s - ds, t - dt)) / (2 * step)
+        assert np.linalg.norm(np.cross(turn, tangent), axis=1).max() < 1e-8
+    grid = made.instance.grid
+    rise = made.heights[grid.second] - made.heights[grid.first]
+    slopes = -made.normals[:, :2] / made.normals[:, 2:]
+    expected = (slopes[grid.first] + slopes[grid.second])[np.arange(len(rise)), grid.upward.astype(int)] / 2
+    assert np.median(np.abs(rise - expected)) < 0.02

@@ -1,0 +1,265 @@
+"""Make docs/surface.md, how near surfaces come to known ones, from docs/surface.json.
+
+    python docs/surface.py [--measure PART ...] [--sketches FOLDER] [--jobs N]
+
+With --measure, parts are measured first, and their rows in docs/surface.json replaced: `known` (surfaces with
+a known answer, from exact crosses and from the field of each method), `noise` (bend fields of noisy strokes),
+`trust` (what is said of samples and drawings) and `times`. FOLDER has line drawings by others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import crossfield as cf
+import numpy as np
+from crossfield.export.solving.methods import METHODS, Request
+from crossfield.models.field.field import CrossField
+from crossfield.models.instance.instance import Instance
+from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.surface.trust import OFF, off_right_angles
+from energies import SKETCHES
+from make import markdown, said
+from surface_text import PAGE
+
+DOCS: Final = Path(__file__).resolve().parent
+KEPT: Final = DOCS / "surface.json"
+SIZES: Final = (32, 48)
+WAYS: Final = ("bend", "greedy", "polyvector", "power")
+NOISE: Final = (3.0, 8.0)
+"""Standard deviation of the noise on each stroke pixel, in degrees."""
+SEEDS: Final = 3
+SURFACES: Final = [name for name, entry in SAMPLES.items() if entry.kind == "analytic"]
+TIMED: Final = (("tilted_cylinder", 54), ("spheroid", 50), ("mouse", 56), ("tilted_cylinder", 180))
+Rows = list[dict[str, Any]]
+
+
+def field_by(method: str, instance: Instance) -> CrossField:
+    """The answer of a method."""
+    with tempfile.TemporaryDirectory() as folder:
+        request = Request(instance, Path(folder), cf.Limits(600.0, threads=1))
+        first, *_ = METHODS[method].find(request)
+    return first.field
+
+
+def angles(first: Any, second: Any) -> Any:
+    """Angles in degrees between unit normals, (n,)."""
+    return np.degrees(np.arccos(np.clip((first * second).sum(axis=1), -1, 1)))
+
+
+def normal_error(surface: cf.Surface, normals: Any) -> Any:
+    """Angles to the true normals in degrees, on the side that is nearer to the truth."""
+    both = [angles(each.normals, normals) for each in (surface, surface.flipped())]
+    return min(both, key=np.mean)
+
+
+def middle_hint(true: Any) -> cf.Hint:
+    """The true normal at the pixel nearest to the middle of the mask."""
+    pixels = np.argwhere(true.instance.mask)
+    at = int(np.argmin(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1)))
+    x, y, z = true.normals[at]
+    row, column = (int(each) for each in pixels[at])
+    return cf.Hint(row, column, float(np.arccos(z)), float(np.arctan2(y, x)))
+
+
+def known(name: str, size: int) -> Rows:
+    """Errors of the normals of a surface from exact crosses and from each method, and with a hint."""
+    true = cf.analytic(name, size)
+    exact = cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle)
+    fields = {"exact": exact} | {method: field_by(method, true.instance) for method in WAYS}
+    flat = angles(true.normals, np.array([0.0, 0.0, 1.0]))
+    rows = []
+    for way, field in fields.items():
+        found, hinted = cf.surface(field), cf.surface(field, [middle_hint(true)])
+        error, told = normal_error(found, true.normals), angles(hinted.normals, true.normals)
+        numbers = {
+            "flat": flat.mean(), "cross": np.degrees(field.cross_error(true.u_angle, true.v_angle)).mean(),
+            "mean": error.mean(), "most": np.percentile(error, 95), "hinted": told.mean(),
+            "side": float(angles(found.normals, true.normals).mean() <= error.mean() + 1e-9),
+            "firm": found.firmness, "alike": rank_correlation(1 - found.confidence, error),
+        }  # fmt: skip
+        facts = {"surface": name, "size": size, "way": way, "doubts": len(found.doubts)}
+        rows.append(facts | {key: round(float(value), 4) for key, value in numbers.items()})
+    return rows
+
+
+def rank_correlation(first: Any, second: Any) -> float:
+    """Spearman's coefficient."""
+    from scipy.stats import spearmanr
+
+    return float(spearmanr(first, second).statistic)
+
+
+def noise(name: str, size: int) -> Rows:
+    """Mean errors of the normals from bend fields of noisy strokes, over seeds."""
+    true = cf.analytic(name, size)
+    rows = []
+    for degrees in NOISE:
+        errors = []
+        for seed in range(SEEDS):
+            shake = np.radians(degrees) * np.random.default_rng(seed).standard_normal(
+                len(true.instance.theta)
+            )
+            field = field_by("bend", replace(true.instance, theta=true.instance.theta + shake))
+            errors.append(normal_error(cf.surface(field), true.normals).mean())
+        rows.append(
+            {"surface": name, "size": size, "noise": degrees, "mean": round(float(np.mean(errors)), 3)}
+        )
+    return rows
+
+
+def trust(name: str, what: str, size: int) -> Rows:
+    """What is said of the surface over the bend field of a sample or drawing."""
+    instance = cf.sample(what, size) if what in SAMPLES else cf.read_sketch(what, size=size)
+    field = field_by("bend", instance)
+    found = cf.surface(field)
+    off = off_right_angles(field, found.heights)
+    numbers = {
+        "unfit": np.mean(off > OFF), "slant": np.degrees(np.arccos(found.normals[:, 2])).mean(),
+        "confidence": found.confidence.mean(), "firm": found.firmness,
+    }  # fmt: skip
+    facts = {"drawing": name, "size": size, "spots": len(field.singularities.index), "doubts": found.doubts}
+    return [facts | {key: round(float(value), 4) for key, value in numbers.items()}]
+
+
+def times(name: str, size: int) -> Rows:
+    """Seconds for the surface over the bend field of a sample."""
+    field = field_by("bend", cf.sample(name, size))
+    cf.surface(field_by("bend", cf.sample(name, 8)))  # imports
+    begin = time.perf_counter()
+    cf.surface(field)
+    seconds = round(time.perf_counter() - begin, 2)
+    return [{"drawing": name, "size": size, "pixels": field.instance.grid.size, "seconds": seconds}]
+
+
+MEASURES: Final[dict[str, Callable[..., Rows]]] = {
+    "known": known, "noise": noise, "trust": trust, "times": times,
+}  # fmt: skip
+
+
+def tasks(part: str, folder: Path | None) -> Iterator[tuple[Any, ...]]:
+    """The arguments of each measurement of a part."""
+    if part == "times":
+        yield from TIMED
+    elif part == "trust":
+        own = [(name, name) for name, entry in SAMPLES.items() if entry.kind == "sketch"]
+        files = (path for path in sorted(folder.iterdir()) if path.suffix in SKETCHES) if folder else ()
+        others = [(path.name, str(path)) for path in files if not path.stem.endswith("_mask")]
+        yield from ((name, what, 48) for name, what in [*own, *others])
+    else:
+        yield from ((name, size) for name in SURFACES for size in SIZES)
+
+
+def measured(part: str, folder: Path | None, jobs: int) -> Rows:
+    """The rows of a part."""
+    with ProcessPoolExecutor(1 if part == "times" else jobs) as processes:
+        found = [processes.submit(MEASURES[part], *given) for given in tasks(part, folder)]
+        return [row for each in found for row in each.result()]
+
+
+# The page
+
+
+def by_surface(rows: Rows) -> str:
+    """Errors of the normals: a row for each surface and size, a column for each source of crosses."""
+    table = []
+    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
+        own = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
+        cells = [f"{row['mean']:.1f} / {row['most']:.1f}" for row in own]
+        table.append([f"`{name}`", str(size), f"{own[0]['flat']:.1f}", *cells])
+    return markdown(
+        ("surface", "size", "facing the viewer", "exact crosses", *(f"`{way}`" for way in WAYS)), table
+    )
+
+
+def with_hints(rows: Rows) -> str:
+    """The same with one hint, and the cross errors and firmness of exact crosses and of bend."""
+    table = []
+    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
+        exact, bend, *_ = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
+        cells = [f"{row['mean']:.1f} to {row['hinted']:.1f}" for row in (exact, bend)]
+        firm = [f"{row['firm']:.3f}" for row in (exact, bend)]
+        table.append([f"`{name}`", str(size), f"{bend['cross']:.2f}", *cells, *firm])
+    heads = (
+        "surface", "size", "cross error of `bend`", "exact: without, with hint", "`bend`: without, with hint",
+        "firmness, exact", "firmness, `bend`",
+    )  # fmt: skip
+    return markdown(heads, table)
+
+
+def by_noise(rows: Rows, clean: Rows) -> str:
+    """Mean errors from bend fields, a column for each noise."""
+    table = []
+    for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
+        without = [row for row in clean if (row["surface"], row["size"], row["way"]) == (name, size, "bend")]
+        own = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
+        table.append([f"`{name}`", str(size), *(f"{row['mean']:.1f}" for row in [*without, *own])])
+    return markdown(("surface", "size", "exact strokes", *(f"{each:g} degrees" for each in NOISE)), table)
+
+
+def by_drawing(rows: Rows) -> str:
+    """What is said of drawings."""
+    table = [
+        [
+            row["drawing"], f"{row['unfit']:.0%}", str(row["spots"]), f"{row['slant']:.0f}",
+            f"{row['confidence']:.2f}", f"{row['firm']:.3f}", str(len(row["doubts"])),
+        ]
+        for row in rows
+    ]  # fmt: skip
+    heads = (
+        "drawing",
+        "unfit crosses",
+        "singular spots",
+        "mean slant",
+        "mean confidence",
+        "firmness",
+        "doubts",
+    )
+    return markdown(heads, table)
+
+
+def by_time(rows: Rows) -> str:
+    """Seconds by pixels."""
+    table = [[row["drawing"], str(row["pixels"]), f"{row['seconds']:.1f}"] for row in rows]
+    return markdown(("drawing", "pixels", "seconds"), table)
+
+
+def write_page(rows: dict[str, Rows]) -> None:
+    """Make the page."""
+    ranks = [row["alike"] for row in rows["known"] if row["way"] == "bend"]
+    sides = [row["side"] for row in rows["known"] if row["way"] != "power"]
+    page = PAGE.format(
+        said=said("python docs/surface.py"), known=by_surface(rows["known"]), hints=with_hints(rows["known"]),
+        noise=by_noise(rows["noise"], rows["known"]), seeds=SEEDS, trust=by_drawing(rows["trust"]),
+        times=by_time(rows["times"]), least=f"{min(ranks):.1f}", most=f"{max(ranks):.1f}",
+        sides=f"{sum(sides):.0f} of {len(sides)}",
+    )  # fmt: skip
+    (DOCS / "surface.md").write_text(page)
+
+
+def main() -> None:
+    """Measure what is asked for, and write the page."""
+    parser = argparse.ArgumentParser(description="Measure surfaces, and write docs/surface.md.")
+    parser.add_argument(
+        "--measure", nargs="+", choices=MEASURES, default=[], help="parts to be measured anew"
+    )
+    parser.add_argument("--sketches", type=Path, help="folder of line drawings by others")
+    parser.add_argument("--jobs", type=int, default=1, help="processes at once")
+    given = parser.parse_args()
+    rows = json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    for part in given.measure:
+        rows[part] = measured(part, given.sketches, given.jobs)
+        KEPT.write_text(json.dumps(rows, indent=0, sort_keys=True) + "\n")
+    write_page(rows)
+
+
+if __name__ == "__main__":
+    main()

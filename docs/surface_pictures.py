@@ -1,0 +1,131 @@
+"""Pictures of surfaces, for docs/surface.md and the README: strokes, normal map, shaded surface in a row.
+
+`python docs/surface_pictures.py` draws docs/pictures/surface_known.png and surface_samples.png anew.
+
+A row is a surface; where the truth is known, it is shaded beside. All rows are under the same lamp.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import crossfield as cf
+import numpy as np
+from crossfield.export.pictures.drawing import read_drawing
+from crossfield.export.shading.light import lit
+from crossfield.export.shading.matcap import matcap
+from crossfield.export.shading.normal_map import coloured, eight_bit
+from crossfield.export.shading.raster import raster
+from crossfield.export.surfaces.overlay import over, strokes
+from crossfield.models.instance.grid import Floats
+from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.surface.surface import Surface
+from matplotlib.figure import Figure
+from PIL import Image
+from surface import SURFACES, angles, field_by, normal_error
+
+CELL: Final = 2.1
+"""Inches of a picture's longer side."""
+DOTS: Final = 110
+HEADINGS: Final = ("strokes", "normal map", "shaded", "the true surface")
+
+
+SIZE: Final = 48
+WIDTH: Final = 1600
+"""Pixels of a strip."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A surface of a picture. title: said above it.
+
+    drawing: file or sample that it was read from; None: its stroke pixels. truth: the true normals (n, 3).
+    """
+
+    title: str
+    surface: Surface
+    drawing: str | Path | None = None
+    truth: Floats | None = None
+
+
+def draw_rows(rows: list[Row], path: Path) -> Path:
+    """The path of the PNG that now has a row for each surface."""
+    cells = [_cells(row, _scale(row)) for row in rows]
+    columns = max(map(len, cells))
+    heights = [CELL * max(cell.shape[0] / max(cell.shape[:2]) for cell in line) for line in cells]
+    size = (columns * (CELL + 0.15), sum(heights) + 0.3 * len(rows) + 0.3)
+    figure = Figure(figsize=size, dpi=DOTS, facecolor="white")
+    top = size[1] - 0.3
+    for line, row, height in zip(cells, rows, heights, strict=True):
+        figure.text(0.08 / size[0], top / size[1], row.title, va="center", fontsize=9, weight="bold")
+        for number, cell in enumerate(line):
+            left = number * (CELL + 0.15) + 0.075
+            axes = figure.add_axes(
+                (left / size[0], (top - 0.15 - height) / size[1], CELL / size[0], height / size[1])
+            )
+            axes.imshow(cell, interpolation="hanning", interpolation_stage="rgba")
+            axes.set_axis_off()
+        top -= height + 0.3
+    for number, heading in enumerate(HEADINGS[:columns]):
+        middle = number * (CELL + 0.15) + 0.075 + CELL / 2
+        figure.text(middle / size[0], 1 - 0.12 / size[1], heading, ha="center", va="center", fontsize=9)
+    stream = io.BytesIO()
+    figure.savefig(stream, metadata={"Software": None})
+    with Image.open(stream) as picture:
+        picture.convert("RGB").save(path, optimize=True)
+    return path
+
+
+def _scale(row: Row) -> int:
+    """Twice as fine as the picture is."""
+    return max(1, round(2 * CELL * DOTS / max(row.surface.instance.mask.shape)))
+
+
+def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
+    """The path of the PNG that now shows a surface four times: strokes, normals, lamp, matcap."""
+    row = Row("", surface, drawing)
+    scale = max(1, WIDTH // (4 * surface.instance.grid.width))
+    found = raster(surface.instance, surface.normals, scale)
+    joined = np.concatenate([*_cells(row, scale), matcap(found)], axis=1)
+    picture = Image.fromarray(eight_bit(over(joined, np.ones(joined.shape))[..., :3]))
+    picture.save(path, optimize=True)
+    return path
+
+
+def _cells(row: Row, scale: int) -> list[Floats]:
+    """The pictures of a row, (h, w, 4) each, `scale` pixels a pixel of the grid."""
+    instance = row.surface.instance
+    drawing = None if row.drawing is None else read_drawing(row.drawing, on=instance)
+    found = raster(instance, row.surface.normals, scale)
+    faint = np.ones((*found.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0)
+    faint[..., 3] = found.opacity
+    cells = [over(strokes(instance, drawing, scale), faint), coloured(found), lit(found)]
+    return cells if row.truth is None else [*cells, lit(raster(instance, row.truth, scale))]
+
+
+def known_rows() -> list[Row]:
+    """Surfaces with a known answer, from the bend fields of their strokes, on the side of the truth."""
+    rows = []
+    for name in SURFACES:
+        true = cf.analytic(name, SIZE)
+        found = cf.surface(field_by("bend", true.instance))
+        off = normal_error(found, true.normals)
+        if off.mean() < angles(found.normals, true.normals).mean():
+            found = found.flipped()
+        rows.append(Row(f"{name}, {off.mean():.1f} degrees off", found, None, true.normals))
+    return rows
+
+
+def sample_rows() -> list[Row]:
+    """The drawn samples with the surfaces over their bend fields."""
+    drawn = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
+    return [Row(name, cf.surface(field_by("bend", cf.sample(name, SIZE))), name) for name in drawn]
+
+
+if __name__ == "__main__":
+    folder = Path(__file__).resolve().parent / "pictures"
+    draw_rows(known_rows(), folder / "surface_known.png")
+    draw_rows(sample_rows(), folder / "surface_samples.png")

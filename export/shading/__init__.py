@@ -1,0 +1,1 @@
+"""Surfaces in light: shaded pictures, matcaps, normal maps."""

@@ -1,0 +1,143 @@
+"""A surface on a finer raster: smooth normals inside of a smooth outline.
+
+Normals of the pixels are spread by cubic B-splines over the pixels of the mask alone, so that nothing from
+outside of it tints the border. The same splines of the mask itself say how much of a place is inside; where
+that is a half runs the outline. The stairs of the mask are smoothed by a wider blur, which may move the
+outline by half a pixel, and by less where the mask or a gap in it is thin, so that these stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ...models.errors import InputError
+from ...models.input_limits import MAX_PIXELS
+from ...models.instance.grid import Bools, Floats
+from ...models.instance.instance import Instance
+
+SIDE: Final = 1000
+"""About as many pixels has the longer side of a picture unless a scale is given."""
+_BLUR: Final = 2.0  # pixels of the grid by which stairs are smoothed
+_MOVED: Final = 0.33  # at most, of the inside of a place
+_MOVED_THIN: Final = 0.12  # where something is one or two pixels thin
+_SLOPE: Final = 2 / 3
+"""By how much the inside of a place changes a pixel across a straight outline."""
+_BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
+_DRAWN: Final = 0.4  # pixels that strokes at the border are within it: they run through its pixels' middles
+_TIP: Final = 8  # pixels of a tip at most; what is thin and larger is a part
+_REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """Normals and opacity on the pixels of a picture that covers the grid of a surface.
+
+    normals: unit vectors (h, w, 3), x right, y up, z towards the viewer; (0, 0, 1) where nothing is near.
+    opacity: (h, w) in [0, 1], the part of each picture pixel inside of the outline.
+    """
+
+    normals: Floats
+    opacity: Floats
+
+
+def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
+    """The normals of a surface, (n, 3) at the pixels, with `scale` x `scale` pixels for each of the grid.
+
+    scale: 1 or more; None: as many as make the longer side about SIDE. Raises InputError for another one.
+    """
+    scale = scale_of(instance, scale)
+    mask = np.pad(instance.mask, _REACH)
+    up, across = (_splines(count, scale)[_REACH * scale : -_REACH * scale] for count in mask.shape)
+
+    def spread(values: Floats) -> Floats:
+        return np.asarray(up @ (across @ values.T).T)
+
+    inside = spread(mask.astype(np.float64))
+    summed = np.stack([spread(_on_grid(mask, part)) for part in normals.T], axis=-1)
+    length = np.linalg.norm(summed, axis=-1, keepdims=True)
+    viewer = np.array([0.0, 0.0, 1.0])
+    unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
+    thin = spread(_thin(mask).astype(np.float64))
+    within = _DRAWN * drawn_border(instance) * (1 - thin)
+    narrow, wide = inside - _SLOPE * within, spread(_blurred(mask)) - _BLURRED_SLOPE * within
+    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, *_moved(thin))))
+
+
+def scale_of(instance: Instance, scale: int | None) -> int:
+    """The pixels of a picture a pixel of the grid. Raises InputError for a scale that cannot be."""
+    height, width = instance.mask.shape
+    if scale is None:
+        return max(1, round(SIDE / int(max(height, width))))
+    if scale < 1 or height * width * scale**2 > MAX_PIXELS:
+        raise InputError(
+            f"the scale {scale} makes no picture of {width} x {height} pixels: it has to be 1 or more, "
+            f"and the picture no more than {MAX_PIXELS // 10**6} million pixels; choose another scale"
+        )
+    return scale
+
+
+def _on_grid(mask: Bools, values: Floats) -> Floats:
+    """Values of the pixels [height, width], 0 outside of the mask."""
+    image = np.zeros(mask.shape)
+    image[mask] = values
+    return image
+
+
+def _splines(count: int, scale: int) -> Any:
+    """The cubic B-splines of `count` pixels at the centres of `count * scale` finer ones, a sparse matrix."""
+    from scipy import sparse
+
+    place = (np.arange(count * scale) + 0.5) / scale - 0.5
+    near = np.floor(place)[:, None].astype(np.int64) + np.arange(1 - _REACH, 1 + _REACH)
+    off = np.abs(place[:, None] - near)
+    weight = np.where(off < 1, 2 / 3 - off**2 + off**3 / 2, np.maximum(2 - off, 0.0) ** 3 / 6)
+    row = np.broadcast_to(np.arange(len(place))[:, None], near.shape)
+    there = (near >= 0) & (near < count)
+    entries = (weight[there], (row[there], near[there]))
+    return sparse.csr_array(entries, shape=(len(place), count))
+
+
+def _blurred(mask: Bools) -> Floats:
+    from scipy import ndimage
+
+    blurred: Floats = ndimage.gaussian_filter(mask.astype(np.float64), _BLUR, mode="constant")
+    return blurred
+
+
+def _thin(mask: Bools) -> Bools:
+    """Pixels in or beside a part of the mask, or a gap in it, too thin for 3 x 3 pixels and no mere tip."""
+    from scipy import ndimage
+
+    block = np.ones((3, 3), dtype=bool)
+    wide = np.pad(mask, 3)
+    changed = (ndimage.binary_opening(wide, block) != wide) | (ndimage.binary_closing(wide, block) != wide)
+    part, _ = ndimage.label(changed, block)
+    long = np.bincount(part.ravel()) > _TIP
+    thin: Bools = ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3]
+    return thin
+
+
+def _moved(thin: Floats) -> tuple[Floats, Floats]:
+    """How far the inside may be corrected, down and up; less where something is thin, a number in [0, 1]."""
+    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
+    return -most, most
+
+
+def drawn_border(instance: Instance) -> float:
+    """The part of the pixels at the border of the mask that carry strokes, 0 to 1."""
+    from scipy import ndimage
+
+    mask = np.pad(instance.mask, 1)
+    border = (mask & ~ndimage.binary_erosion(mask))[1:-1, 1:-1]
+    return float(border[tuple(instance.stroke_pixels.T)].sum() / border.sum())
+
+
+def _opacity(level: Floats) -> Floats:
+    """The part of each pixel inside of the outline, which runs where the level is a half."""
+    depth = np.pad(level - 0.5, 1, mode="edge")
+    steepness = np.hypot(*np.gradient(depth))
+    part: Floats = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)
+    return part[1:-1, 1:-1]

@@ -1,0 +1,1 @@
+"""What a surface leaves: pictures, heights, mesh, report."""

@@ -1,0 +1,102 @@
+"""The folder of a surface: pictures, heights, a mesh for other programs, and a report."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.storage import make_folder, write_bytes
+from ...models.surface.surface import Surface
+from ..pictures.drawing import Drawing, read_drawing
+from ..shading.light import UPPER_LEFT, Light, lit
+from ..shading.matcap import matcap
+from ..shading.normal_map import eight_bit, normal_map
+from ..shading.raster import raster, scale_of
+from .mesh import to_mtl, to_obj
+from .overlay import on_paper, over, strokes
+from .report import surface_document
+
+NORMALS: Final = "normals.png"
+SHADED: Final = "shaded.png"
+MATCAP: Final = "matcap.png"
+OVERLAY: Final = "overlay.png"
+DRAWING: Final = "drawing.png"
+HEIGHTS: Final = "heights.npy"
+MESH: Final = "surface.obj"
+MATERIALS: Final = "surface.mtl"
+REPORT: Final = "surface.json"
+FILES: Final = {
+    NORMALS: "normals as colours, a texel a pixel",
+    SHADED: "in the light of a lamp",
+    MATCAP: "in the material of a glazed ball",
+    OVERLAY: "in the light of a lamp, with the strokes",
+    HEIGHTS: "heights at the corners of pixels",
+    MESH: "mesh with texture coordinates and normals",
+    MATERIALS: "its material",
+    DRAWING: "the strokes on paper, its texture",
+    REPORT: "what can be said of it",
+}
+"""The files of a surface, and what each holds."""
+
+
+def write_surface(
+    surface: Surface,
+    folder: str | Path,
+    *,
+    drawing: str | Path | Drawing | None = None,
+    light: Light = UPPER_LEFT,
+    scale: int | None = None,
+    about: Mapping[str, Any] | None = None,
+) -> Path:
+    """The folder, which now holds all of FILES: pictures, heights, a mesh and a report.
+
+    Same surface, same bytes.
+    drawing: file or sample that the instance was read from, for the strokes; None: pieces of line at the
+    stroke pixels. scale: pixels of a picture a pixel of the grid; None: one in the normal map, and in the
+    others as many as make about 1000 on the longer side. about: facts for the report on how the surface was
+    made. Every file stands whole or not at all; the report is written last. Raises InputError for a drawing
+    that is unreadable or lies elsewhere and a scale that cannot be, and OutputError.
+    """
+    if drawing is not None and not isinstance(drawing, Drawing):
+        drawing = read_drawing(drawing, on=surface.instance)
+    fine = scale_of(surface.instance, scale)
+    folder = make_folder(folder)
+    (folder / REPORT).unlink(missing_ok=True)
+    found = raster(surface.instance, surface.normals, fine)
+    shaded, ink = lit(found, light), strokes(surface.instance, drawing, fine)
+    write_bytes(folder / NORMALS, png_of(normal_map(surface.instance, surface.normals, scale or 1)))
+    pictures = {SHADED: shaded, MATCAP: matcap(found), OVERLAY: over(ink, shaded), DRAWING: on_paper(ink)}
+    for name, picture in pictures.items():
+        write_bytes(folder / name, png_of(eight_bit(picture)))
+    write_bytes(folder / HEIGHTS, _npy(surface.heights))
+    write_bytes(folder / MATERIALS, to_mtl(DRAWING))
+    write_bytes(folder / MESH, to_obj(surface, MATERIALS))
+    document = surface_document(surface, about) | {"files": FILES}
+    write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+    return folder
+
+
+def write_shaded(surface: Surface, path: str | Path) -> Path:
+    """The path of the PNG that now shows the surface in the light of a lamp. Raises OutputError."""
+    return write_bytes(path, png_of(eight_bit(lit(raster(surface.instance, surface.normals)))))
+
+
+def png_of(picture: NDArray[np.uint8]) -> bytes:
+    """A picture (h, w, 3 or 4) of red, green, blue and, if it has one, opacity as PNG."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def _npy(heights: NDArray[np.float64]) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, heights, allow_pickle=False)
+    return stream.getvalue()

@@ -1,0 +1,86 @@
+"""What is known of the surface at a place, beside the crosses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy import sparse
+
+from ..errors import InputError
+from ..instance.grid import Bools, Floats
+from ..instance.instance import HALF, Instance
+from .equations import Rows
+from .levels import Level
+
+WEIGHT: Final = 0.1
+"""Weight of each pixel of the disc about a hint: its neighbours lean a little otherwise."""
+_DISC: Final = 0.05  # radius in parts of the root of the number of pixels
+
+
+@dataclass(frozen=True)
+class Hint:
+    """The normal of the surface at a pixel.
+
+    row, column: of the pixel. slant: angle between the normal and the direction to the viewer, in
+    [0, pi/2) radians. tilt: direction to which the normal leans in the picture, in radians counter-clockwise
+    from +x with y up.
+    """
+
+    row: int
+    column: int
+    slant: float
+    tilt: float = 0.0
+
+    @property
+    def slopes(self) -> Floats:
+        """The slopes (dz/dx, dz/dy) of a surface with this normal."""
+        rise: Floats = -np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)])
+        return rise
+
+
+def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
+    """Nothing, when every hint can be used on the instance. Raises InputError."""
+    mask = instance.mask
+    for hint in hints:
+        place = f"the hint at row {hint.row}, column {hint.column}"
+        inside = all(0 <= at < size for at, size in zip((hint.row, hint.column), mask.shape, strict=True))
+        if not inside or not mask[hint.row, hint.column]:
+            raise InputError(
+                f"{place} lies outside the mask of {instance.name}, which has {mask.shape[0]} rows and "
+                f"{mask.shape[1]} columns; give a pixel inside"
+            )
+        if not 0 <= hint.slant < HALF or not np.isfinite(np.tan(hint.slant)):
+            raise InputError(
+                f"{place} has a slant of {np.degrees(hint.slant):g} degrees; give one from 0 to less than 90"
+            )
+        if not np.isfinite(hint.tilt):
+            raise InputError(f"{place} has the tilt {hint.tilt}, which is no direction; give a finite angle")
+
+
+@dataclass(frozen=True, eq=False)
+class Disc:
+    """The pixels of a level about a hint, a mask (n,), and the slopes that they shall have."""
+
+    level: Level
+    pixels: Bools
+    slopes: Floats
+
+    @classmethod
+    def of(cls, hint: Hint, level: Level) -> Disc:
+        """The disc of a hint; one pixel at least."""
+        grid, (top, left) = level.grid, level.corner
+        away = np.hypot(
+            grid.rows - ((hint.row - top) >> level.halved),
+            grid.columns - ((hint.column - left) >> level.halved),
+        )
+        return cls(level, away <= max(1.0, _DISC * np.sqrt(grid.size)), hint.slopes)
+
+    @property
+    def rows(self) -> Rows:
+        """The squares that ask for the slopes."""
+        chosen = [slope[self.pixels] for slope in self.level.stencils.slopes]
+        weight = np.sqrt(WEIGHT)
+        return Rows(weight * sparse.vstack(chosen), weight * np.repeat(self.slopes, int(self.pixels.sum())))

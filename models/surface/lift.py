@@ -1,0 +1,153 @@
+"""From a cross field to the surface whose curvature lines its crosses look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy import ndimage
+
+from ..field.field import CrossField
+from ..instance.grid import Bools, Floats, Grid
+from ..processes.deadline import Over, never
+from ..processes.progress import Progress, silent
+from .crosses import Crosses
+from .descent import descended
+from .equations import FORGIVEN, Equations, Weights, normals_of
+from .hints import Disc, Hint, check_hints
+from .levels import Level, levels_of
+from .stencils import Stencils
+from .surface import Surface
+from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
+
+FIRST: Final = Weights(even=1e-4, facing=1e-2)
+"""The first pass from a start: stiff, so that starts come together."""
+WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
+"""Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
+
+CLEARLY: Final = 0.8
+"""Share of the energy from a dome below which that from a plane is preferred: bodies bulge more often."""
+
+TELLING: Final = np.radians(10)
+"""Least slant of a hint that tells z from -z: with less slant, both sides fit it nearly alike."""
+_LEVEL: Final = 0.05  # share of what leans at the border to which the leanings cancel, where none is outward
+
+
+def surface(
+    field: CrossField,
+    hints: Iterable[Hint] = (),
+    *,
+    flip: bool = False,
+    over: Over = never,
+    progress: Progress = silent,
+) -> Surface:
+    """The surface whose curvature lines the crosses of a field look most like, seen from the front.
+
+    One height at each corner of a pixel, found by minimising the energy of `Equations` from three starts on
+    a coarse grid, and then on finer ones. Neither the order of the two lines nor jumps matter. Parts of the
+    mask that share no corner are independent; the mean height of each is 0. Deterministic.
+
+    Turned inside out, z to -z, a surface has the same crosses. So each part leans outward at its border on
+    the whole, or where that is undecided upward, as a floor seen from above. hints: normals that are known at
+    some pixels; a part with one that is slanted by 10 degrees or more takes its side from there. flip: turns
+    all other parts inside out. Hints also choose among surfaces of different depth with the same crosses.
+    over: says whether the time is over; then the best heights so far come back, and a doubt says so.
+
+    Raises InputError for a hint outside the mask, or with angles that no normal has. See docs/surface.md.
+    """
+    instance, given, cut = field.instance, tuple(hints), Cut(over)
+    check_hints(given, instance)
+    part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
+    heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
+    found = []
+    for number in range(1, parts + 1):
+        progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
+        level = _part(field, part_of == number)
+        own = [hint for hint in given if part_of[hint.row, hint.column] == number]
+        z = _solved(level, own, cut, flip=flip)
+        used, (top, left) = level.stencils.used, level.corner
+        heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
+        found.append((level.grid.size, level, z, own))
+    _, level, z, own = max(found, key=lambda each: each[0])
+    firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
+    return _judged(field, heights, firm, hinted=_tells(own), cut=cut.off)
+
+
+def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cut: bool) -> Surface:
+    """The surface of heights, with what is to be said of it."""
+    off = off_right_angles(field, heights)
+    found = Surface(field, heights, confidence_of(field, off), (), freedom_of(firm, hinted=hinted), firm)
+    slant = np.arccos(np.minimum(found.normals[:, 2], 1.0))
+    late = ("time was over before it had settled",) if cut else ()
+    return replace(found, doubts=(*doubts_of(field, off, slant), *late))
+
+
+@dataclass
+class Cut:
+    """Whether time is over, asked of another; keeps in mind that it once was."""
+
+    over: Over
+    off: bool = False
+
+    def __call__(self) -> bool:
+        """Whether time is over."""
+        self.off = self.off or self.over()
+        return self.off
+
+
+def _part(field: CrossField, mask: Bools) -> Level:
+    """The finest level of a part of the mask, cut out."""
+    window = ndimage.find_objects(mask.astype(np.int8))[0]
+    crosses = Crosses.of(field).at(mask[field.instance.mask])
+    return Level(Stencils(Grid(mask[window])), crosses, (window[0].start, window[1].start))
+
+
+def _solved(part: Level, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
+    """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
+    coarse, *finer = levels_of(part)
+    dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.starts)
+    _, z = min([*dome, *((energy / CLEARLY, z) for found in planes for energy, z in found)], key=_energy)
+    for level in finer:
+        z = _settled(level, level.refined(coarse, z), hints, over)[1]
+        coarse = level
+    return z if hints else _oriented(part, z, flip=flip)
+
+
+def _energy(found: tuple[float, Floats]) -> float:
+    return found[0]
+
+
+def _from_start(
+    level: Level, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
+) -> Iterator[tuple[float, Floats]]:
+    """Energies and heights to which a start leads, with hints from the sides that are possible."""
+    _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
+    z = _oriented(level, z, flip=flip)
+    for side in (z, -z) if _tells(hints) else (z,):
+        yield _settled(level, side, hints, over)
+
+
+def _tells(hints: Sequence[Hint]) -> bool:
+    """Whether hints tell z from -z."""
+    return any(hint.slant >= TELLING for hint in hints)
+
+
+def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
+    """The energy and heights to which z leads down, with the hints."""
+    extra = [Disc.of(hint, level).rows for hint in hints]
+    return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
+
+
+def _oriented(level: Level, z: Floats, *, flip: bool) -> Floats:
+    """The heights or their negatives: that lean outward at the border, else upwards; or those that do not."""
+    lean = normals_of(level.stencils, z)[:2].T
+    inside = np.pad(level.grid.mask, 1)
+    row, column = level.grid.rows + 1, level.grid.columns + 1
+    sides = [(0, 1, 1, 0), (0, -1, -1, 0), (-1, 0, 0, 1), (1, 0, 0, -1)]
+    outward = np.concatenate([(lean @ (x, y))[~inside[row + r, column + c]] for r, c, x, y in sides])
+    total = outward.sum()
+    if abs(total) <= _LEVEL * np.abs(outward).sum():
+        total = lean[:, 1].sum()
+    return -z if (total < 0) != flip else z

@@ -1,0 +1,110 @@
+"""How far a surface can be trusted: how well its crosses fit it, and what they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from scipy import linalg
+
+from ..field.field import CrossField
+from ..instance.grid import Floats
+from ..smooth.systems import factored, one_thread
+from .crosses import Crosses
+from .equations import Equations, Rows, Weights, changes_of_normals
+from .levels import Level
+from .stencils import Stencils, around, scaled
+
+OFF: Final = np.radians(10)
+"""Lines whose angle in space is further than this from a right one do not fit."""
+UNFIT: Final = 0.25
+"""Share of the crosses that do not fit from which a surface is doubted; docs/surface.md has the figures."""
+SPOTS: Final = 4
+"""Singular spots that a surface may show: an ellipsoid has four umbilics."""
+FLAT: Final = np.radians(10)
+"""Mean slant below which a surface is called flat."""
+LOOSE: Final = 0.01
+"""Firmness below which the crosses do not tell a surface from others: see `firmness`."""
+
+_PLAIN: Final = Weights(even=0.0, facing=0.0)
+_VECTORS: Final = 4
+_ROUNDS: Final = 12  # the least value has two digits after six
+_PULL: Final = 1e-7  # of the normals, so that what costs nothing does not make the system singular
+_TWIST: Final = 1e-3
+
+
+def off_right_angles(field: CrossField, heights: Floats) -> Floats:
+    """How far from a right angle both lines of each cross are on the surface, in [0, pi/2] radians; (n,)."""
+    stencils = Stencils(field.instance.grid)
+    cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
+    off: Floats = np.arcsin(np.minimum(np.abs(cosine), 1.0))
+    return off
+
+
+def confidence_of(field: CrossField, off: Floats) -> Floats:
+    """1 / (1 + (off / OFF)^2) at each pixel, and 0 at the four pixels of a singular spot; shape (n,)."""
+    spots = field.singularities
+    singular = np.zeros(field.instance.mask.shape, dtype=bool)
+    for quad in around(singular):
+        quad[spots.row, spots.column] = True
+    return np.where(singular[field.instance.mask], 0.0, 1 / (1 + (off / OFF) ** 2))
+
+
+def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
+    """Sentences that say why a surface should not be trusted. slant: of its normals, radians (n,)."""
+    unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
+    found = []
+    if unfit > UNFIT:
+        found.append(
+            f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
+            "no one surface has all these curvature lines, as where hidden lines are drawn"
+        )
+    if spots > SPOTS:
+        found.append(f"the crosses turn round {spots} singular spots, more than a smooth surface shows")
+    if slant.mean() < FLAT:
+        found.append(
+            f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
+            "lines that cross at right angles everywhere say nothing of a shape"
+        )
+    return tuple(found)
+
+
+def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
+    """Sentences that say which other surfaces have the same crosses."""
+    found = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
+    if firm < LOOSE:
+        found.append(
+            "other surfaces fit as well, steeper or leaning otherwise: "
+            f"when its normals turn by 10 degrees the angles between its lines change by {10 * firm:.2f}; "
+            "a hint settles it"
+        )
+    return tuple(found)
+
+
+def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
+    """How much the equations change, at least, when the normals turn: radians for each radian, both rms.
+
+    The root of the least eigenvalue of the curvature of right angles, conjugacy and hints at heights z,
+    against that of the normals; by inverse iteration. Along a family of surfaces with the same crosses it
+    is 0. 0 too for masks too small to say.
+    """
+    count = level.stencils.count
+    if level.grid.size < 2 * _VECTORS:
+        return 0.0
+    twist = level.stencils.twist
+    _, curvature = Equations(level.stencils, level.crosses, _PLAIN, extra).model(z)
+    curvature = curvature + _TWIST * (twist.T @ twist)
+    change, slopes = changes_of_normals(level.stencils, z), level.stencils.slopes
+    turns = [scaled(slopes[0], part[0]) + scaled(slopes[1], part[1]) for part in change]
+    turning = sum(turn.T @ turn for turn in turns)
+    solve = factored(curvature + _PULL * turning)
+    vectors = np.random.default_rng(0).standard_normal((count, _VECTORS))
+    least = np.zeros(_VECTORS)
+    for _ in range(_ROUNDS):
+        vectors = solve(turning @ vectors)
+        with one_thread():
+            small = vectors.T @ (curvature @ vectors), vectors.T @ (turning @ vectors)
+            least, turn = linalg.eigh(*small)
+            vectors = vectors @ turn
+    return float(np.sqrt(max(least[0], 0.0)))

@@ -1,0 +1,111 @@
+"""The command `shade`: what it takes, what it leaves, and what it refuses."""
+
+import json
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.surfaces.files import FILES
+from PIL import Image
+
+
+@pytest.fixture(scope="module")
+def field():
+    """A field on a small sample."""
+    return cf.bend_field(cf.polyvector_field(cf.sample("mouse", 12)))
+
+
+@pytest.fixture
+def saved(field, tmp_path):
+    """That field in a file."""
+    return str(cf.write_field(field, tmp_path / "saved.npz"))
+
+
+def told(folder):
+    return json.loads((folder / "surface.json").read_text())
+
+
+def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
+    given = ["shade", "mouse", "--size", "12", "--scale", "4", "-o", str(tmp_path / "out")]
+    assert invoke(given) == 0
+    out = capsys.readouterr().out
+    assert "mouse: 12 x 11" in out
+    assert "open: inside out it has the same crosses" in out
+    assert "--flip" in out
+    assert str(tmp_path / "out") in out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "field.npz"}
+    assert told(tmp_path / "out")["method"] == "bend"
+    field = cf.read_field(tmp_path / "out" / "field.npz")
+    found = cf.surface(field)
+    heights = np.load(tmp_path / "out" / "heights.npy")
+    assert np.array_equal(heights, found.heights, equal_nan=True)
+    cf.write_surface(found, tmp_path / "again", drawing="mouse", scale=4)
+    for name in set(FILES) - {"surface.json"}:
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "out" / name).read_bytes(), name
+
+
+def test_a_saved_field_is_flipped_hinted_and_lit(saved, tmp_path, capsys):
+    plain, turned = tmp_path / "plain", tmp_path / "turned"
+    assert invoke(["shade", saved, "--scale", "3", "-q", "-o", str(plain)]) == 0
+    assert capsys.readouterr().out == ""
+    given = ["--flip", "--hint", "5,6,20,90", "--hint", "2,8,30.5,-45", "--light", "0,30", "--over", "mouse"]
+    assert invoke(["shade", saved, *given, "--scale", "3", "--json", "-o", str(turned)]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert told(turned) == said | {"files": FILES}
+    assert said["method"] is None
+    assert said["flipped"] is True
+    assert said["hints"] == [
+        {"row": 5, "column": 6, "slant": 20.0, "tilt": 90.0},
+        {"row": 2, "column": 8, "slant": 30.5, "tilt": -45.0},
+    ]
+    assert said["light"] == {"azimuth": 0.0, "elevation": 30.0}
+    with Image.open(plain / "overlay.png") as one, Image.open(turned / "overlay.png") as other:
+        assert one.size == other.size == (36, 33)
+    assert "field.npz" not in {path.name for path in plain.iterdir()}
+
+
+def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
+    cf.write_field(field, tmp_path / "f.rawfield")
+    cf.write_instance(field.instance, tmp_path / "i.json")
+    instance = str(tmp_path / "i.json")
+    given = ["-q", "--scale", "2", "-o"]
+    raw = ["shade", str(tmp_path / "f.rawfield"), "--on", instance, *given, str(tmp_path / "raw")]
+    assert invoke(raw) == 0
+    made = ["shade", instance, "--method", "greedy", *given, str(tmp_path / "made")]
+    assert invoke(made) == 0
+    assert told(tmp_path / "made")["method"] == "greedy"
+    assert told(tmp_path / "raw")["instance"] == told(tmp_path / "made")["instance"]
+
+
+REFUSED = [
+    (["--hint", "1,2,3"], "give numbers as in 12,30,45,90"),
+    (["--hint", "1,2,3,x"], "give numbers as in 12,30,45,90"),
+    (["--hint", "1.5,2,3,4"], "row and column are whole numbers"),
+    (["--hint", "1,2,nan,4"], "give numbers as in 12,30,45,90"),
+    (["--hint", "0,0,30,90"], "mask"),
+    (["--hint", "5,5,95,90"], "90"),
+    (["--light", "30"], "give numbers as in 135,45"),
+    (["--light", "30,-20"], "elevation is between 0 and 90"),
+    (["--scale", "100000"], "choose another scale"),
+    (["--size", "12"], "is a field, which has its own grid"),
+    (["--method", "greedy"], "is a field, which has its own grid"),
+    (["--crossings"], "is a field, which has its own grid"),
+    (["--over", "nothing.svg"], "cannot be read"),
+]
+
+
+def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_written(saved, tmp_path, capsys):
+    for given, reason in REFUSED:
+        assert invoke(["shade", saved, "-q", "-o", str(tmp_path / "out"), *given]) == 1, given
+        line = capsys.readouterr().err
+        assert reason in line, (given, line)
+        assert len(line.splitlines()) == 1
+        assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
+    assert invoke(["shade", "nothing", "-o", str(tmp_path / "out")]) == 1
+    assert "no such file and no such sample" in capsys.readouterr().err
+    assert invoke(["shade", "mouse", "--method", "wings", "-o", str(tmp_path / "out")]) == 1
+    assert "there is no method 'wings'" in capsys.readouterr().err
+    (tmp_path / "bad.npz").write_bytes(b"no archive")
+    assert invoke(["shade", str(tmp_path / "bad.npz"), "-o", str(tmp_path / "out")]) == 1
+    assert "is no field" in capsys.readouterr().err

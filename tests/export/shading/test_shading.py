@@ -1,0 +1,142 @@
+"""Surfaces in light: normals stay normals on any raster, the outline is smooth, and light is Lambert's."""
+
+import io
+
+import numpy as np
+import pytest
+from crossfield.export.shading.light import CLAY, Light, lit
+from crossfield.export.shading.matcap import ball as matcap_ball
+from crossfield.export.shading.matcap import matcap
+from crossfield.export.shading.normal_map import normal_map
+from crossfield.export.shading.raster import Raster, raster
+from crossfield.export.surfaces.files import png_of
+from crossfield.models.errors import InputError
+from PIL import Image
+from shapes import ball, ball_normals, disc, plane, surface_of
+
+
+def fine(surface, scale):
+    return raster(surface.instance, surface.normals, scale)
+
+
+def mapped(surface, scale=1):
+    return normal_map(surface.instance, surface.normals, scale).astype(int)
+
+
+def test_a_normal_map_is_half_of_the_normals_and_one_right_red_up_green():
+    surface = ball(24)
+    mask, texels = surface.instance.mask, mapped(surface)
+    assert texels.shape == (24, 24, 4)
+    assert (texels[..., 3] == np.where(mask, 255, 0)).all()
+    assert (texels[mask][:, :3] == np.round(255 * (surface.normals + 1) / 2)).all()
+    assert (texels[~mask][:, :3] == (128, 128, 255)).all()
+    assert np.abs(texels[mask][:, :3] - 255 * (ball_normals(surface) + 1) / 2).max() < 8
+    assert texels[12, 20, 0] > 180 > texels[12, 3, 0] + 100
+    assert texels[3, 12, 1] > 180 > texels[20, 12, 1] + 100
+    read = Image.open(io.BytesIO(png_of(texels.astype(np.uint8))))
+    assert (np.asarray(read) == texels).all()
+
+
+def test_a_finer_normal_map_has_unit_normals_near_those_of_the_pixels():
+    surface = ball(20)
+    texels = mapped(surface, 5)
+    assert texels.shape == (100, 100, 4)
+    inside = texels[texels[..., 3] == 255]
+    assert np.abs(np.linalg.norm(2 * inside[:, :3] / 255 - 1, axis=1) - 1).max() < 0.02
+    middles = texels[2::5, 2::5][surface.instance.mask][:, :3]
+    deep = ball_normals(surface)[:, 2] > 0.6
+    assert np.abs(middles - 255 * (surface.normals + 1) / 2)[deep].max() < 3
+
+
+def test_a_plane_has_one_normal_up_to_its_border():
+    found = fine(plane(9, 0.5, -1.0), 7)
+    normal = np.array([-0.5, 1.0, 1.0]) / 1.5
+    assert np.abs(found.normals[found.opacity > 0] - normal).max() < 1e-12
+    assert np.abs(np.linalg.norm(found.normals, axis=-1) - 1).max() < 1e-12
+
+
+def outlined(mask, scale=8):
+    """Opacity of a flat surface."""
+    return fine(surface_of(mask, lambda x, _: 0 * x), scale).opacity
+
+
+def test_the_outline_keeps_the_area_and_smooths_the_stairs():
+    opacity = outlined(disc(40, 17))
+    assert opacity.sum() / 64 == pytest.approx(np.pi * 17**2, rel=0.015)
+    y, x = (np.mgrid[:320, :320] + 0.5) / 8 - 20
+    radius = np.hypot(x, y)
+    assert opacity[radius < 16.5].min() == 1
+    assert opacity[radius > 17.5].max() == 0
+    part = (opacity > 0) & (opacity < 1)
+    assert radius[part].max() - radius[part].min() < 0.7  # the stairs are 1.4 apart
+    assert part.sum() < 4 * 2 * np.pi * 17 * 8
+
+
+def test_what_is_one_pixel_thin_stays_and_so_do_thin_gaps():
+    mask = np.zeros((12, 24), dtype=bool)
+    mask[5, 2:22] = True
+    assert outlined(mask)[5 * 8 + 4, 3 * 8 : 21 * 8].min() == 1
+    gap = outlined(~mask)
+    assert gap[5 * 8 + 4, 4 * 8 : 20 * 8].max() == 0
+    assert gap[2 * 8 + 4, 8:-8].min() == 1
+
+
+def test_strokes_at_the_border_are_the_border():
+    mask = np.ones((16, 16), dtype=bool)
+    surface = surface_of(mask, lambda x, _: 0 * x)
+    edge = np.argwhere(~np.pad(np.ones((14, 14), dtype=bool), 1))
+    instance = type(surface.instance)("shape", mask, edge, np.zeros(len(edge)), np.ones(len(edge)))
+    drawn = raster(instance, surface.normals, 10).opacity
+    assert fine(surface, 10).opacity[80].sum() == pytest.approx(160, abs=1.5)
+    assert drawn[80].sum() == pytest.approx(152, abs=1.5)
+
+
+def encoded(energy):
+    """What a screen is told of clay in light of that energy."""
+    light = np.minimum(energy * np.array(CLAY), 1.0)
+    return 1.055 * light ** (1 / 2.4) - 0.055
+
+
+def test_light_comes_back_with_the_cosine_and_mirrored_light_is_mirrored():
+    one = np.ones((1, 1))
+    for azimuth, elevation in ((0.3, 0.4), (2.2, 1.5), (-1.0, 0.0)):
+        light = Light(azimuth, elevation)
+        assert np.linalg.norm(light.direction) == pytest.approx(1)
+        facing = lit(Raster(light.direction[None, None], one), light)
+        away = lit(Raster((light.direction * (-1, -1, 1))[None, None], one), light)
+        assert (facing >= away).all()
+    frontal = lit(Raster(np.array([[[0.0, 0.0, 1.0]]]), one), Light(0.0, np.pi / 2))[0, 0]
+    assert frontal[:3] == pytest.approx(encoded(1.09 + 0.08 * np.sqrt(0.5)))
+    side = lit(Raster(np.array([[[0.8, 0.0, 0.6]]]), one), Light(np.pi, 0.0))[0, 0]
+    assert side[:3] == pytest.approx(encoded(0.04 + 0.06 + 0.08 * 0.8))  # in the lamp's shade
+    found = fine(ball(16), 4)
+    left, right = lit(found, Light(2.0, 0.7)), lit(found, Light(np.pi - 2.0, 0.7))
+    assert np.abs(left - right[:, ::-1]).max() < 1e-9
+    rows, columns = np.nonzero(left[..., 0] == left[found.opacity == 1][:, 0].max())
+    assert rows.mean() < 32
+    assert columns.mean() < 32
+
+
+@pytest.mark.parametrize("angles", [(0.0, -0.1), (0.0, 1.7), (np.nan, 0.5), (0.0, np.nan), (np.inf, 0.5)])
+def test_a_lamp_below_the_drawing_is_refused(angles):
+    with pytest.raises(InputError, match="elevation is between 0 and 90"):
+        Light(*angles)
+
+
+def test_a_matcap_has_one_colour_for_each_normal_and_all_are_colours():
+    grid = np.random.default_rng(1).normal(size=(500, 3))
+    normals = np.abs(grid / np.linalg.norm(grid, axis=1, keepdims=True)) * np.sign(grid) ** (1, 1, 2)
+    assert (matcap_ball(normals) >= 0).all()
+    found = fine(ball(16), 4)
+    coloured = matcap(found)
+    assert ((coloured >= 0) & (coloured <= 1)).all()
+    turned = Raster(found.normals[::-1], found.opacity[::-1])
+    assert (matcap(turned) == coloured[::-1]).all()
+    light = coloured[found.opacity == 1][:, :3].sum(axis=1)
+    assert np.ptp(light) > 0.8
+
+
+@pytest.mark.parametrize("scale", [0, -3, 10**6])
+def test_scales_without_a_picture_are_refused(scale):
+    with pytest.raises(InputError, match="choose another scale"):
+        fine(ball(8), scale)

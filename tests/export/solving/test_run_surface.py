@@ -1,0 +1,58 @@
+"""A run shades the surface over its field where that can be trusted, says why not, and stops for Ctrl-C."""
+
+import json
+from dataclasses import replace
+
+import crossfield as cf
+import pytest
+from crossfield.export.cli.output import show_report
+from crossfield.export.solving.methods import Candidate
+from crossfield.export.solving.run import Report, _shaded
+from crossfield.models.processes.progress import silent
+from PIL import Image
+from shapes import ball
+
+
+@pytest.fixture(scope="module")
+def report():
+    """The report of a run that found one field."""
+    field = cf.bend_field(cf.polyvector_field(cf.sample("mouse", 12)))
+    return Report(field.instance, (Candidate("bend", field, 0.1),), (), stages={"start": 0.1})
+
+
+def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path, capsys):
+    found = _shaded(report, tmp_path, silent)
+    trusted = not found.surface.doubts
+    assert found.shaded == trusted == (tmp_path / "shaded.png").exists()
+    for surface, doubt in ((ball(8), ""), (replace(ball(8), doubts=("it is flat",)), "it is flat")):
+        told = replace(report, surface=surface)
+        document = json.loads(json.dumps(told.document()))["surface"]
+        assert document["doubts"] == ([doubt] if doubt else [])
+        assert document["picture"] == (None if doubt else "shaded.png")
+        show_report(told, tmp_path)
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("no shaded surface: it is flat" if doubt else "shaded surface: ") in said
+        assert ("no shaded surface" in said) == bool(doubt)
+
+
+def test_ctrl_c_before_the_surface_leaves_the_rest(report, tmp_path):
+    def pressed(line):
+        assert "surface" in line
+        raise KeyboardInterrupt
+
+    ended = _shaded(report, tmp_path, pressed)
+    assert ended.interrupted == "surface"
+    assert ended.surface is None
+    assert ended.document()["surface"] is None
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_picture_of_a_run_is_that_of_the_command(tmp_path):
+    from crossfield.export.surfaces.files import write_shaded
+
+    surface = ball(8)
+    cf.write_surface(surface, tmp_path / "folder")
+    path = write_shaded(surface, tmp_path / "shaded.png")
+    assert path.read_bytes() == (tmp_path / "folder" / "shaded.png").read_bytes()
+    with Image.open(path) as picture:
+        assert picture.mode == "RGBA"

@@ -1,0 +1,233 @@
+"""Surfaces over cross fields: near the truth, the same however crosses are written, and always ended."""
+
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.errors import InputError
+from crossfield.models.instance.instance import HALF, Instance
+from crossfield.models.smooth.polyvector import HOLDS
+from loops import for_each
+from moves import MOVES, lines
+
+pytestmark = pytest.mark.numeric
+
+
+def exact(name, size):
+    """An analytic instance, and the field of its exact crosses."""
+    true = cf.analytic(name, size)
+    return true, cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle)
+
+
+def bent(instance):
+    return cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS)))
+
+
+def apart(first, second):
+    """Angles in degrees between unit normals."""
+    return np.degrees(np.arccos(np.clip((first * second).sum(axis=1), -1, 1)))
+
+
+def error(surface, true):
+    """Mean angle to the true normals, the side by the truth."""
+    return min(apart(each.normals, true.normals).mean() for each in (surface, surface.flipped()))
+
+
+def middle(true, slant=None):
+    """The hint of the pixel next to the middle of the mask."""
+    pixels = np.argwhere(true.instance.mask)
+    at = np.argmin(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1))
+    x, y, z = true.normals[at]
+    return cf.Hint(
+        *map(int, pixels[at]), float(np.arccos(z)) if slant is None else slant, float(np.arctan2(y, x))
+    )
+
+
+@for_each("name, most", [("vase", 3), ("ellipsoid", 3)])
+def test_exact_crosses_lead_to_the_surface(name, most):
+    true, field = exact(name, 16)
+    found = cf.surface(field)
+    assert error(found, true) <= most
+    assert apart(found.normals, true.normals).mean() < 90  # the default side is the true one
+    assert found.doubts == ()
+    assert found.confidence.mean() > 0.9
+
+
+@pytest.mark.slow
+@for_each(
+    "name, size, most",
+    [("tilted_cylinder", 48, 2), ("torus_patch", 48, 5), ("vase", 32, 2), ("spheroid", 32, 3)],
+)
+def test_exact_crosses_lead_to_the_surface_on_finer_grids(name, size, most):
+    true, field = exact(name, size)
+    assert error(cf.surface(field), true) <= most
+
+
+@pytest.mark.slow
+@for_each(
+    "name, size, most",
+    [("tilted_cylinder", 48, 2), ("torus_patch", 48, 10), ("vase", 32, 5), ("spheroid", 32, 3)],
+)
+def test_strokes_lead_near_it(name, size, most):
+    true = cf.analytic(name, size)
+    assert error(cf.surface(bent(true.instance)), true) <= most
+
+
+@pytest.mark.parametrize("size", [pytest.param(48, marks=pytest.mark.slow), 16])
+@pytest.mark.parametrize("name", ["tilted_cylinder", "wave_sheet"])
+def test_a_hint_chooses_among_surfaces_of_the_same_crosses(name, size):
+    true, field = exact(name, size)
+    loose, settled = cf.surface(field), cf.surface(field, [middle(true)])
+    assert apart(settled.normals, true.normals).mean() < (1 if size == 48 else 2)
+    assert loose.firmness < 0.01 < settled.firmness
+    assert [len(each.freedom) for each in (loose, settled)] == [2, 0]
+
+
+def test_what_has_no_such_family_says_so():
+    _, field = exact("vase", 16)
+    found = cf.surface(field)
+    assert found.firmness > 0.01
+    assert len(found.freedom) == 1
+
+
+def test_a_hint_and_flip_choose_the_side():
+    true, field = exact("spheroid", 12)
+    hint = middle(true)
+    other = replace(hint, tilt=hint.tilt + np.pi)
+    found, turned = cf.surface(field), cf.surface(field, flip=True)
+    assert turned.heights == pytest.approx(-found.heights, nan_ok=True)
+    assert turned.normals == pytest.approx(found.flipped().normals)
+    told = [cf.surface(field, [each], flip=True) for each in (hint, other)]
+    assert [(apart(each.normals, true.normals).mean() < 20) for each in told] == [True, False]
+    straight = cf.surface(field, [replace(hint, slant=0.0)], flip=True)
+    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # such a hint tells no side
+
+
+@for_each(
+    "hint, message",
+    [
+        (
+            (-1, 3, 0.1, 0),
+            "row -1, column 3 lies outside the mask of spheroid, which has 24 rows and 20 columns",
+        ),
+        ((2, 99, 0.1, 0), "outside the mask"),
+        ((0, 0, 0.1, 0), "outside the mask"),
+        ((12, 10, HALF, 0), "slant of 90 degrees; give one from 0 to less than 90"),
+        ((12, 10, -0.1, 0), "slant"),
+        ((12, 10, np.nan, 0), "slant of nan degrees"),
+        ((12, 10, 0.1, np.inf), "tilt inf, which is no direction"),
+    ],
+)
+def test_hints_that_say_nothing_possible_are_refused(hint, message):
+    with pytest.raises(InputError, match=message):
+        cf.surface(exact("spheroid", 24)[1], [cf.Hint(*hint)])
+
+
+def test_how_crosses_are_written_does_not_matter():
+    """Lines exchanged, turned by pi, and other jumps, at random at each pixel."""
+    field = bent(cf.sample("mouse", 12))
+    steps = np.random.default_rng(0).integers(-3, 4, field.instance.grid.size)
+    other = cf.CrossField(
+        field.instance, field.alpha + HALF * steps, (-1.0) ** steps * field.beta, np.zeros_like(field.p)
+    )
+    assert cf.surface(other).heights == pytest.approx(cf.surface(field).heights, abs=1e-6, nan_ok=True)
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_the_surface_moves_with_the_sketch(name):
+    move, turn = MOVES[name]
+    _, field = exact("spheroid", 12)
+    other = getattr(field.instance, name)()
+    there = [turn(move(field.image(line)))[other.mask] for line in lines(field)]
+    moved = cf.surface(cf.CrossField.from_lines(other, *there)).heights
+    assert moved == pytest.approx(move(cf.surface(field).heights), abs=0.05, nan_ok=True)
+
+
+def test_the_same_field_gives_the_same_bytes():
+    field = bent(cf.sample("bottle", 12))
+    first, second = cf.surface(field), cf.surface(field)
+    assert first.heights.tobytes() == second.heights.tobytes()
+    assert first.firmness == second.firmness
+
+
+def constant(mask, u=0.3, v=1.3):
+    """A field of the same skew cross everywhere."""
+    mask = np.array(mask, dtype=bool)
+    instance = Instance("tiny", mask, np.argwhere(mask)[:1], np.array([u]), np.ones(1))
+    return cf.CrossField.from_lines(instance, np.full(mask.sum(), u), np.full(mask.sum(), v))
+
+
+@for_each(
+    "mask", [np.ones((1, 1)), np.ones((1, 7)), np.ones((6, 1)), np.eye(4), np.indices((5, 6)).sum(axis=0) % 2]
+)
+def test_any_mask_has_heights_at_the_corners_of_its_pixels(mask):
+    found = cf.surface(constant(mask))
+    used = np.zeros(np.add(mask.shape, 1), dtype=bool)
+    for row, column in np.argwhere(mask):
+        used[row : row + 2, column : column + 2] = True
+    assert (np.isfinite(found.heights) == used).all()
+    assert apart(found.normals, np.array([0, 0, 1.0])).max() < 75
+    assert found.confidence.min() > 0.5  # one slope explains one cross; touching corners tie them
+
+
+def test_parts_of_the_mask_are_independent():
+    true, field = exact("spheroid", 12)
+    gap = np.zeros((true.instance.mask.shape[0], 1), dtype=bool)
+    mask = np.hstack([true.instance.mask, gap, true.instance.mask[:, ::-1]])
+    pictures = [field.image(line) for line in lines(field)]
+    mirrored = [np.pi - picture[:, ::-1] for picture in pictures]
+    twice = [np.hstack([one, gap, other])[mask] for one, other in zip(pictures, mirrored, strict=True)]
+    instance = Instance("twice", mask, np.argwhere(mask)[:1], twice[0][:1], np.ones(1))
+    both = cf.surface(cf.CrossField.from_lines(instance, *twice)).heights
+    alone = cf.surface(field).heights
+    wide = alone.shape[1]
+    assert both[:, :wide] == pytest.approx(alone, abs=1e-6, nan_ok=True)
+    assert both[:, wide:] == pytest.approx(alone[:, ::-1], abs=0.05, nan_ok=True)
+
+
+def test_an_end_in_time_leaves_the_best_so_far():
+    true, field = exact("spheroid", 16)
+    errors = []
+    for most in (0, 8, 10_000):
+        left = iter(range(most))
+        found = cf.surface(field, over=lambda left=left: next(left, None) is None)
+        assert np.isfinite(found.normals).all()
+        assert any("time" in doubt for doubt in found.doubts) == (most < 10_000)
+        errors.append(error(found, true))
+    assert errors[2] < errors[0] / 5
+    assert found.heights.tobytes() == cf.surface(field).heights.tobytes()
+
+
+def test_progress_tells_of_every_part():
+    told = []
+    cf.surface(constant([[1, 0, 0, 1]]), progress=told.append)
+    assert told == ["surface, part 1 of 2", "surface, part 2 of 2"]
+
+
+def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
+    field = cf.power_field(cf.sample("bottle", 12))
+    square = cf.CrossField(field.instance, field.alpha, 0 * field.beta, field.p)
+    found = cf.surface(square)
+    (doubt,) = found.doubts
+    assert "nearly flat" in doubt
+    assert apart(found.normals, np.array([0, 0, 1.0])).mean() < 1
+
+
+@pytest.mark.slow
+@for_each("name", ["mouse", "bottle", "saddle", "cylinder_bend", "singular"])
+def test_samples_are_trusted_but_not_at_singular_spots(name):
+    field = bent(cf.sample(name, 24))
+    found = cf.surface(field)
+    assert found.doubts == ()
+    at = field.instance.grid.number[field.singularities.row, field.singularities.column]
+    assert (found.confidence[at] == 0).all()
+
+
+def test_crosses_of_no_surface_are_doubted():
+    instance = cf.sample("mouse", 12)
+    angle = np.random.default_rng(0).uniform(0, np.pi, (2, instance.grid.size))
+    found = cf.surface(cf.CrossField.from_lines(instance, *angle))
+    assert any("no one surface" in doubt for doubt in found.doubts)
+    assert any("singular spots" in doubt for doubt in found.doubts)
+    assert found.confidence.mean() < 0.7
