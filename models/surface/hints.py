@@ -46,8 +46,10 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
     mask = instance.mask
     for hint in hints:
         place = f"the hint at row {hint.row}, column {hint.column}"
-        inside = all(0 <= at < size for at, size in zip((hint.row, hint.column), mask.shape, strict=True))
-        if not inside or not mask[hint.row, hint.column]:
+        at = (hint.row, hint.column)
+        whole = all(isinstance(each, (int, np.integer)) for each in at)
+        inside = whole and all(0 <= each < size for each, size in zip(at, mask.shape, strict=True))
+        if not inside or not mask[at]:
             raise InputError(
                 f"{place} lies outside the mask of {instance.name}, which has {mask.shape[0]} rows and "
                 f"{mask.shape[1]} columns; give a pixel inside"
