@@ -21,6 +21,7 @@ from ..smooth.systems import PULL, Solve, factored, one_thread, stroke_weight, s
 CLOSE: Final = 1e-2
 """Relative residual of a step that ranks jumps like the exact one."""
 
+_ROUNDING: Final = 1e-9  # residual, absolute, below which a local step would follow rounding
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 40 are usual
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 
@@ -75,7 +76,7 @@ def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
     """
     inverse = 1 / energy.stiffness
     scaled = LinearOperator(energy.matrix.shape, matvec=lambda v: inverse * v, dtype=np.float64)
-    step: Floats = cg(energy.matrix, right, rtol=tolerance, maxiter=_MOST_LOCAL_STEPS, M=scaled)[0]
+    step: Floats = cg(energy.matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=_MOST_LOCAL_STEPS, M=scaled)[0]
     return step
 
 

@@ -46,9 +46,15 @@ def factored(matrix: Any) -> Solve:
     """The solver of a Hermitian system that is positive semidefinite: of H + 1e-9, so that it is definite."""
     pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
     with one_thread():
-        # A definite matrix needs no pivots, so that the ordering can keep the factors sparse.
+        # A definite matrix needs no pivots, so that the ordering can keep the factors sparse. So sparse that
+        # columns taken together, as dense blocks, would mostly hold zeros.
         factors = splu(
-            pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            pulled,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            relax=1,
+            panel_size=1,
+            options={"SymmetricMode": True},
         )
 
     def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
