@@ -31,6 +31,7 @@ _Strategy = Callable[[Instance, Over], FreeField]
 
 _SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
 _EFFORT: Final = 40960  # pixels of all hasty fields of one grid
+_LIFTED: Final = 8  # fields
 _HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
 _HASTY: Final = 0.1  # relative residual of such a step
 
@@ -44,7 +45,7 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     """
     if instance.grid.size <= _SMALL:
         return improved(greedy(instance, over=over), over)
-    return _best_of_many(instance, over).bounded(over)
+    return _best_of_many(instance, over)[0].bounded(over)
 
 
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
@@ -87,19 +88,23 @@ _STRATEGIES: Final[tuple[_Strategy, ...]] = (
 """Two strategies with factors of the stroke weights, those first that add most to the ones before."""
 
 
-def _best_of_many(instance: Instance, over: Over) -> FreeField:
-    """Hasty fields, and what has grown from the coarse grid, made one."""
+def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
+    """The hasty fields made one, and then they themselves: of strategies here and on coarser grids."""
     starts = []
     coarse = halved(instance) if instance.grid.size > _SMALL else None
     if coarse is not None:
-        starts.append(lifted(_best_of_many(coarse, over).field, instance))
-        _hurry(starts[0])
+        for state in _best_of_many(coarse, over)[:_LIFTED]:
+            if starts and over():
+                break
+            starts.append(lifted(state.field, instance))
+            _hurry(starts[-1])
     for strategy in _STRATEGIES[: max(1, _EFFORT // instance.grid.size)]:
         if starts and over():
             break
         starts.append(strategy(instance, over))
         _hurry(starts[-1])
-    return _together(starts, over)
+    starts.sort(key=_of_state)
+    return [_together(starts, over), *starts]
 
 
 def _hurry(state: FreeField) -> None:
@@ -112,16 +117,19 @@ def _hurry(state: FreeField) -> None:
 
 
 def _together(states: list[FreeField], over: Over) -> FreeField:
-    """The lowest field with the regions of others that lower it, the lower ones first, settled."""
-    fields = sorted((state.field for state in states), key=_energy)
-    best = fields[0]
-    for other in fields[1:]:
+    """The first and lowest field with the regions of others that lower it, settled."""
+    best = states[0].field
+    for other in states[1:]:
         if over():
             break
-        best = fused(best, other)
+        best = fused(best, other.field)
     state = FreeField.of(best)
     settle(state, LinearSolver(), over, enough=CREEP)
-    return min(state, FreeField.of(fields[0]), key=lambda each: round(each.energy, 9))
+    return min(state, states[0], key=_of_state)
+
+
+def _of_state(state: FreeField) -> float:
+    return round(state.energy, 9)
 
 
 def _energy(field: CrossField) -> float:
