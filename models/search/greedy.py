@@ -18,7 +18,8 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from .energy import CLOSE, LinearSolver, energy_at, local_step
+from ..smooth.systems import locally
+from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
@@ -45,7 +46,7 @@ class _Pace:
 
 _CLOSE: Final = _Pace(1.0, None)
 _LARGE: Final = _Pace(1.0, 3e-2)
-_ROUGH: Final = _Pace(2.0, 1e-2, 0.02)
+_ROUGH: Final = _Pace(2.0, 3e-2, 0.02)
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
@@ -110,4 +111,4 @@ def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float |
     if local is None:
         state.x = state.x + solver.step(energy.matrix, right, CLOSE)
     else:
-        state.x = state.x + local_step(energy, right, local)
+        state.x = state.x + locally(energy.matrix, right, local)

@@ -20,9 +20,10 @@ from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
+from ..smooth.systems import locally
 from .box_qp import fitted
 from .coarse import CREEP, halved, lifted
-from .energy import LinearSolver, energy_at, local_step
+from .energy import LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
 from .greedy import greedy, rough_greedy
 from .improvement import improved, settle
@@ -34,6 +35,7 @@ _EFFORT: Final = 40960  # pixels of all hasty fields of one grid
 _LIFTED: Final = 8  # fields
 _HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
 _HASTY: Final = 0.1  # relative residual of such a step
+_FAINT: Final = 1e-2  # of the polynomials of a hasty field, whose values fade away from strokes
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
@@ -64,7 +66,7 @@ def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
 
 
 def _polyvector(hold: float, instance: Instance, _: Over) -> FreeField:
-    return FreeField.of(polyvector_field(instance, hold=hold))
+    return FreeField.of(polyvector_field(instance, hold=hold, tolerance=_FAINT))
 
 
 def _greedy(hold: float, instance: Instance, over: Over) -> FreeField:
@@ -112,7 +114,7 @@ def _hurry(state: FreeField) -> None:
     bounds = free_bounds(state.instance)
     for _ in range(_HASTE):
         energy = energy_at(state.instance, state.p)
-        state.x = np.clip(state.x + local_step(energy, -energy.slope(state.x), _HASTY), *bounds)
+        state.x = np.clip(state.x + locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
         state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
 
 
