@@ -62,7 +62,7 @@ def _of_pixels(field: CrossField) -> Floats:
 
 
 def _least_of_pairs(pairs: Ints, first: CrossField, second: CrossField) -> Floats:
-    """What some pairs add to the energy with their best jumps, first pixels of one field, second of another."""
+    """What pairs add to the energy with their best jumps, first pixels of one field, second of another."""
     i, j = first.instance.grid.first[pairs], first.instance.grid.second[pairs]
     turn = first.alpha[i] - second.alpha[j]
     near = np.floor(-turn / HALF).astype(np.int32)

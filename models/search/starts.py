@@ -31,7 +31,7 @@ from .improvement import improved, settle
 _Strategy = Callable[[Instance, Over], FreeField]
 
 _SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
-_EFFORT: Final = 40960  # pixels of all hasty fields of one grid
+_EFFORT: Final = 32768  # pixels of all hasty fields of one grid
 _LIFTED: Final = 8  # fields
 _HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
 _HASTY: Final = 0.1  # relative residual of such a step
@@ -92,7 +92,7 @@ _STRATEGIES: Final[tuple[_Strategy, ...]] = (
 
 def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
     """The hasty fields made one, and then they themselves: of strategies here and on coarser grids."""
-    starts = []
+    starts: list[FreeField] = []
     coarse = halved(instance) if instance.grid.size > _SMALL else None
     if coarse is not None:
         for state in _best_of_many(coarse, over)[:_LIFTED]:

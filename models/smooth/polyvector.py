@@ -30,9 +30,7 @@ _HARDEST: Final = 1e4
 _DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
 
 
-def polyvector_field(
-    instance: Instance, *, hold: float = 1.0, tolerance: float | None = None
-) -> CrossField:
+def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
@@ -48,7 +46,8 @@ def polyvector_field(
     tolerance: relative residual that is left in the polynomials, found without a factorisation, in a third of
     the time; None: none.
     """
-    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in _lines(*_polynomials(instance, hold, tolerance)))
+    found = _polynomials(instance, hold, tolerance)
+    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in _lines(*found))
     alpha, beta = label_of(u, v)
     start = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
     return start.with_best_jumps()

@@ -69,7 +69,7 @@ def factored(matrix: Any) -> Solve:
 
 
 def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
-    """The x with Ax = right to a relative residual, A Hermitian, by conjugate gradients scaled by the diagonal.
+    """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients.
 
     Step k of the method reaches k pixels far: what is smooth over longer distances stays as it is, near 0.
     """
