@@ -20,7 +20,7 @@ from ..instance.instance import HALF
 from .field import CrossField
 from .jumps import free_jumps, parity_sign
 
-_APART: Final = 0.01  # radians of cross error up to which two crosses count as one
+_APART: Final = 0.02  # radians of cross error up to which two crosses count as one
 _UNITS: Final = 1e6  # into which 1 + energy is divided: flows are whole numbers, whose sums no order changes
 
 

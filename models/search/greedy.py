@@ -36,7 +36,7 @@ class _Pace:
     """How much energy one batch of jumps may add, and to which relative residual angles are then brought up
     to date locally, which leaves the smooth part of the error; None: by factorisations.
 
-    share: of the energy that all jumps would add at the beginning, that a batch may add if that is more.
+    share: of the energy that all jumps so far have added, that a batch may add if that is more.
     """
 
     batch: float
@@ -46,7 +46,7 @@ class _Pace:
 
 _CLOSE: Final = _Pace(1.0, None)
 _LARGE: Final = _Pace(1.0, 3e-2)
-_ROUGH: Final = _Pace(2.0, 3e-2, 0.02)
+_ROUGH: Final = _Pace(0.5, 3e-2, 0.1)
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
@@ -89,13 +89,15 @@ def _stitch(
     grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
     _settle(state, known, solver, pace.local)
-    most = max(pace.batch, pace.share * float(free_jumps(grid, state.alpha, state.beta)[1][~known].sum()))
+    added = 0.0
     while not known.all():
         open_ = np.nonzero(~known)[0]
         jumps, cost = free_jumps(grid, state.alpha, state.beta)
         # Rounding must not decide the order of equal costs: it would differ between machines.
         order = np.argsort(np.round(cost[open_], 9), kind="stable")
-        many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), most, side="right")))
+        sums = np.cumsum(cost[open_][order])
+        many = max(1, int(np.searchsorted(sums, max(pace.batch, pace.share * added), side="right")))
+        added += float(sums[many - 1])
         chosen = open_ if over() else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
