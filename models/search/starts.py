@@ -32,7 +32,9 @@ _Strategy = Callable[[Instance, Over], FreeField]
 
 _SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
 _EFFORT: Final = 32768  # pixels of all hasty fields of one grid
-_LIFTED: Final = 4  # fields of a coarse grid that grow to the next one: what they were made into, and the lowest
+_LIFTED: Final = (
+    4  # fields of a coarse grid that grow to the next one: what they were made into, and the lowest
+)
 _HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
 _HASTY: Final = 0.1  # relative residual of such a step
 _FAINT: Final = 1e-2  # of the polynomials of a hasty field, whose values fade away from strokes
