@@ -46,7 +46,7 @@ class _Pace:
 
 _CLOSE: Final = _Pace(1.0, None)
 _LARGE: Final = _Pace(1.0, 3e-2)
-_ROUGH: Final = _Pace(0.5, 3e-2, 0.1)
+_ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
