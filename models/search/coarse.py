@@ -70,12 +70,18 @@ def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossFi
     Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the
     stroke. Then angles and jumps settle until the time is over.
     """
+    state = lifted(coarse, instance)
+    settle(state, LinearSolver(), over, enough=CREEP)
+    return state.bounded(over)
+
+
+def lifted(coarse: CrossField, instance: Instance) -> FreeField:
+    """The crosses and jumps of the coarse pixels on the fine grid, before they settle; see `grown`."""
     grid = instance.grid
     parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
     state = FreeField(instance, coarse.alpha[parent], coarse.beta[parent], _jumps(coarse, parent, instance))
     _face_strokes(state)
-    settle(state, LinearSolver(), over, enough=CREEP)
-    return state.bounded(over)
+    return state
 
 
 def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:

@@ -21,7 +21,6 @@ from ..smooth.systems import PULL, Solve, factored, one_thread, stroke_weight, s
 CLOSE: Final = 1e-2
 """Relative residual of a step that ranks jumps like the exact one."""
 
-_MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 40 are usual
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 
 
@@ -66,17 +65,6 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
         matrix,
         np.concatenate([pulled + strokes.at_pixels(goal, n), strokes.at_pixels(strokes.side * goal, n)]),
     )
-
-
-def local_step(energy: Quadratic, right: Floats, tolerance: float) -> Floats:
-    """The s with Hs = right to a relative residual, by conjugate gradients scaled by the diagonal.
-
-    Step k of the method reaches k pixels far: what is smooth over longer distances stays as it is.
-    """
-    inverse = 1 / energy.stiffness
-    scaled = LinearOperator(energy.matrix.shape, matvec=lambda v: inverse * v, dtype=np.float64)
-    step: Floats = cg(energy.matrix, right, rtol=tolerance, maxiter=_MOST_LOCAL_STEPS, M=scaled)[0]
-    return step
 
 
 class LinearSolver:

@@ -18,7 +18,8 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from .energy import CLOSE, LinearSolver, energy_at, local_step
+from ..smooth.systems import locally
+from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
@@ -34,15 +35,18 @@ _CLOSE_UP_TO: Final = (
 class _Pace:
     """How much energy one batch of jumps may add, and to which relative residual angles are then brought up
     to date locally, which leaves the smooth part of the error; None: by factorisations.
+
+    share: of the energy that all jumps so far have added, that a batch may add if that is more.
     """
 
     batch: float
     local: float | None
+    share: float = 0.0
 
 
 _CLOSE: Final = _Pace(1.0, None)
 _LARGE: Final = _Pace(1.0, 3e-2)
-_ROUGH: Final = _Pace(2.0, 1e-2)
+_ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
@@ -60,14 +64,14 @@ def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Ov
     return state.bounded(over)
 
 
-def rough_greedy(instance: Instance, over: Over = never) -> CrossField:
-    """As `greedy`, in a third of its time: in larger batches, with angles brought up to date locally.
+def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
+    """As `greedy`, in a tenth of its time: some 60 batches, angles brought up to date locally, no bounds.
 
     The jumps are others, and as good: which strategy has the best is a matter of luck.
     """
     state, nearest = _cells(instance)
     _stitch(state, nearest, _ROUGH, over)
-    return state.bounded(over)
+    return state
 
 
 def _cells(instance: Instance) -> tuple[FreeField, Ints]:
@@ -84,13 +88,16 @@ def _stitch(
     """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
-    _settle(state, known, solver, None)
+    _settle(state, known, solver, pace.local)
+    added = 0.0
     while not known.all():
         open_ = np.nonzero(~known)[0]
         jumps, cost = free_jumps(grid, state.alpha, state.beta)
         # Rounding must not decide the order of equal costs: it would differ between machines.
         order = np.argsort(np.round(cost[open_], 9), kind="stable")
-        many = max(1, int(np.searchsorted(np.cumsum(cost[open_][order]), pace.batch, side="right")))
+        sums = np.cumsum(cost[open_][order])
+        many = max(1, int(np.searchsorted(sums, max(pace.batch, pace.share * added), side="right")))
+        added += float(sums[many - 1])
         chosen = open_ if over() else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
@@ -106,4 +113,4 @@ def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float |
     if local is None:
         state.x = state.x + solver.step(energy.matrix, right, CLOSE)
     else:
-        state.x = state.x + local_step(energy, right, local)
+        state.x = state.x + locally(energy.matrix, right, local)

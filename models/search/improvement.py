@@ -52,11 +52,18 @@ def improved(field: CrossField, over: Over = never, *, enough: float = FALL) -> 
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
+def settle(
+    state: FreeField,
+    solver: LinearSolver,
+    over: Over = never,
+    *,
+    enough: float = FALL,
+    tolerance: float = _SETTLED,
+) -> None:
     """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts.
 
     enough: relative fall of the energy in a round below which no more rounds follow. Singularities creep by a
-    pixel a round, on fine grids for a hundred rounds.
+    pixel a round, on fine grids for a hundred rounds. tolerance: of the angles, as for `least_in_box`.
     """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
@@ -64,7 +71,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
         if over():
             break
         energy = energy_at(state.instance, state.p)
-        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
+        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=tolerance, over=over)
         reached = state.energy
         fall = (least - reached) / (1 + reached)
         if fall >= FALL:

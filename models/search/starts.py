@@ -1,41 +1,55 @@
-"""Fields to start from: the greedy one, PolyVector fields, and what grows out of the best on a coarse grid.
+"""Fields to start from: the greedy one, PolyVector fields, and the best of many made one.
 
-Which jumps a strategy finds is a matter of luck, and on a coarse grid luck is cheap: there several are tried,
-curves of the best, or of two that are close, change their family, and what is found grows to the fine grid,
-where angles and jumps only settle.
+Which jumps a strategy finds is a matter of luck, and another one is lucky elsewhere. So on larger grids
+hasty fields of several strategies are made one, region by region (models/field/fusion.py), first on a coarse
+grid, where they cost little; what is found there grows to the fine grid and is one of several again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
+import numpy as np
+
 from ..field.field import CrossField
+from ..field.fusion import fused
+from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
+from ..smooth.systems import locally
 from .box_qp import fitted
-from .coarse import CREEP, grown, halved, prolonged
+from .coarse import CREEP, halved, lifted
+from .energy import LinearSolver, energy_at
+from .free_field import FreeField, free_bounds
 from .greedy import greedy, rough_greedy
-from .improvement import improved
+from .improvement import improved, settle
 
-_COARSE: Final = 4096  # pixels up to which the greedy strategy costs little
-_HELD: Final = (1.0, 0.3, 0.1, 0.03)  # factors of the stroke weights for the greedy strategy
-_IMPROVED: Final = 2  # of the starts: improving one takes as long as finding three
-_CLOSE: Final = 0.03  # relative energy above the lowest start up to which another one is improved too
+_Strategy = Callable[[Instance, Over], FreeField]
+
+_SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
+_EFFORT: Final = 32768  # pixels of all hasty fields of one grid
+_LIFTED: Final = (
+    4  # fields of a coarse grid that grow to the next one: what they were made into, and the lowest
+)
+_HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
+_HASTY: Final = 0.1  # relative residual of such a step
+_FAINT: Final = 1e-2  # of the polynomials of a hasty field, whose values fade away from strokes
 
 
 def first_field(instance: Instance, over: Over = never) -> CrossField:
     """A field of low 2-norm energy, as time allows: where searches start, and `qp-fixed`'s jumps.
 
-    Up to 4096 pixels the improved greedy field. On larger grids what the best of several starts, on a grid of
-    at most 4096 pixels, grows to from grid to grid, each of twice the resolution: improved on all but the
-    last, where angles and jumps settle. Deterministic where time does not cut it off.
+    Up to 1024 pixels the improved greedy field. On larger grids hasty fields of up to ten strategies, fewer
+    the larger the grid, and what the first field of the grid of half the resolution grows to, made one.
+    Deterministic where time does not cut it off.
     """
-    coarse = _coarser(instance)
-    if coarse is None:
+    if instance.grid.size <= _SMALL:
         return improved(greedy(instance, over=over), over)
-    return grown(_from_coarsest(coarse, over), instance, over)
+    return _best_of_many(instance, over)[0].bounded(over)
 
 
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
@@ -53,35 +67,73 @@ def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
     return best
 
 
-def _coarser(instance: Instance) -> Instance | None:
-    """The instance on half the resolution; None where it is coarse already, or no stroke would be left."""
-    return halved(instance) if instance.grid.size > _COARSE else None
+def _polyvector(hold: float, instance: Instance, _: Over) -> FreeField:
+    return FreeField.of(polyvector_field(instance, hold=hold, tolerance=_FAINT))
 
 
-def _from_coarsest(instance: Instance, over: Over) -> CrossField:
-    """The best start of the coarsest grid, grown and improved from grid to grid up to this one."""
-    coarse = _coarser(instance)
-    if coarse is None:
-        return _best_start(instance, over)
-    return prolonged(_from_coarsest(coarse, over), instance, over, enough=CREEP)
+def _greedy(hold: float, instance: Instance, over: Over) -> FreeField:
+    """Held less, strokes that contradict each other leave fewer vortices."""
+    light = rough_greedy(replace(instance, w_strokes=hold * instance.w_strokes), over)
+    return FreeField(instance, light.alpha, light.beta, light.p)
 
 
-def _best_start(instance: Instance, over: Over) -> CrossField:
-    """The best of the PolyVector start and, in time, of greedy fields; the lowest of them improved."""
-    starts = [polyvector_start(instance, over)]
-    starts += [_held(instance, factor, over) for factor in _HELD if not over()]
-    lowest = sorted(starts, key=_energy)[:_IMPROVED]
-    close = [start for start in lowest if _energy(start) <= (1 + _CLOSE) * _energy(lowest[0])]
-    return min((improved(start, over) for start in close), key=_energy)
+_STRATEGIES: Final[tuple[_Strategy, ...]] = (
+    partial(_polyvector, 0.1),
+    partial(_greedy, 0.3),
+    partial(_polyvector, 1.0),
+    partial(_polyvector, 0.03),
+    partial(_greedy, 1.0),
+    partial(_polyvector, 0.3),
+    partial(_greedy, 0.1),
+    partial(_polyvector, 0.01),
+    partial(_polyvector, 100.0),
+    partial(_greedy, 0.03),
+)
+"""Two strategies with factors of the stroke weights, those first that add most to the ones before."""
 
 
-def _held(instance: Instance, factor: float, over: Over) -> CrossField:
-    """The greedy field of strokes held that much, with the best angles for its jumps under the own weights.
+def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
+    """The hasty fields made one, and then they themselves: of strategies here and on coarser grids."""
+    starts: list[FreeField] = []
+    coarse = halved(instance) if instance.grid.size > _SMALL else None
+    if coarse is not None:
+        for state in _best_of_many(coarse, over)[:_LIFTED]:
+            if starts and over():
+                break
+            starts.append(lifted(state.field, instance))
+            _hurry(starts[-1])
+    for strategy in _STRATEGIES[: max(1, _EFFORT // instance.grid.size)]:
+        if starts and over():
+            break
+        starts.append(strategy(instance, over))
+        _hurry(starts[-1])
+    starts.sort(key=_of_state)
+    return [_together(starts, over), *starts]
 
-    Held less, strokes that contradict each other leave fewer vortices.
-    """
-    light = rough_greedy(replace(instance, w_strokes=factor * instance.w_strokes), over)
-    return fitted(CrossField(instance, light.alpha, light.beta, light.p).with_best_jumps(), over)
+
+def _hurry(state: FreeField) -> None:
+    """Bring angles and jumps up to date, enough to compare regions: what is smooth needs no comparison."""
+    bounds = free_bounds(state.instance)
+    for _ in range(_HASTE):
+        energy = energy_at(state.instance, state.p)
+        state.x = np.clip(state.x + locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
+        state.p = free_jumps(state.instance.grid, state.alpha, state.beta)[0]
+
+
+def _together(states: list[FreeField], over: Over) -> FreeField:
+    """The first and lowest field with the regions of others that lower it, settled."""
+    best = states[0].field
+    for other in states[1:]:
+        if over():
+            break
+        best = fused(best, other.field)
+    state = FreeField.of(best)
+    settle(state, LinearSolver(), over, enough=CREEP)
+    return min(state, states[0], key=_of_state)
+
+
+def _of_state(state: FreeField) -> float:
+    return round(state.energy, 9)
 
 
 def _energy(field: CrossField) -> float:

@@ -17,7 +17,7 @@ from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
 from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
-from .systems import factored, smoothness
+from .systems import factored, locally, smoothness
 
 _Complex = NDArray[np.complex128]
 
@@ -30,7 +30,7 @@ _HARDEST: Final = 1e4
 _DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
 
 
-def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
+def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
@@ -43,14 +43,17 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0) -> CrossField:
     of `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings,
     where strokes contradict each other and a hard hold makes singularities between them, and a hard one on
     clean curves that cross.
+    tolerance: relative residual that is left in the polynomials, found without a factorisation, in a third of
+    the time; None: none.
     """
-    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*_polynomials(instance, hold)))
+    found = _polynomials(instance, hold, tolerance)
+    u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
     alpha, beta = label_of(u, v)
     start = relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])
     return start.with_best_jumps()
 
 
-def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
+def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tuple[_Complex, _Complex]:
     """The coefficients X0, X1 (n,) of each pixel."""
     size, strokes = instance.grid.size, instance.stroke_terms
     weight = np.minimum(hold * strokes.weight, _HARDEST)
@@ -61,7 +64,9 @@ def _polynomials(instance: Instance, hold: float) -> tuple[_Complex, _Complex]:
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
     once = sums(weight * root)
-    x = factored(_beside(alike, once, instance.w_beta))(np.concatenate([-sums(weight * root**2), -once]))
+    matrix = _beside(alike, once, instance.w_beta)
+    right = np.concatenate([-sums(weight * root**2), -once])
+    x = factored(matrix)(right) if tolerance is None else locally(matrix, right, tolerance)
     return x[:size], x[size:]
 
 

@@ -24,8 +24,30 @@ def test_on_a_large_grid_the_first_field_is_at_most_the_improved_greedy_one(name
     assert first_field(instance).energy().total <= improved(greedy(instance)).energy().total + 1e-9
 
 
+def test_many_hasty_fields_made_one_are_well_below_the_improved_greedy_one():
+    instance = cf.sample("mouse", 56)
+    assert starts._SMALL < instance.grid.size < 4 * starts._SMALL
+    assert first_field(instance).energy().total < 0.9 * improved(greedy(instance)).energy().total
+
+
+def test_the_larger_the_grid_the_fewer_strategies_are_tried(monkeypatch):
+    tried = []
+    one = starts._STRATEGIES[0]
+
+    def counted(instance, over):
+        tried.append(instance.grid.size)
+        return one(instance, over)
+
+    monkeypatch.setattr(starts, "_STRATEGIES", (counted,) * 10)
+    monkeypatch.setattr(starts, "_SMALL", 40)
+    monkeypatch.setattr(starts, "_EFFORT", 900)
+    first_field(cf.sample("mouse", 24))
+    assert [tried.count(size) for size in sorted(set(tried))] == [10, 10, 3]
+    assert max(tried) == cf.sample("mouse", 24).grid.size == 298
+
+
 def test_first_fields_of_large_grids_are_the_same_each_time(monkeypatch):
-    monkeypatch.setattr(starts, "_COARSE", 150)
+    monkeypatch.setattr(starts, "_SMALL", 150)
     instance = cf.sample("mouse", 24)
     first, again = first_field(instance), first_field(instance)
     for name in ("alpha", "beta", "p"):
@@ -42,7 +64,7 @@ def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
 
 @pytest.mark.slow
 def test_ragged_grids_grow_from_coarse_ones_to_valid_fields(monkeypatch):
-    monkeypatch.setattr(starts, "_COARSE", 40)
+    monkeypatch.setattr(starts, "_SMALL", 40)
     for seed in range(12):
         instance = random_instance(seed, (9, 14), strokes=14, gauge=("strokes", "box")[seed % 2])
         if seed % 3 == 0:

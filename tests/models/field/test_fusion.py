@@ -1,0 +1,65 @@
+"""Two fields made one: never above the first, the better half of each, the best of all choices."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from crossfield.models.field.field import CrossField
+from crossfield.models.field.fusion import fused
+from crossfield.models.field.jumps import free_jumps
+from crossfield.models.instance.instance import HALF
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.greedy import greedy
+from crossfield.models.sketch.samples import sample
+from crossfield.models.smooth.polyvector import polyvector_field
+from exhaustive import random_instance, sketch
+
+pytestmark = pytest.mark.numeric
+
+
+def mixed(one, other, taken):
+    alpha, beta = np.where(taken, other.alpha, one.alpha), np.where(taken, other.beta, one.beta)
+    return CrossField(one.instance, alpha, beta, free_jumps(one.instance.grid, alpha, beta)[0])
+
+
+def test_it_takes_the_better_half_of_each():
+    theta = np.full((8, 14), np.nan)
+    theta[2:6, [1, 12]] = 0.3
+    good = greedy(sketch(np.ones(theta.shape, bool), theta))
+    bumps = [np.hypot(good.instance.grid.rows - 4, good.instance.grid.columns - at) < 3 for at in (2, 11)]
+    left, right = (CrossField(good.instance, good.alpha + 0.5 * bump, good.beta, good.p) for bump in bumps)
+    for one, other in ((left, right), (right, left)):
+        assert one.energy().total > 1
+        assert fused(one, other).energy().total == pytest.approx(good.energy().total, abs=1e-9)
+
+
+def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
+    rng = np.random.default_rng(3)
+    for seed in range(12):
+        one = greedy(random_instance(seed, (3, 4), strokes=5))
+        alpha = one.alpha + np.where(rng.random(12) < 0.6, rng.normal(0, 0.3, 12), 0)
+        other = CrossField(one.instance, alpha, one.beta, one.p)
+        least = min(mixed(one, other, choice).energy().total for choice in product([False, True], repeat=12))
+        found = fused(one, other).energy().total
+        assert found <= one.energy().total
+        assert found == pytest.approx(least, rel=1e-5)
+
+
+def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time():
+    lower = 0
+    for name in ("mouse", "saddle", "cylinder_bend"):
+        instance = sample(name, 40)
+        one, other = greedy(instance), fitted(polyvector_field(instance, hold=0.1))
+        found, again = fused(one, other), fused(one, other)
+        assert found.energy().total <= one.energy().total
+        assert found.p.tobytes() == again.p.tobytes()
+        assert found.alpha.tobytes() == again.alpha.tobytes()
+        lower += found.energy().total < min(one.energy().total, other.energy().total) - 1e-3
+    assert lower
+
+
+def test_fields_that_are_one_stay_as_they_are():
+    field = greedy(random_instance(1))
+    turned = CrossField(field.instance, field.alpha + HALF, -field.beta, field.p)
+    assert fused(field, field) is field
+    assert fused(field, turned) is field
