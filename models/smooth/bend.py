@@ -24,15 +24,19 @@ from .systems import factored
 _Places = NDArray[np.intp]
 
 HARMONIC: Final = 0.05
-"""Weight of plain smoothness beside bend: 0.01 follows clean strokes best, 0.1 evens out rough ones."""
+"""Weight of plain smoothness beside bend for strokes that tremble by `TREMBLE`."""
+TREMBLE: Final = np.radians(1.2)
+"""About what 3 degrees of noise on each stroke pixel leave between strokes and lines at 48 pixels."""
 HOLD: Final = 0.25
 """Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
 
+_HARMONICS: Final = (0.01, 0.1)  # the first follows clean strokes best, the second evens out rough ones
+_SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
 _FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
 
 
-def bend_field(start: CrossField, *, harmonic: float = HARMONIC, hold: float = HOLD) -> CrossField:
+def bend_field(start: CrossField, *, harmonic: float | None = None, hold: float = HOLD) -> CrossField:
     """The crosses of little bend that the lines of `start` lead to, as a field with the best jumps.
 
     With line angles u, v in radians the energy is the sum of (v . grad u)^2 + (u . grad v)^2 over pixels, of
@@ -47,8 +51,27 @@ def bend_field(start: CrossField, *, harmonic: float = HARMONIC, hold: float = H
     rises is left out.
     Labels are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic.
 
-    harmonic: weight of plain smoothness, above 0. hold: factor of the stroke weights, above 0.
+    harmonic: weight of plain smoothness, above 0; None: as the strokes tremble in the field of `HARMONIC`,
+    that weight times (tremble / TREMBLE)^2, from 0.01 to 0.1. hold: factor of the stroke weights, above 0.
     """
+    if harmonic is not None:
+        return _bent(start, harmonic, hold)
+    rough = tremble(_bent(start, HARMONIC, hold)) / TREMBLE
+    return _bent(start, float(np.clip(HARMONIC * rough**2, *_HARMONICS)), hold)
+
+
+def tremble(field: CrossField) -> float:
+    """How far single strokes are off the lines of a field, in radians; 0 where there is none.
+
+    The standard deviation that a normal error of the same median has: a few strokes that contradict others
+    do not count.
+    """
+    deviation = field.stroke_deviation
+    return _SIGMA * float(np.median(deviation)) if len(deviation) else 0.0
+
+
+def _bent(start: CrossField, harmonic: float, hold: float) -> CrossField:
+    """As `bend_field`, for a given weight of plain smoothness."""
     bend = _Bend.of(start, harmonic, hold)
     x = np.concatenate(_lines(start))
     energy = bend.energy(x)
