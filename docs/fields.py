@@ -58,6 +58,7 @@ class Task:
     size: int
     seconds: float
     noise: float = 0.0
+    only: tuple[str, ...] = ()
 
     @property
     def instance(self) -> Instance:
@@ -87,7 +88,8 @@ def angles(task: Task, instance: Instance, tried: Iterable[str]) -> Rows:
 
 def methods(task: Task) -> Rows:
     """Hidden curves of a drawing, by method; those about energies at one size only."""
-    return angles(task, task.instance, (n for n in METHODS if n not in OF_ENERGIES or task.size == MIDDLE))
+    tried = (n for n in task.only or METHODS if n not in OF_ENERGIES or task.size == MIDDLE)
+    return angles(task, task.instance, tried)
 
 
 def weights(task: Task) -> Rows:
@@ -181,11 +183,18 @@ def tasks(part: str, folder: Path | None, seconds: float) -> list[Task]:
     return [Task(name, what, size, seconds) for size in SIZES for name, what in [*own, *others]]
 
 
-def measured(part: str, folder: Path | None, seconds: float, jobs: int) -> Rows:
-    """The rows of a part."""
+def measured(part: str, folder: Path | None, seconds: float, jobs: int, only: Iterable[str] = ()) -> Rows:
+    """The rows of a part; of `methods` only those of some methods, where these are named."""
+    given = [replace(task, only=tuple(only)) for task in tasks(part, folder, seconds)]
     with ProcessPoolExecutor(jobs) as processes:
-        found = processes.map(MEASURES[part], tasks(part, folder, seconds))
-        return [row for rows in found for row in rows]
+        return [row for rows in processes.map(MEASURES[part], given) for row in rows]
+
+
+def renewed(rows: Rows, found: Rows) -> Rows:
+    """The rows, those that were found again in their places. Raises KeyError for one that is not there."""
+    places = {(row["drawing"], row["size"], row["method"]): k for k, row in enumerate(rows)}
+    anew = dict(enumerate(rows)) | {places[row["drawing"], row["size"], row["method"]]: row for row in found}
+    return list(anew.values())
 
 
 # The pages
@@ -310,14 +319,19 @@ def main() -> None:
     parser.add_argument(
         "--measure", nargs="+", choices=MEASURES, default=[], help="parts to be measured anew"
     )
+    parser.add_argument(
+        "--methods", nargs="+", choices=METHODS, default=[], help="of the part `methods` only these, anew"
+    )
     parser.add_argument("--sketches", type=Path, help="folder of line drawings by others")
     parser.add_argument("--seconds", type=float, default=5.0, help="for each field that is searched")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     given = parser.parse_args()
     kept = json.loads(KEPT.read_text()) if KEPT.exists() else {"seconds": given.seconds, "rows": {}}
     for part in given.measure:
-        kept["rows"][part] = measured(part, given.sketches, given.seconds, given.jobs)
-        if part == "methods":
+        only = given.methods if part == "methods" else ()
+        found = measured(part, given.sketches, given.seconds, given.jobs, only)
+        kept["rows"][part] = renewed(kept["rows"][part], found) if only else found
+        if part == "methods" and not only:
             kept["seconds"] = given.seconds
         KEPT.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
     write_pages(kept)
