@@ -8,7 +8,8 @@ A program's module is imported in a child process only (worker.py). It has
     evaluate(path, points) -> Evaluation             the behaviour of a file of another format
     solve(path, seconds, solver) -> RawSolution      its answer, where it solves
 
-and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
+A solver for which the table has a file of starting points takes the path of one as a fourth argument, `start`.
+A module raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
 """
 
 from __future__ import annotations
