@@ -28,9 +28,8 @@ from .solving import FAILED, energies, sizes
 MOST_CURVES: Final = 8
 """Curves of a drawing that are hidden in turn, the longest ones."""
 PERTURBED: Final = "perturbed"
-AMPLITUDES: Final = (0.3, 0.8)
-"""Radians: standard deviations of what is added to alpha of a perturbed field."""
-MILP: Final = "milp"
+SHARES: Final = (0.02, 0.1, 0.3)
+"""Of the pixels of a perturbed field that get another cross at random."""
 Found = tuple[CrossField, dict[str, Any]]
 
 
@@ -96,25 +95,21 @@ def _proven(run: Run, instance: Instance) -> Found:
 
 
 def _by_method(run: Run, instance: Instance) -> Found:
-    """The last field of a method of the table; of `milp` that of HiGHS, before its angles are fitted."""
-    name = "two-stage" if run.way == MILP else run.way
+    """The last field of a method of the table."""
     with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
         request = Request(instance, Path(folder), cf.Limits(run.limit, threads=1))
-        candidates = METHODS[name].find(request)
-        found = next(iter(candidates)) if run.way == MILP else list(candidates)[-1]
+        *_, found = METHODS[run.way].find(request)
     if found.proof is not None:
         return found.field, {"status": found.proof.status, "bound": found.proof.bound}
-    if run.way == MILP and found.solution is not None:
-        status = str(found.solution.status)
-        return found.field, {"bound": found.solution.bound, "note": status}
     return found.field, {}
 
 
-def perturbed(instance: Instance, amplitude: float, seed: int) -> CrossField:
-    """A local optimum near the greedy field: its alpha disturbed, the best jumps, then the best angles."""
-    field = cf.greedy(instance)
-    step = amplitude * np.random.default_rng([3, seed]).standard_normal(instance.grid.size)
-    moved = relabelled(instance, field.alpha + step, field.beta, field.p)
+def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
+    """A local optimum near the greedy field: random crosses at some pixels, best jumps, then best angles."""
+    field, rng = cf.greedy(instance), np.random.default_rng([3, seed])
+    chosen = rng.random(instance.grid.size) < share
+    alpha = np.where(chosen, rng.uniform(0, np.pi, instance.grid.size), field.alpha)
+    moved = relabelled(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
     return fitted(moved.with_best_jumps())
 
 

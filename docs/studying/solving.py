@@ -24,6 +24,8 @@ from crossfield.models.search.box_qp import fitted
 from .instances import made
 from .rows import Run
 
+GAP: Final = 1e-6
+"""Relative gap up to which an optimum counts as proven, asked of all solvers."""
 TOO_LARGE: Final = "too large"
 FAILED: Final = "failed"
 JUMPS_GIVEN: Final = "qp-fixed"
@@ -96,7 +98,7 @@ def solved(run: Run) -> dict[str, Any]:
         "rows": problem.row_count,
     }
     try:
-        found = programs().solve(problem, run.solver, run.limit, start)
+        found = programs().solve(problem, run.solver, run.limit, gap=GAP, start=start)
     except UnsupportedBySolverError as error:
         return facts | {"status": TOO_LARGE, "note": str(error)}
     except (SolverError, SolutionError) as error:

@@ -70,11 +70,17 @@ class Programs:
         return str(answer["words"])
 
     def solve(
-        self, problem: Problem, solver: str, seconds: float, start: CrossField | None = None
+        self,
+        problem: Problem,
+        solver: str,
+        seconds: float,
+        *,
+        gap: float = 0.0,
+        start: CrossField | None = None,
     ) -> Solution:
         """What a solver finds within the time, its point read by name; a bound where it tells one.
 
-        start: a field whose complete point it starts from, in the file itself (.nl, GAMS) or beside it; CBC
+        gap: the relative one that is enough; GAMS has 1e-6. start: a field whose complete point it starts from, in the file itself (.nl, GAMS) or beside it; CBC
         and GLPK do without. `seconds` of the answer: reading the file and solving, the start of the process
         left out. Raises UnsupportedBySolverError for a problem that it does not take or that is too large for
         its free edition, SolverError for a run that failed.
@@ -90,7 +96,7 @@ class Programs:
         held = write(problem, path, start=start).problem
         task = {"step": "solve", "path": str(path), "result": str(result), "solver": solver}
         task |= self._beside(problem, solver, start, folder)
-        answer = self._worker(program.name).ask(task | {"seconds": seconds}, seconds)
+        answer = self._worker(program.name).ask(task | {"seconds": seconds, "gap": gap}, seconds)
         if answer["kind"] == "too large":
             raise UnsupportedBySolverError(
                 f"{entry.title}: {held.columns} columns and {held.row_count} rows are too many for its free "

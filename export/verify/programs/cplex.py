@@ -81,7 +81,9 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
     return listed(linear, indices=2), listed(cubes, indices=3, products=2)
 
 
-def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     if start is not None:
@@ -90,7 +92,7 @@ def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -
     tolerances.timelimit.set(seconds)
     tolerances.threads.set(1)
     for parameter, value in (
-        (tolerances.mip.tolerances.mipgap, 0.0),
+        (tolerances.mip.tolerances.mipgap, gap),
         (tolerances.mip.tolerances.absmipgap, 1e-9),
         (tolerances.mip.tolerances.integrality, 0.0),
         (tolerances.simplex.tolerances.feasibility, 1e-9),

@@ -85,13 +85,15 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     with _loaded(path) as model:
         if start is not None:
             model.read(str(start))
         for option, value in (
-            ("TimeLimit", seconds), ("MIPGap", 0.0), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
+            ("TimeLimit", seconds), ("MIPGap", gap), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
             ("OptimalityTol", 1e-9), ("IntFeasTol", 1e-9), ("BarConvTol", 1e-12), ("Threads", 1),
         ):  # fmt: skip
             model.setParam(option, value)

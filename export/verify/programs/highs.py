@@ -58,12 +58,14 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     highs = _load(path)
     if start is not None:
         highs.readSolution(str(start), 0)
-    driver.set_options(highs, time_limit=seconds, mip_rel_gap=0.0, mip_abs_gap=1e-9, threads=1)
+    driver.set_options(highs, time_limit=seconds, mip_rel_gap=gap, mip_abs_gap=1e-9, threads=1)
     if not highs.getModel().hessian_.dim_:  # its QP method ends in an error with such tolerances
         driver.set_options(highs, mip_feasibility_tolerance=1e-9, primal_feasibility_tolerance=1e-9)
     try:

@@ -177,12 +177,14 @@ _STATUS: Final = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     scip = _load(path)
     for option, value in (
         ("limits/time", seconds),
-        ("limits/gap", 0.0),
+        ("limits/gap", gap),
         ("limits/absgap", 1e-9),
         ("numerics/feastol", 1e-9),
         ("numerics/dualfeastol", 1e-9),

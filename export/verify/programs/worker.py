@@ -140,7 +140,7 @@ def _result(module: Any, task: dict[str, Any]) -> Any:
     if task["step"] == "evaluate":
         return module.evaluate(path, load(Points, Path(task["points"])))
     start = {"start": Path(task["start"])} if task.get("start") else {}
-    return module.solve(path, task["seconds"], task["solver"], **start)
+    return module.solve(path, task["seconds"], task["solver"], task.get("gap", 0.0), **start)
 
 
 def main(arguments: list[str]) -> int:

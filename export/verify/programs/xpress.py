@@ -89,13 +89,15 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str, start: Path | None = None) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
     if start is not None:
         model.readSlxSol(str(start))
     for option, value in (
-        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("timelimit", seconds), ("miprelstop", gap), ("mipabsstop", 1e-9), ("feastol", 1e-9),
         ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
