@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
@@ -123,17 +123,16 @@ def shifted_mean(seconds: Iterable[float], shift: float = 1.0) -> float:
     return float(np.exp(np.log(values + shift).mean()) - shift)
 
 
-def profile(
-    rows: list[Row], key: Callable[[Row], Any], case: Callable[[Row], Any]
-) -> dict[Any, np.ndarray[Any, Any]]:
-    """Performance ratios of Dolan and More, sorted: of each key one for every case that all have run.
+Times = dict[str, dict[tuple[Any, ...], float]]
+"""Seconds of proofs by name of a line, and case."""
+
+
+def ratios(times: Times) -> dict[str, np.ndarray[Any, Any]]:
+    """Performance ratios of Dolan and More, sorted: of each line one for every case that all lines have.
 
     The ratio is the time of a proof over that of the quickest; infinite where nothing is proven. Cases that
     nobody proves count too.
     """
-    times: dict[Any, dict[Any, float]] = defaultdict(dict)
-    for row in rows:
-        times[key(row)][case(row)] = spent(row)
     common = sorted(set.intersection(*(set(each) for each in times.values()))) if times else []
     best = {each: min(of[each] for of in times.values()) for each in common}
     return {

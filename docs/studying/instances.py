@@ -1,10 +1,10 @@
 """The instances of the study: anyone can make the same, from the samples and from seeds.
 
-    whole NAME    the sample, its longer side as many pixels as the rung
-    crop NAME     the square of the rung's size with most stroke pixels in the sample of twice that size, 24
-                  at least; turned by a quarter for every second sample
-    lines SEED    a full square with straight strokes at random
-    noise SEED    a full square, half of its pixels with a stroke in a random direction
+whole NAME    the sample, its longer side as many pixels as the rung
+crop NAME     the square of the rung's size with most stroke pixels in the sample of twice that size, 24
+at least; turned by a quarter for every second sample
+lines SEED    a full square with straight strokes at random
+noise SEED    a full square, half of its pixels with a stroke in a random direction
 """
 
 from __future__ import annotations

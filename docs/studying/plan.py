@@ -134,8 +134,8 @@ def qualities(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
         for share in SHARES if "hidden" in given else ():
             for seed in SEEDS:
                 yield _default("quality", name, size, f"{PERTURBED} {share}", **given, seed=seed)
-        for limit in SEARCHES:
-            yield _default("quality", name, size, "search", **given, limit=min(limit, plan.quality_limit))
+        for limit in dict.fromkeys(min(each, plan.quality_limit) for each in SEARCHES):
+            yield _default("quality", name, size, "search", **given, limit=limit)
         for norm in (2, 1):
             yield _default("quality", name, size, PROOF, **given, norm=norm, limit=plan.quality_limit)
 

@@ -79,7 +79,9 @@ def posed(run: Run) -> Problem:
     options = {} if run.facet == "hull" else {"facet": run.facet}
     jumps = greedy(run.instance, run.size).p if run.way == JUMPS_GIVEN else None
     found = formulate(instance, run.way, p=jumps, **options)
-    return tightened(found, windows(run.instance, run.size, PROOF_SECONDS)) if run.windows == "proof" else found
+    return (
+        tightened(found, windows(run.instance, run.size, PROOF_SECONDS)) if run.windows == "proof" else found
+    )
 
 
 PROOF_SECONDS: Final = 20.0

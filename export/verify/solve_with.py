@@ -80,10 +80,11 @@ class Programs:
     ) -> Solution:
         """What a solver finds within the time, its point read by name; a bound where it tells one.
 
-        gap: the relative one that is enough; GAMS has 1e-6. start: a field whose complete point it starts from, in the file itself (.nl, GAMS) or beside it; CBC
-        and GLPK do without. `seconds` of the answer: reading the file and solving, the start of the process
-        left out. Raises UnsupportedBySolverError for a problem that it does not take or that is too large for
-        its free edition, SolverError for a run that failed.
+        gap: the relative one that is enough; GAMS has 1e-6. start: a field whose complete point it starts
+        from, in the file itself (.nl, GAMS) or beside it; CBC and GLPK do without. `seconds` of the answer:
+        reading the file and solving, the start of the process left out. Raises UnsupportedBySolverError for a
+        problem that it does not take or that is too large for its free edition, SolverError for a run that
+        failed.
         """
         entry, name = SOLVERS[solver], format_for(problem, solver)
         program = PROGRAMS[entry.program]

@@ -9,7 +9,8 @@ A program's module is imported in a child process only (worker.py). It has
     solve(path, seconds, solver, gap) -> RawSolution its answer, where it solves
 
 The gap is the relative one that is enough. A solver for which the table has a file of starting points takes
-the path of one as a fifth argument, `start`. A module raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
+the path of one as a fifth argument, `start`. A module raises Refused, NotTold or TooLarge. Files come
+unpacked; the current folder is its own.
 """
 
 from __future__ import annotations
