@@ -6,7 +6,8 @@
 
 Without options it does all runs that have no row yet in docs/studying/data, then makes the page. Killed and
 given again it goes on where it was. --quick is the same in two minutes, small, into another folder. --plan
-counts the runs and their seconds. With --scheduler, dask workers do the runs (docs on their PYTHONPATH).
+counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers have
+the folder docs on their PYTHONPATH.
 
 The plan (studying/plan.py), every run on one thread:
 

@@ -10,7 +10,7 @@ noise SEED    a full square, half of its pixels with a stroke in a random direct
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -26,14 +26,15 @@ FEWEST: Final = 3  # stroke pixels of a whole sample on a rung
 SMALLEST: Final = 24  # size of the sample of a crop
 
 
-def rung(size: int) -> list[str]:
-    """The names of the instances of a size, 30 or less: some samples leave too little of themselves."""
+@cache
+def rung(size: int) -> tuple[str, ...]:
+    """The names of the 30 instances of a size; lines stand for samples of which too little is left."""
     names = [f"whole {name}" for name in SAMPLES if _is_there(name, size)]
     names += [f"crop {name}" for name in SAMPLES]
     missing = len(SAMPLES) - sum(name.startswith("whole") for name in names)
     for seed in range(RANDOM):
         names += [f"lines {seed}", f"noise {seed}"]
-    return names + [f"lines {RANDOM + seed}" for seed in range(missing)]
+    return (*names, *(f"lines {RANDOM + seed}" for seed in range(missing)))
 
 
 def _is_there(name: str, size: int) -> bool:

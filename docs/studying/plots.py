@@ -107,13 +107,13 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
                 axis.scatter(np.maximum(x, _ZERO), y, s=14, alpha=0.55, linewidths=0, label=name, **look)
             x, y = (np.concatenate([np.array(each[i]) for each in kinds.values()] or [[]]) for i in (0, 1))
             centre, middle = medians(np.maximum(x, _ZERO), y)
-            axis.plot(centre, middle, color="#000000", linewidth=2.2, label="median")
+            axis.plot(centre, middle, color="#000000", linewidth=2.2, label="median of bins")
             axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %", ylim=(0, None))
             axis.set_xlim(_ZERO / 1.5, max(1.5 * x.max(initial=0.0), 100))
             axis.set_xticks([_ZERO, 0.1, 1, 10, 100], ["0", "0.1", "1", "10", "100"])
             axis.minorticks_off()
         axes[0].set_ylabel("error, degrees")
-        axes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 _ZERO: Final = 0.01
@@ -140,7 +140,7 @@ def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
             axis.set(xscale="log", xlabel=title, ylim=(0, None))
             axis.xaxis.set_major_formatter("{x:g}")
         axes[0].set_ylabel("error, degrees")
-        axes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float, float]]]) -> None:

@@ -136,7 +136,7 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
     (error, best), *others = nearest(found, quick)
     text = (
         f"While drawing, take `{best}`: of the ways that take {QUICK:g} s or less at {max(found)} pixels it "
-        f"comes nearest to hidden curves, {error:.1f} degrees on average over {_sizes(found)} pixels"
+        f"comes nearest to hidden curves, {error:.1f} degrees on average at {_sizes(found)} pixels"
     )
     text += f" ({others[0][0]:.1f} for `{others[0][1]}`)" if others else ""
     slower = [way for way in found[max(found)] if way not in quick]
@@ -191,7 +191,9 @@ def _for_solvers(found: Fares, kept: Kept) -> str:
     without = [s for s, fare in milp.items() if fare.failed]
     two = "the paper's two stages "
     two += f"give no field in time of some drawings at {_sizes(without)} pixels, and " if without else ""
-    two += f"are above the least energy at {_sizes(worse)} pixels" if worse else "reach the least energy"
+    two += f"are above the least energy at {_sizes(worse)} pixels" if worse else (
+        f"reach the least energy at {_sizes(milp)} pixels"
+    )  # fmt: skip
     return f"{text}; {two}." if milp else f"{text}."
 
 

@@ -171,6 +171,8 @@ def draw(kept: Kept, pictures: Path) -> None:
 def section(kept: Kept) -> list[str]:
     """The part of the page."""
     rows = kept["quality"]
+    if not rows:
+        return [QUALITY_TEXT["head"], "Not measured yet."]
     return [
         QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"],
         ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), QUALITY_TEXT["weights"],

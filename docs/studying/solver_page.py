@@ -145,7 +145,9 @@ def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> st
 def open_table(rows: list[Row], known: facts.Optima) -> str:
     """What pairs leave where they prove nothing: gap, and how far the best point is above the optimum."""
     cells = []
-    for (way, solver), group in facts.grouped(rows, "way", "solver").items():
+    for (way, solver), group in sorted(
+        facts.grouped(rows, "way", "solver").items(), key=lambda each: _place(each[0])
+    ):
         for size in sorted({row["size"] for row in group}):
             left = [row for row in group if row["size"] == size and not facts.is_proven(row)]
             left = [row for row in left if row["status"] not in {TOO_LARGE, FAILED}]
@@ -190,7 +192,7 @@ def variants_table(rows: list[Row], known: facts.Optima) -> str:
         "formulation", "solver", "variant", "instances", "proven: cold / variant", "s: cold / variant",
         "above the optimum: cold / variant",
     )  # fmt: skip
-    return markdown(heads, sorted(cells, key=lambda line: line[2]))
+    return markdown(heads, sorted(cells, key=lambda line: line[2])) if cells else "Not measured yet."
 
 
 def variant(kind: list[str]) -> str:

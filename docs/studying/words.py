@@ -72,8 +72,9 @@ PRACTICE_TEXT: Final = {
 
 Every way to a field on every drawing, whole and without one of its three longest curves, on grids of 24 to
 256 pixels; one thread, default weights. `power` and `polyvector` with the best angles for their jumps.
-`two-stage` is section 5 of the paper: HiGHS on the MILP, from the greedy field, then Ipopt on the convex QP.
-Hidden curves: mean over drawings and standard error. The least energy is that of any way here.""",
+`two-stage` is section 5 of the paper: HiGHS on the MILP, then Ipopt on the convex QP. It, `patches` and
+`search` begin with the improved greedy field, so that their answer is no worse. Hidden curves: mean over
+drawings and standard error. The least energy is that of any way here.""",
     "plot": """![Error to hidden curves beside seconds, by size](pictures/study_practice.svg)
 
 Up to the left is slow and bad, down to the left quick and good. Bars: standard error over drawings.""",
@@ -89,9 +90,11 @@ THREATS: Final = """## What may be wrong with this
 - **Free editions.** {free} They say nothing of what the full programs do with larger files.
 - **Short limits.** A few seconds for each run; a proof that takes a minute is not seen here.
   [Proven optima](proofs.md) has runs of a minute.
+- **One run of each.** How long a solver takes varies with its seed; each run is done once, with the default.
 - **Tolerances** are tighter than the defaults of most solvers, which costs them time; all have the same.
 - **Formats.** A solver gets one format for a formulation; another may suit it better.
 - **One machine.** {machine}
-- **Our own prover** is measured by those who wrote it. Its bounds come with
-  [certificates](proofs.md) that a program of one file checks; other solvers' optima agree with it, as above.
+- **`prove`** belongs to this project, and is what the others are judged by. Its bounds come with
+  [certificates](proofs.md) that a program of one file checks, and claims of other solvers are held against it
+  above.
 """

@@ -55,8 +55,9 @@ def carry_out(
 ) -> None:
     """Do all runs of a plan that have no row yet; each row is on the disk before another run begins.
 
-    jobs: processes, of one thread each; scheduler: address of a dask scheduler instead, whose workers have
-    the folder docs on their PYTHONPATH. folder: of drawings by others. parts: only these, all by default.
+    jobs: processes, of one thread each; scheduler: address of a dask scheduler instead; it and its workers
+    have the folder docs on their PYTHONPATH. folder: of drawings by others. parts: only these, by default
+    all.
     """
     wanted = frozenset(parts)
     data.mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,7 @@ def study():
     """The modules of the study."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(DOCS)
-        names = ("facts", "page", "plan", "rows", "solver_page", "work")
+        names = ("facts", "page", "plan", "practice_page", "rows", "solver_page", "work")
         yield SimpleNamespace(**{name: import_module(f"studying.{name}") for name in names})
 
 
@@ -135,6 +135,29 @@ def test_answers_that_cannot_be_are_told(study):
         rows.append(row)
     found = study.facts.contradictions(rows, known)
     assert [rows.index(row) for row, _ in found] == [1, 2, 3]
+
+
+def practice_rows(study, errors):
+    for number, (way, (error, energy, seconds, limit)) in enumerate(errors.items()):
+        for drawing in ("mouse", "ring", "saddle"):
+            row = dict.fromkeys(study.rows.COLUMNS) | {"part": "practice", "instance": drawing, "way": way}
+            row |= {"size": 24.0, "hidden": 0.0, "status": "field", "energy_2": energy, "off": 1.0}
+            row |= {"error": error + 0.01 * number, "seconds": seconds, "limit": limit}
+            yield row
+
+
+def test_the_recommendation_follows_the_rows(study):
+    slow = {"search": (5.0, 1.0, 10.0, 10.0), "two-stage": (6.0, 2.0, 10.0, 10.0)}
+    said = []
+    for bend, greedy in ((3.0, 4.0), (4.0, 3.0)):
+        ways = {"bend": (bend, 1.5, 0.1, 0.0), "greedy": (greedy, 1.2, 0.1, 0.0)} | slow
+        kept = {"practice": list(practice_rows(study, ways)), "solvers": [], "proofs": []}
+        said.append(study.practice_page.recommendation(kept))
+    assert [sentences[0].split("`")[1] for sentences in said] == ["bend", "greedy"]
+    assert {sentences[1] for sentences in said} == {"For the least energy take `search, 10 s` at 24 pixels."}
+    assert all(len(sentences) == 3 and "No solver proves half" in sentences[2] for sentences in said)
+    nothing = {"practice": [], "solvers": [], "proofs": []}
+    assert study.practice_page.recommendation(nothing) == ["The ways to a field are not measured yet."]
 
 
 def test_every_planned_run_is_another_one_and_the_instances_are_the_same_again(study):
