@@ -107,6 +107,16 @@ def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
     ]
 
 
+def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
+    """Each field with its gap, and its error less that of the field of least energy of its instance."""
+    least: dict[Any, Row] = {}
+    for row, _ in found:
+        case = case_of(row)
+        if case not in least or row["energy_2"] < least[case]["energy_2"]:
+            least[case] = row
+    return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in found]
+
+
 def correlation(found: list[tuple[Row, float]]) -> Summary | None:
     """Rank correlation of gap and error within a case: its mean over drawings, with standard error."""
     cases: dict[Any, list[tuple[float, float]]] = defaultdict(list)

@@ -104,15 +104,17 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
         for axis, (title, kinds) in zip(axes, panels.items(), strict=True):
             for name, (x, y) in kinds.items():
                 look = {"color": looks[name]["color"], "marker": looks[name]["marker"]}
-                axis.scatter(np.maximum(x, _ZERO), y, s=14, alpha=0.55, linewidths=0, label=name, **look)
+                axis.scatter(np.maximum(x, _ZERO), y, s=16, alpha=0.6, linewidths=0, label=name, **look)
             x, y = (np.concatenate([np.array(each[i]) for each in kinds.values()] or [[]]) for i in (0, 1))
             centre, middle = medians(np.maximum(x, _ZERO), y)
             axis.plot(centre, middle, color="#000000", linewidth=2.2, label="median of bins")
-            axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %", ylim=(0, None))
+            axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %")
+            axis.axhline(0, color="#888888", linewidth=0.8)
             axis.set_xlim(_ZERO / 1.5, max(1.5 * x.max(initial=0.0), 100))
-            axis.set_xticks([_ZERO, 0.1, 1, 10, 100], ["0", "0.1", "1", "10", "100"])
+            ticks = [tick for tick in (0.1, 1, 10, 100, 1000, 10000) if tick <= axis.get_xlim()[1]]
+            axis.set_xticks([_ZERO, *ticks], ["0", *(f"{tick:g}" for tick in ticks)])
             axis.minorticks_off()
-        axes[0].set_ylabel("error, degrees")
+        axes[0].set_ylabel("error less that of the optimum, degrees")
         axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 

@@ -29,6 +29,8 @@ def made_by(way: str, *, norm: int = 2, strokes: float = STROKE_WEIGHT, skew: fl
 
 
 _LONGER: Final = 2.0
+NEAR: Final = 0.2
+"""Gap up to which a field is near the optimum."""
 
 CHANGES: Final[dict[str, tuple[str, Kind, Kind]]] = {
     "improve": ("greedy, then improved", made_by("greedy"), made_by("improved")),
@@ -117,9 +119,11 @@ def correlation_text(rows: list[Row]) -> str:
     """How energy and error go together within an instance."""
     parts = []
     for surfaces, words in ((False, "drawings"), (True, "surfaces")):
-        found = errors.correlation([each for each in errors.gaps(rows) if is_surface(each[0]) == surfaces])
-        if found is not None and found.error is not None:
-            parts.append(f"{found.mean:+.2f} +- {found.error:.2f} over {found.count} {words}")
+        for most, which in ((np.inf, "all fields"), (NEAR, f"those within {percent(NEAR)} of the optimum")):
+            mine = [(r, gap) for r, gap in errors.gaps(rows) if is_surface(r) == surfaces and gap <= most]
+            found = errors.correlation(mine)
+            if found is not None and found.error is not None:
+                parts.append(f"{found.mean:+.2f} +- {found.error:.2f} over {found.count} {words}, {which}")
     return (
         "Rank correlation of energy and error between the fields of one instance, 1 where less energy always "
         f"means less error: {'; '.join(parts)}."
@@ -153,13 +157,13 @@ def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
 
 def draw(kept: Kept, pictures: Path) -> None:
     """The plots of this part."""
-    found = errors.gaps(kept["quality"])
+    found = errors.differences(errors.gaps(kept["quality"]))
     panels: dict[str, dict[str, plots.Line]] = {}
     for surfaces, title in ((False, "hidden curves of drawings"), (True, "surfaces with a known answer")):
         panels[title] = {}
-        for kind in dict.fromkeys(kind_of(row) for row, _ in found):
-            mine = [(r, g) for r, g in found if kind_of(r) == kind and is_surface(r) == surfaces]
-            panels[title][kind] = ([100 * g for _, g in mine], [r["error"] for r, _ in mine])
+        for kind in dict.fromkeys(kind_of(each[0]) for each in found):
+            mine = [each for each in found if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
+            panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
     plots.error_by_gap(pictures / "study_quality.svg", panels)
     lines = {name: weight_lines(kept["quality"], name) for name in ("w_strokes", "w_beta")}
     titles = {"w_strokes": "weight of the strokes", "w_beta": "weight of the skew"}

@@ -142,6 +142,31 @@ def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> st
     return markdown(("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells)
 
 
+def kinds_table(rows: list[Row]) -> str:
+    """Of each kind of instance and problem how many are proven by any solver, by size."""
+    sizes = sorted({int(row["size"]) for row in rows})
+    cells = []
+    for problem in facts.PROBLEMS:
+        for kind in KINDS:
+            mine = [r for r in rows if facts.problem_of(r) == problem and r["instance"].startswith(kind)]
+            line = []
+            for size in sizes:
+                have = {row["instance"] for row in mine if row["size"] == size}
+                done = {row["instance"] for row in mine if row["size"] == size and facts.is_proven(row)}
+                line.append(f"{len(done)} of {len(have)}" if have else "")
+            cells.append([problem, KINDS[kind], *line])
+    return markdown(("problem", "instances", *(f"{size} pixels" for size in sizes)), cells)
+
+
+KINDS: Final = {
+    "whole": "whole samples",
+    "crop": "squares of samples",
+    "lines": "straight strokes at random",
+    "noise": "random directions",
+}
+"""Kinds of instances by the first word of their names."""
+
+
 def open_table(rows: list[Row], known: facts.Optima) -> str:
     """What pairs leave where they prove nothing: gap, and how far the best point is above the optimum."""
     cells = []
@@ -210,7 +235,13 @@ def _over(rung: Rung, known: facts.Optima) -> str:
 
 def percent(share: float) -> str:
     """A share in percent: two digits, or whole percents of what is more than that."""
-    return f"{100 * share:,.0f} %" if abs(share) >= 0.1 else f"{100 * share:.2g} %"
+    if abs(share) < _NONE:
+        return "0 %"
+    return f"{100 * share:,.0f} %" if abs(share) >= _WHOLE else f"{100 * share:.2g} %"
+
+
+_NONE: Final = 5e-6  # what is less is rounding
+_WHOLE: Final = 0.1
 
 
 def _signed(row: Row, known: facts.Optima) -> float | None:
@@ -320,6 +351,8 @@ def section(kept: Kept) -> list[str]:
         proven_table(standing, kept["proofs"]),
         SOLVERS_TEXT["profiles"],
         SOLVERS_TEXT["growth"],
+        SOLVERS_TEXT["kinds"],
+        kinds_table(facts.measured(cold)),
         SOLVERS_TEXT["open"],
         open_table(facts.measured(cold), known),
         SOLVERS_TEXT["variants"],

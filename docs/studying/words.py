@@ -32,6 +32,9 @@ have, those that nobody proves included.""",
 
 Each formulation at the solver that proves most of it. Where a pair was not run on a rung, it counts as
 proving nothing there, and has no seconds.""",
+    "kinds": """### Are random instances like drawings?
+
+Instances that at least one solver proves, by problem and by where they come from.""",
     "open": """### What is left where nothing is proven
 
 Runs without a proof: how many have a point, how far its objective is above the optimum that `prove` knows
@@ -57,7 +60,8 @@ that `prove` finds in 10 s, in both norms. The weights are the default, 20 and 1
 named.""",
     "plot": """![Error beside the gap to the proven optimum](pictures/study_quality.svg)
 
-Each point is a field; the line is the median of bins. Gap: energy (2-norm) above the optimum.""",
+Each point is a field: its energy (2-norm) above the optimum, and its error less that of the field of least
+energy of the same instance. Below zero it is better than the optimum.""",
     "changes": """### What buys a better field
 
 The error after a change less the error before it, on the same instances: mean over drawings or surfaces, and
