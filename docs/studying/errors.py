@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -115,6 +116,26 @@ def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]
         if case not in least or row["energy_2"] < least[case]["energy_2"]:
             least[case] = row
     return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in found]
+
+
+def medians(x: Any, y: Any, bins: int = 8) -> tuple[list[float], list[float]]:
+    """The medians of x and y in bins of x, a first one of zeros and others logarithmic, of FEW points or more.
+
+    x: gaps, not negative.
+    """
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    if not len(x):
+        return [], []
+    ends = np.concatenate(
+        [[0.0, _NO_GAP], np.geomspace(5 * _NO_GAP, max(1.01 * x.max(), 10 * _NO_GAP), bins)]
+    )
+    parts = [(x >= a) & (x < b) for a, b in pairwise(ends)]
+    found = [(x[inside], y[inside]) for inside in parts if inside.sum() >= FEW]
+    return [float(np.median(a)) for a, _ in found], [float(np.median(b)) for _, b in found]
+
+
+FEW: Final = 5
+_NO_GAP: Final = 1e-4
 
 
 def correlation(found: list[tuple[Row, float]]) -> Summary | None:

@@ -84,6 +84,7 @@ def matters(kept: Kept) -> str:
         f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {middle} above the least "
         "in the median, to the best field that is found."
     )
+    text = " ".join(filter(None, (text, quality_page.harmless(kept["quality"]))))
     sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
     if sure:
         most = sorted(sure, key=lambda name: sure[name].mean)[:3]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import cycle, pairwise
+from itertools import cycle
 from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+
+from .errors import medians
 
 mpl.use("svg")
 
@@ -106,8 +108,14 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
                 look = {"color": looks[name]["color"], "marker": looks[name]["marker"]}
                 axis.scatter(np.maximum(x, _ZERO), y, s=16, alpha=0.6, linewidths=0, label=name, **look)
             x, y = (np.concatenate([np.array(each[i]) for each in kinds.values()] or [[]]) for i in (0, 1))
-            centre, middle = medians(np.maximum(x, _ZERO), y)
-            axis.plot(centre, middle, color="#000000", linewidth=2.2, label="median of bins")
+            centre, middle = medians(x / 100, y)
+            axis.plot(
+                np.maximum(100 * np.array(centre), _ZERO),
+                middle,
+                color="#000000",
+                linewidth=2.2,
+                label="median of bins",
+            )
             axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %")
             axis.axhline(0, color="#888888", linewidth=0.8)
             axis.set_xlim(_ZERO / 1.5, max(1.5 * x.max(initial=0.0), 100))
@@ -120,16 +128,6 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
 
 _ZERO: Final = 0.01
 """Percent: where what is less is drawn."""
-
-
-def medians(x: Any, y: Any, bins: int = 8) -> tuple[Any, Any]:
-    """The median of y in logarithmic bins of x that hold five points or more."""
-    if not len(x):
-        return [], []
-    ends = np.concatenate([[0.0, 1.01 * _ZERO], np.geomspace(0.05, max(x.max() * 1.01, 0.1), bins)])
-    parts = [(x >= a) & (x < b) for a, b in pairwise(ends)]
-    found = [(x[inside], y[inside]) for inside in parts if inside.sum() >= 5]
-    return [float(np.median(a)) for a, _ in found], [float(np.median(b)) for _, b in found]
 
 
 def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:

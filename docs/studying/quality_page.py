@@ -132,6 +132,28 @@ def correlation_text(rows: list[Row]) -> str:
     )
 
 
+def harmless(rows: list[Row]) -> str:
+    """From which gap on fields of drawings are worse than the optimum, in words."""
+    found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
+    gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
+    harmed = [place for place, each in enumerate(more) if each > HARM]
+    if not gap:
+        return ""
+    if not harmed:
+        return (
+            f"In no bin up to {percent(max(gap))} above the optimum are fields worse than it by more than "
+            f"{HARM:g} degrees in the median."
+        )
+    return (
+        f"Fields are worse than the optimum by more than {HARM:g} degrees, in the median of bins, from some "
+        f"{percent(gap[harmed[0]])} above its energy on, and not yet at {percent(gap[harmed[0] - 1])}."
+    )
+
+
+HARM: Final = 0.5
+"""Degrees by which a field is worse."""
+
+
 def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
     """Error by one of the weights: greedy and best field, drawings and surfaces, those with all weights."""
     other, usual = ("w_beta", SKEW_WEIGHT) if which == "w_strokes" else ("w_strokes", STROKE_WEIGHT)
@@ -178,6 +200,6 @@ def section(kept: Kept) -> list[str]:
     if not rows:
         return [QUALITY_TEXT["head"], "Not measured yet."]
     return [
-        QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"],
+        QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"], harmless(rows),
         ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), QUALITY_TEXT["weights"],
     ]  # fmt: skip

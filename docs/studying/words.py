@@ -94,6 +94,7 @@ THREATS: Final = """## What may be wrong with this
 - **Free editions.** {free} They say nothing of what the full programs do with larger files.
 - **Short limits.** A few seconds for each run; a proof that takes a minute is not seen here.
   [Proven optima](proofs.md) has runs of a minute.
+- **Proven optima only.** Gaps are known where `prove` closes an instance in 10 s: not the hardest ones.
 - **One run of each.** How long a solver takes varies with its seed; each run is done once, with the default.
 - **Tolerances** are tighter than the defaults of most solvers, which costs them time; all have the same.
 - **Formats.** A solver gets one format for a formulation; another may suit it better.
