@@ -119,7 +119,7 @@ def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]
 
 
 def medians(x: Any, y: Any, bins: int = 8) -> tuple[list[float], list[float]]:
-    """The medians of x and y in bins of x, a first one of zeros and others logarithmic, of FEW points or more.
+    """The medians of x and y in bins of x of FEW points or more: a first one of zeros, others logarithmic.
 
     x: gaps, not negative.
     """

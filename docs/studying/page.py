@@ -75,14 +75,14 @@ def matters(kept: Kept) -> str:
     if optimum is None:
         return "Not measured yet."
     before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
-    middle = percent(float(np.median(before or [0.0])))
+    mean = percent(float(np.mean(before or [0.0])))
     if not optimum.sure:
         verdict = "No: the error does not change beyond chance"
     else:
         verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error changes"
     text = (
-        f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {middle} above the least "
-        "in the median, to the best field that is found."
+        f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
+        "on average, to the best field that is found."
     )
     text = " ".join(filter(None, (text, quality_page.harmless(kept["quality"]))))
     sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}

@@ -144,9 +144,11 @@ def harmless(rows: list[Row]) -> str:
             f"In no bin up to {percent(max(gap))} above the optimum are fields worse than it by more than "
             f"{HARM:g} degrees in the median."
         )
+    first = harmed[0]
+    before = f", and not yet at {percent(gap[first - 1])}" if first else ""
     return (
         f"Fields are worse than the optimum by more than {HARM:g} degrees, in the median of bins, from some "
-        f"{percent(gap[harmed[0]])} above its energy on, and not yet at {percent(gap[harmed[0] - 1])}."
+        f"{percent(gap[first])} above its energy on{before}."
     )
 
 
