@@ -11,17 +11,25 @@ from make import said
 
 from . import errors, practice_page, quality_page, solver_page
 from .plan import Plan, stages
-from .rows import EVERY, NOT_RUN, Row, key_of, tables
+from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
+from .rows import read as read_rows
 from .solver_page import percent
-from .words import QUESTION, THREATS
+from .words import QUESTION, ROWS, THREATS
 
 Kept = dict[str, list[Row]]
 COMMAND: Final = "python docs/study.py --page"
 
 
+def counted(text: str) -> dict[str, int]:
+    """From how many rows of each part a page was made, by what it says at its end."""
+    said = text.rstrip().rpartition("from the first ")[2].rstrip(".")
+    return {part: int(count) for count, part in (each.split() for each in said.split(", "))}
+
+
 def read(data: Path) -> Kept:
-    """The rows of all parts."""
-    return {part: table.rows for part, table in tables(data).items()}
+    """The rows of all parts; a study may be adding others meanwhile."""
+    files = {part: data / f"{part}.csv" for part in PARTS}
+    return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
 
 
 def completeness(kept: Kept, plan: Plan) -> str:
@@ -111,7 +119,9 @@ def page(kept: Kept, plan: Plan) -> str:
     """The text of the page."""
     parts = ["# Of what practical use?", said(COMMAND), QUESTION, answers(kept), completeness(kept, plan)]
     parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
-    return "\n\n".join(part for part in [*parts, threats(kept)] if part).rstrip() + "\n"
+    counts = ", ".join(f"{len(rows)} {part}" for part, rows in kept.items())
+    parts += [threats(kept).rstrip(), f"{ROWS} This page is made from the first {counts}."]
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:

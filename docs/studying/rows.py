@@ -121,14 +121,13 @@ def _line(cells: tuple[str, ...] | list[str]) -> str:
 
 
 def read(path: Path) -> Iterator[Row]:
-    """The rows of a file, numbers as numbers."""
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.reader(file)
-        head = next(reader, [])
-        if tuple(head) != COLUMNS:
-            raise ValueError(f"{path.name} has other columns than this study; move it away")
-        for line in reader:
-            yield typed(dict(zip(COLUMNS, line, strict=True)))
+    """The rows of a file, numbers as numbers; a last line without an end is not looked at."""
+    whole = path.read_bytes().rpartition(b"\n")[0].decode()
+    head, *lines = csv.reader(io.StringIO(whole, newline="")) if whole else [COLUMNS]
+    if tuple(head) != COLUMNS:
+        raise ValueError(f"{path.name} has other columns than this study; move it away")
+    for line in lines:
+        yield typed(dict(zip(COLUMNS, line, strict=True)))
 
 
 def typed(given: dict[str, str]) -> Row:

@@ -103,3 +103,19 @@ THREATS: Final = """## What may be wrong with this
   [certificates](proofs.md) that a program of one file checks, and claims of other solvers are held against it
   above.
 """
+
+ROWS: Final = """## The rows
+
+`proofs.csv`, `solvers.csv`, `quality.csv` and `practice.csv` in `docs/studying/data`, a line for each run.
+What was asked: `part`, `instance`, `size`, `way` (formulation or method), `solver`, `start` (cold, greedy),
+`facet`, `windows` (gauge, proof), `norm`, `w_strokes`, `w_beta`, `hidden` (number of the curve, -1 for none),
+`noise` (degrees), `limit` (seconds), `seed`. What was found: `version`, `format`, `status` as the solver
+claims it (`unknown` where its point contradicts that, `not run` for a pair that proved too little before, and
+the instance is then `*`), `objective` recomputed from the declaration at the point, `bound`, `energy_2` and
+`energy_1` of the field, `violation`, `error` to the hidden curve or the true field and `off` from the strokes
+shown (degrees), `seconds`, `nodes`, numbers of `pixels`, `pairs`, `columns` and `rows`, `note`, `machine`,
+and the `load` average.
+
+`python docs/study.py` does the runs that have no row; killed, it goes on where it was. `--plan` counts them,
+`--scheduler ADDRESS` hands them to dask workers, `--quick --data FOLDER` is a small study of two minutes.
+Instances are made by `docs/studying/instances.py` from samples and seeds."""
