@@ -73,23 +73,22 @@ class Stage:
 
 
 def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
-    """All of the plan: proofs first, small rungs before large ones, parts in turn."""
-    rungs, quality, practice = list(plan.rungs), list(plan.quality), list(plan.practice)
-    for number, size in enumerate(rungs):
-        before = rungs[number - 1] if number else 0
-        yield Stage(f"proofs {size}", tuple(proofs(plan, size)))
-        yield Stage(f"solvers {size}", tuple(cold(plan, size)), before)
-        if number < len(practice):
+    """All of the plan: proofs first, small rungs before large ones, parts in turn; variants a rung later."""
+    rungs, practice, quality = (dict(enumerate(each)) for each in (plan.rungs, plan.practice, plan.quality))
+    for number in range(max(len(rungs) + 1, len(practice), len(quality))):
+        before = rungs.get(number - 1, 0)
+        if number in rungs:
+            size = rungs[number]
+            yield Stage(f"proofs {size}", tuple(proofs(plan, size)))
+            yield Stage(f"solvers {size}", tuple(cold(plan, size)), before)
+        if number in practice:
             yield Stage(f"practice {practice[number]}", tuple(ways(plan, practice[number], folder)))
-        if number < len(quality):
+        if number in quality:
             yield Stage(f"quality {quality[number]}", tuple(qualities(plan, quality[number], folder)))
-        if number == 2:
-            yield Stage("weights", tuple(weights(plan, quality[0], folder)))
-        yield Stage(f"variants {size}", tuple(variants(plan, size)), before)
-    for size in practice[len(rungs) :]:
-        yield Stage(f"practice {size}", tuple(ways(plan, size, folder)))
-    if len(rungs) <= 2:
-        yield Stage("weights", tuple(weights(plan, quality[0], folder)))
+        if number == 1:
+            yield Stage("weights", tuple(weights(plan, plan.quality[0], folder)))
+        if before:
+            yield Stage(f"variants {before}", tuple(variants(plan, before)), rungs.get(number - 2, 0))
 
 
 def proofs(plan: Plan, size: int) -> Iterator[Run]:
