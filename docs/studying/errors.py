@@ -118,7 +118,7 @@ def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]
     return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in found]
 
 
-def medians(x: Any, y: Any, bins: int = 8) -> tuple[list[float], list[float]]:
+def medians(x: Any, y: Any, bins: int = 12) -> tuple[list[float], list[float]]:
     """The medians of x and y in bins of x of FEW points or more: a first one of zeros, others logarithmic.
 
     x: gaps, not negative.
