@@ -59,16 +59,28 @@ Optima = dict[tuple[str, str, float], tuple[float, float]]
 """Least energy that is known and greatest bound, by problem, instance and size."""
 
 
-def optima(proofs: Iterable[Row]) -> Optima:
-    """What `prove` found of every instance, and the best angles for given jumps."""
+MIXED: Final = "1-norm and 2-norm"
+"""The problem that `prove` does not know."""
+
+
+def optima(proofs: Iterable[Row], solvers: Iterable[Row] = ()) -> Optima:
+    """What `prove` found of every instance, and the best angles for given jumps.
+
+    solvers: their rows, of which the best point of the mixed problem is taken, without a bound.
+    """
     problem = {("prove", 2.0): "2-norm", ("prove", 1.0): "1-norm"}
-    return {
+    found = {
         (problem.get((row["way"], row["norm"]), "given jumps"), row["instance"], row["size"]): (
             row["objective"], row["bound"],
         )
         for row in proofs
         if row["objective"] is not None
     }  # fmt: skip
+    for row in solvers:
+        if row["objective"] is not None and row["facet"] == "hull" and problem_of(row) == MIXED:
+            key = (MIXED, row["instance"], row["size"])
+            found[key] = (min(row["objective"], found.get(key, (np.inf,))[0]), -np.inf)
+    return found
 
 
 def problem_of(row: Row) -> str:

@@ -69,7 +69,13 @@ def solvable(kept: Kept) -> str:
             parts.append(f"{rung.proven} of {len(rung.runs)} at {size} pixels ({solver_page.label(pair)})")
     ours = [f"{own[size].proven} of {len(own[size].runs)} at {size}" for size in sorted(own)]
     reach = found["reach"]
-    text = f"Up to {reach[0]} pixels a side at least half." if reach else "Hardly any."
+    last = max((size for of in free.values() for size, rung in of.items() if rung.tried), default=0)
+    if reach is None:
+        text = "No solver proves half of the instances of any size."
+    elif reach[0] == last:
+        text = f"Half of the instances or more at every size that is measured, up to {last} pixels a side."
+    else:
+        text = f"Only on small grids: {reach[0]} pixels a side is the most of which a solver proves half."
     return (
         f"{text} From a file, the best pair of formulation and solver proves {', '.join(parts)}. `prove`, "
         f"which uses what is special about the problem, proves {', '.join(ours)}."
@@ -85,9 +91,9 @@ def matters(kept: Kept) -> str:
     before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
     mean = percent(float(np.mean(before or [0.0])))
     if not optimum.sure:
-        verdict = "No: the error does not change beyond chance"
+        verdict = "No: the error to hidden curves does not change beyond chance"
     else:
-        verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error changes"
+        verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error to hidden curves changes"
     text = (
         f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
         "on average, to the best field that is found."

@@ -21,7 +21,7 @@ INK: Final = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", 
 MARKS: Final = ("o", "s", "^", "D", "v", "P", "X", "*", "h")
 DASHES: Final = ("-", "--", ":", "-.")
 OURS: Final = "crossfield prove"
-"""The line that is drawn thicker."""
+"""How the names of lines begin that are drawn thicker."""
 _STYLE: Final = {
     "svg.hashsalt": "crossfield",
     "svg.fonttype": "path",
@@ -60,6 +60,10 @@ def styles(names: list[str]) -> dict[str, dict[str, Any]]:
     }
 
 
+def _thick(name: str) -> dict[str, float]:
+    return {"linewidth": 2.6} if name.startswith(OURS) else {}
+
+
 def profiles(path: Path, panels: dict[str, dict[str, Any]]) -> None:
     """Performance profiles: of each panel the sorted ratios of every line."""
     with drawn(path, len(panels), high=4.9) as axes:
@@ -71,7 +75,7 @@ def profiles(path: Path, panels: dict[str, dict[str, Any]]) -> None:
                 x = np.concatenate([[1.0], solved, [top]])
                 y = np.concatenate([[(solved <= 1).sum()], np.arange(1, len(solved) + 1), [len(solved)]])
                 look = looks[name] | {"markevery": 0.18, "markersize": 4}
-                look |= {"linewidth": 2.6} if name == OURS else {}
+                look |= _thick(name)
                 axis.step(x, 100 * y / max(len(ratios), 1), where="post", label=name, **look)
             axis.set(title=title, xscale="log", xlim=(1, top), ylim=(-2, 102))
             axis.set_xlabel("seconds, as a multiple of the quickest")
@@ -85,9 +89,9 @@ def growth(path: Path, rungs: list[int], share: dict[str, Line], seconds: dict[s
     with drawn(path, 2, high=3.8) as (left, right):
         looks = styles(list(share))
         for name, (x, y) in share.items():
-            left.plot(x, y, label=name, **looks[name])
+            left.plot(x, y, label=name, **looks[name] | _thick(name))
         for name, (x, y) in seconds.items():
-            right.plot(x, y, label=name, **looks[name])
+            right.plot(x, y, label=name, **looks[name] | _thick(name))
         for axis in (left, right):
             axis.set(xscale="log", xlabel="pixels of the longer side")
             axis.set_xticks(rungs, [str(rung) for rung in rungs])

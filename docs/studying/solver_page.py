@@ -259,9 +259,10 @@ def contradictions_text(rows: list[Row], known: facts.Optima) -> str:
     found = facts.contradictions(rows, known)
     kinds = Counter((row["solver"], row["way"], what.split(" ")[0]) for row, what in found)
     said = (
-        f"Of {len(claims):,} optima that solvers claim, {len(judged):,} are of problems whose optimum or "
-        f"bound `prove` knows; {len(found)} answers contradict it by more than {facts.WITHIN:g}, relative to "
-        "1, or to the optimum if that is more."
+        f"Of {len(claims):,} optima that solvers claim, {len(judged):,} can be held against what `prove` has "
+        "shown, or against the best point that any solver has of the mixed problem, which `prove` does not "
+        f"know; {len(found)} answers contradict these by more than {facts.WITHIN:g}, relative to 1, or to "
+        "the optimum if that is more."
     )
     if not found:
         return said
@@ -319,7 +320,7 @@ def growth_lines(
 ) -> tuple[dict[str, plots.Line], dict[str, plots.Line]]:
     """Share and seconds by size: of each formulation at its best solver, and of `prove`."""
     of_all = {label(pair): standing[pair] for pair in best_solvers(standing).values()}
-    of_all |= {f"prove, {norm}-norm": proof_rungs(proofs, norm) for norm in (2, 1)}
+    of_all |= {f"{plots.OURS}, {norm}-norm": proof_rungs(proofs, norm) for norm in (2, 1)}
     share: dict[str, plots.Line] = {}
     seconds: dict[str, plots.Line] = {}
     for name, of in of_all.items():
@@ -343,7 +344,8 @@ def draw(kept: Kept, pictures: Path) -> None:
 
 def section(kept: Kept) -> list[str]:
     """The part of the page."""
-    rows, known = kept["solvers"], facts.optima(kept["proofs"])
+    rows = kept["solvers"]
+    known = facts.optima(kept["proofs"], facts.measured(rows))
     cold = [row for row in rows if is_cold(row)]
     standing = rungs_of(cold)
     return [

@@ -27,18 +27,20 @@ no file: it knows that the energy is one of [crosses on a strip](proofs.md).""",
 Performance profiles (Dolan and More, 2002): the share of instances that are proven within a multiple of the
 quickest solver's time; the curve of the best solver is up and to the left. One panel for each problem, since
 formulations of one problem have one optimum. Only the best pairs are shown, on instances that all of them
-have, those that nobody proves included.""",
+have, those that nobody proves included. A curve that ends low may have met the size limit of a free
+edition.""",
     "growth": """![Share of proofs and seconds by size](pictures/study_growth.svg)
 
-Each formulation at the solver that proves most of it. Where a pair was not run on a rung, it counts as
-proving nothing there, and has no seconds.""",
+Each formulation at the solver that proves most of it. Where a pair was not run on a rung, or an instance is
+too large, it counts as proving nothing; seconds are those of instances that are not too large.""",
     "kinds": """### Are random instances like drawings?
 
 Instances that at least one solver proves, by problem and by where they come from.""",
     "open": """### What is left where nothing is proven
 
-Runs without a proof: how many have a point, how far its objective is above the optimum that `prove` knows
-(median), and the solver's own gap (median; 100 % where it has no bound).""",
+Runs without a proof: how many have a point, how far its objective is above the best that is known (median):
+by `prove`, or by any solver for the mixed problem; and the solver's own gap (median; 100 % where it has no
+bound).""",
     "variants": """### Starts, facets and windows
 
 The same pairs and instances with one thing changed. *From the greedy field*: the complete point of that field
