@@ -22,7 +22,7 @@ The plan (studying/plan.py), every run on one thread:
               field, 1 s or 10 s for those with a limit
 
 17,400 runs, 27 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
-leaves out most runs of the large ones: about 11 hours on one core, 5 to 6 on two.
+leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
 """
 
 from __future__ import annotations

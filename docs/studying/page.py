@@ -10,6 +10,7 @@ from crossfield.export.solvers_table import PROGRAMS
 from make import said
 
 from . import errors, practice_page, quality_page, solver_page
+from .instances import surfaces
 from .plan import Plan, stages
 from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
 from .rows import read as read_rows
@@ -118,7 +119,12 @@ def threats(kept: Kept) -> str:
         f"{float(np.median(loads)):.1f} in the median. Other work ran beside, and seconds are too many by "
         "what it took."
     )
-    return THREATS.format(free="; ".join(free) + ".", machine=machine)
+    fields = [row for part in ("quality", "practice") for row in kept[part]]
+    known = {row["instance"] for row in fields if row["instance"] in surfaces()}
+    drawings = {row["instance"] for row in fields} - known
+    return THREATS.format(
+        drawings=len(drawings), surfaces=len(known), free="; ".join(free) + ".", machine=machine
+    )
 
 
 def page(kept: Kept, plan: Plan) -> str:

@@ -88,11 +88,12 @@ Up to the left is slow and bad, down to the left quick and good. Bars: standard 
 
 THREATS: Final = """## What may be wrong with this
 
-- **Drawings.** Seven drawn samples and three surfaces, made for this project, are few, and curves of one
-  drawing are alike: hence standard errors over drawings. `--sketches FOLDER` adds others. Half of the
-  instances for solvers are parts of the same samples; ten of thirty are random and look like no drawing.
-- **Hidden curves** measure what designers draw, not the surface that they mean. The three surfaces have
-  known answers, but are smooth and simple.
+- **Drawings.** {drawings} drawings and {surfaces} surfaces are few, the samples among them were made for this
+  project, and curves of one drawing are alike: hence standard errors over drawings. `--sketches FOLDER` adds
+  others. Of thirty instances for solvers on a rung twenty or fewer come from the samples; the others are
+  random and look like no drawing.
+- **Hidden curves** measure what designers draw, not the surface that they mean. The surfaces with
+  known answers are smooth and simple.
 - **Free editions.** {free} They say nothing of what the full programs do with larger files.
 - **Short limits.** A few seconds for each run; a proof that takes a minute is not seen here.
   [Proven optima](proofs.md) has runs of a minute.

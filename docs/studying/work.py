@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from .solving import FAILED, proved, solved
 
 Progress = Callable[[str], object]
 _LONGEST: Final = 200  # characters of a note
+_FOLDERS: Final = re.compile(r"(?:/[\w.+-]+)+/")  # of this machine
 
 
 def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
@@ -27,7 +29,8 @@ def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
         found = _find(run, folder)
     except Exception as error:  # noqa: BLE001 - a row says what it was
         found = {"status": FAILED, "note": f"{type(error).__name__}: {error}"}
-    return found | {"note": str(found.get("note") or "")[:_LONGEST], **_machine()}
+    note = _FOLDERS.sub("", str(found.get("note") or ""))
+    return found | {"note": note[:_LONGEST], **_machine()}
 
 
 def _find(run: Run, folder: Path | None) -> dict[str, Any]:
