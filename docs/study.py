@@ -7,13 +7,13 @@
 Without options it does all runs that have no row yet in docs/studying/data, then makes the page. Killed and
 given again it goes on where it was. --quick is the same in two minutes, small, into another folder. --plan
 counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers have
-the folder docs on their PYTHONPATH.
+the folder docs on their PYTHONPATH. Runs of a solver that is not installed wait for a machine where it is.
 
 The plan (studying/plan.py), every run on one thread:
 
     proofs    30 instances on each of the rungs 4, 6, 8, 12, 16, 24: `prove` in both norms, at most 20 s, and
               the best angles for the jumps of the greedy field; what all else is judged by
-    solvers   the same instances: nine formulations x each installed solver that takes them, cold, 6 s each;
+    solvers   the same instances: nine formulations x each solver that takes them, cold, 6 s each;
               20 variants: from the greedy field, with the printed facet, with the windows of a proof. A pair
               that proves fewer than a tenth of a rung is not run on the next one, and a row says so
     quality   drawings without one of their curves, surfaces with known answers, sizes 24 and 32: fields of

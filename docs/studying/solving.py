@@ -36,12 +36,12 @@ PROOF: Final = "prove"
 
 @cache
 def pairs() -> tuple[tuple[str, str], ...]:
-    """Every formulation with every installed solver that takes it, in the order of the tables."""
+    """Every formulation with every solver that takes it, in the order of the tables."""
     return tuple(
         (problem.name, solver)
         for problem in smallest_problems()
-        for solver, entry in SOLVERS.items()
-        if not entry.missing and format_for(problem, solver)
+        for solver in SOLVERS
+        if format_for(problem, solver)
     )
 
 

@@ -13,7 +13,7 @@ SOLVERS_TEXT: Final = {
 
 Thirty instances on each rung of a ladder of sizes: samples as a whole, squares cut out of samples, squares
 with straight strokes at random, and squares with random directions. The coefficients are the paper's, 1 and
-1e-6. Every solver that is installed gets the file of every [formulation](formulations.md) that it takes, in
+1e-6. Every solver that can be had for free gets the file of every [formulation](formulations.md) it takes, in
 the format that it reads best, on one thread, without a starting point: 6 s each, a relative gap of 1e-6,
 tolerances of 1e-9 where they can be set. Seconds are those of reading and solving. A run counts as proven
 when the solver says so, or when its bound is within 1e-6 of the objective, which is recomputed at its point.

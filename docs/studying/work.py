@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from crossfield.export.library.building.executor import Tasks, ahead, executor
 from crossfield.export.library.documents.lock import locked
+from crossfield.export.solvers_table import SOLVERS
 
 from .facts import is_proven
 from .fields import fielded
@@ -67,13 +68,18 @@ def carry_out(
     with locked(data, "a study", progress), executor(jobs, scheduler) as chosen:
         kept = tables(data)
         for stage in stages(plan, folder):
-            runs = [run for run in stage.runs if not wanted or run.part in wanted]
+            runs = [run for run in stage.runs if (not wanted or run.part in wanted) and _can_run(run)]
             runs = left(runs, stage, kept)
             progress(f"{stage.name}: {len(runs)} of {len(stage.runs)} runs")
             tasks = Tasks(chosen, ahead(jobs, scheduler))
             for run in reversed(runs):  # the last one that is added is the first to be done
                 tasks.add(perform, (run, folder), partial(_keep, kept[run.part], run))
             tasks.run()
+
+
+def _can_run(run: Run) -> bool:
+    """Whether its solver is here; what has none can run anywhere."""
+    return not run.solver or not SOLVERS[run.solver].missing
 
 
 def _keep(table: Table, run: Run, found: dict[str, Any]) -> None:
