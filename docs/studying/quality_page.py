@@ -64,6 +64,7 @@ def changes_table(rows: list[Row]) -> str:
     """All changes, for hidden curves and surfaces; those beyond two standard errors are bold."""
     drawn, known = changes(rows, surfaces=False), changes(rows, surfaces=True)
     cells = [[words, _told(drawn[name]), _told(known[name])] for name, (words, *_) in CHANGES.items()]
+    cells = [line for line in cells if any(line[1:])]
     return markdown(("change", "hidden curves, degrees", "surfaces, degrees"), cells)
 
 
@@ -201,7 +202,10 @@ def section(kept: Kept) -> list[str]:
     rows = kept["quality"]
     if not rows:
         return [QUALITY_TEXT["head"], "Not measured yet."]
+    weights = (
+        QUALITY_TEXT["weights"] if weight_lines(rows, "w_strokes") else "Other weights: not measured yet."
+    )
     return [
         QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"], harmless(rows),
-        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), QUALITY_TEXT["weights"],
+        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), weights,
     ]  # fmt: skip
