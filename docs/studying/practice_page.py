@@ -109,9 +109,14 @@ def _mean_error(found: Fares, way: str, sizes: Iterable[int]) -> float:
     return float(np.mean([error.mean for size in sizes if (error := found[size][way].error) is not None]))
 
 
+def compared(found: Fares, ways: Iterable[str]) -> list[int]:
+    """The sizes at which all of these ways have an error."""
+    return [size for size in found if all(way in found[size] and found[size][way].error for way in ways)]
+
+
 def nearest(found: Fares, ways: list[str]) -> list[tuple[float, str]]:
     """Ways by their mean error over the sizes at which all of them have one, best first."""
-    sizes = [size for size in found if all(way in found[size] and found[size][way].error for way in ways)]
+    sizes = compared(found, ways)
     return sorted((_mean_error(found, way, sizes), way) for way in ways) if sizes else []
 
 
@@ -133,12 +138,16 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
     quick = quick_ways(found)
     if not quick:
         return f"No way takes {QUICK:g} s or less at {max(found)} pixels."
+    at = compared(found, quick)
+    if not at:
+        return "How near the ways come to hidden curves is not measured yet."
     (error, best), *others = nearest(found, quick)
     text = (
         f"While drawing, take `{best}`: of the ways that take {QUICK:g} s or less at {max(found)} pixels it "
-        f"comes nearest to hidden curves, {error:.1f} degrees on average at {_sizes(found)} pixels"
+        f"comes nearest to hidden curves, {error:.1f} degrees on average at {_sizes(at)} pixels"
     )
-    text += f" ({others[0][0]:.1f} for `{others[0][1]}`)" if others else ""
+    if others:
+        text += f" ({others[0][0]:.1f} for `{others[0][1]}`{_paired(rows, others[0][1], best)})"
     slower = [way for way in found[max(found)] if way not in quick]
     ahead = nearest(found, [best, *slower])
     if not slower or not ahead:
@@ -154,7 +163,7 @@ def _paired(rows: list[Row], before: str, after: str) -> str:
     )
     if found is None:
         return ""
-    return f", by {found} degrees{'' if found.sure else ', which may be chance'}"
+    return f", difference {found}{'' if found.sure else ', which may be chance'}"
 
 
 def _for_energy(found: Fares) -> str:
