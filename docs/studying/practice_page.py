@@ -84,13 +84,14 @@ def fares(rows: list[Row]) -> Fares:
         if row["energy_2"] is not None:
             least[case] = min(least.get(case, np.inf), row["energy_2"])
     whole = [row for row in rows if have[errors.case_of(row)] == ways]
-    return {
-        int(size): {
-            way: Fare.of([row for row in whole if row["size"] == size and name_of(row) == way], least)
-            for way in dict.fromkeys(name_of(row) for row in whole if row["size"] == size)
+    found: Fares = {}
+    for size in sorted({int(row["size"]) for row in whole}):
+        here = [row for row in whole if row["size"] == size]
+        found[size] = {
+            way: Fare.of([row for row in here if name_of(row) == way], least)
+            for way in dict.fromkeys(map(name_of, whole))
         }
-        for size in sorted({row["size"] for row in whole})
-    }
+    return found
 
 
 def table(found: Fares) -> str:
