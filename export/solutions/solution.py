@@ -42,7 +42,7 @@ class Solution:
     bound, where one is known. status is what remains of the claim. rounded: the furthest that rounding moved
     an integer column. tolerance: how far the point may be off before it contradicts the claim, in units of a
     column. interrupted: whether the user ended the search. start_returned: whether the point is the start
-    that the solver was given; None where that is not known.
+    that the solver was given; None where that is not known. nodes: of the search tree, where they are told.
     """
 
     problem: Problem
@@ -58,6 +58,7 @@ class Solution:
     interrupted: bool = False
     start_returned: bool | None = None
     tolerance: float = TOLERANCE
+    nodes: int | None = None
 
     def __repr__(self) -> str:
         numbers = {"objective": self.objective, "bound": self.bound, "gap": self.gap}

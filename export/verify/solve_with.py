@@ -5,15 +5,16 @@ Each program is a child process that starts when it is asked first; it reads the
 
 from __future__ import annotations
 
-import time
 from contextlib import ExitStack
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from ...models.errors import SolverError, UnsupportedBySolverError
+from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
+from ..bundle.starts import STARTS, write_start
 from ..formats.registry import FORMATS, write
 from ..solutions.readers.text import RawSolution
 from ..solutions.solution import Solution
@@ -68,11 +69,22 @@ class Programs:
             raise SolverError(f"{program.title} does not say its version: {answer['words']}")
         return str(answer["words"])
 
-    def solve(self, problem: Problem, solver: str, seconds: float) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        solver: str,
+        seconds: float,
+        *,
+        gap: float = 0.0,
+        start: CrossField | None = None,
+    ) -> Solution:
         """What a solver finds within the time, its point read by name; a bound where it tells one.
 
-        Raises UnsupportedBySolverError for a problem that it does not take or that is too large for its free
-        edition, SolverError for a run that failed.
+        gap: the relative one that is enough; GAMS has 1e-6. start: a field whose complete point it starts
+        from, in the file itself (.nl, GAMS) or beside it; CBC and GLPK do without. `seconds` of the answer:
+        reading the file and solving, the start of the process left out. Raises UnsupportedBySolverError for a
+        problem that it does not take or that is too large for its free edition, SolverError for a run that
+        failed.
         """
         entry, name = SOLVERS[solver], format_for(problem, solver)
         program = PROGRAMS[entry.program]
@@ -82,11 +94,10 @@ class Programs:
         folder.mkdir(exist_ok=True)
         path, result = folder / f"model{FORMATS[name].suffix}", folder / "result.npz"
         result.unlink(missing_ok=True)
-        held = write(problem, path).problem
+        held = write(problem, path, start=start).problem
         task = {"step": "solve", "path": str(path), "result": str(result), "solver": solver}
-        begin = time.perf_counter()
-        answer = self._worker(program.name).ask(task | {"seconds": seconds}, seconds)
-        spent = time.perf_counter() - begin
+        task |= self._beside(problem, solver, start, folder)
+        answer = self._worker(program.name).ask(task | {"seconds": seconds, "gap": gap}, seconds)
         if answer["kind"] == "too large":
             raise UnsupportedBySolverError(
                 f"{entry.title}: {held.columns} columns and {held.row_count} rows are too many for its free "
@@ -94,7 +105,19 @@ class Programs:
             )
         if answer["kind"] != "done":
             raise SolverError(f"{entry.title}: {answer['words']}")
-        return _solution(held, load(RawSolution, result), spent)
+        return _solution(held, load(RawSolution, result), answer["seconds"])
+
+    @staticmethod
+    def _beside(problem: Problem, solver: str, start: CrossField | None, folder: Path) -> dict[str, Any]:
+        """The file of a starting point in the folder, for a solver that takes one."""
+        if start is None or solver not in STARTS or not problem.integer.any():
+            return {}
+        path = folder / f"start{STARTS[solver].suffix}"
+        try:
+            write_start(problem, start, path, solver)
+        except UnsupportedBySolverError:  # Xpress, where the problem is not convex
+            return {}
+        return {"start": str(path)}
 
     def _worker(self, program: str) -> Worker:
         if program not in self._workers:
@@ -110,6 +133,5 @@ def _solution(held: Problem, raw: RawSolution, seconds: float) -> Solution:
         if wrong:
             raise SolverError(wrong)
     bound = finite(raw.bound)
-    return Solution(
-        held, point, raw.status, raw.message, raw.reader, raw.objective, bound=bound, seconds=seconds
-    )
+    told = (raw.status, raw.message, raw.reader, raw.objective)
+    return Solution(held, point, *told, bound=bound, seconds=seconds, nodes=raw.nodes)

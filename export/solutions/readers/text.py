@@ -96,7 +96,7 @@ class RawSolution:
     before the values. order: the order of the values where there are no names. bound: the solver's dual
     bound, or None. of_rows: names (k,) that the file lists as those of rows, whose values are left out.
     stamp: of the problem, where the solver repeated it, or empty. reader: name of the reader that understood
-    the file.
+    the file. nodes: of the search tree, where the solver tells.
     """
 
     status: Status
@@ -111,6 +111,7 @@ class RawSolution:
     of_rows: Bytes | None = None
     stamp: str = ""
     reader: str = ""
+    nodes: int | None = None
 
     @property
     def has_point(self) -> bool:

@@ -37,10 +37,10 @@ def evaluate(path: Path, points: Points, renamed: Callable[[str], str] = str) ->
     )
 
 
-def solve(path: Path, seconds: float, solver: str) -> RawSolution:
+def solve(path: Path, seconds: float, solver: str, gap: float = 0.0) -> RawSolution:
     """The answer of Ipopt or Bonmin within the time."""
     model = read_nl(path)
-    answer = casadi_driver.solve(solver, model, seconds, 0.0)
+    answer = casadi_driver.solve(solver, model, seconds, gap)
     if not len(answer.point):
         status = Status.INFEASIBLE if 200 <= answer.code < 300 else Status.LIMIT_WITHOUT_POINT
         return told(status, answer.words)

@@ -48,10 +48,10 @@ def read(path: Path) -> Meaning:
     return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(path: Path, seconds: float, _solver: str, gap: float = 0.0) -> RawSolution:
     """Its answer within the time; its solution file has eight digits."""
     answer = _fresh("cbc.sol")
-    gaps = ("ratio", "0", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
+    gaps = ("ratio", f"{gap:g}", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
     limits = (*gaps, "sec", f"{seconds:g}", "timem", "elapsed")
     said = _run(str(path), *limits, "solve", "solution", answer.name)
     try:

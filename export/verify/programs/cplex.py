@@ -81,14 +81,18 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
     return listed(linear, indices=2), listed(cubes, indices=3, products=2)
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
+    if start is not None:
+        model.MIP_starts.read(str(start))
     tolerances = model.parameters
     tolerances.timelimit.set(seconds)
     tolerances.threads.set(1)
     for parameter, value in (
-        (tolerances.mip.tolerances.mipgap, 0.0),
+        (tolerances.mip.tolerances.mipgap, gap),
         (tolerances.mip.tolerances.absmipgap, 1e-9),
         (tolerances.mip.tolerances.integrality, 0.0),
         (tolerances.simplex.tolerances.feasibility, 1e-9),
@@ -106,10 +110,11 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     answer = model.solution
     words, names = answer.get_status_string(), model.variables.get_names()
     mixed = "MI" in model.problem_type[model.get_problem_type()]
+    nodes = answer.progress.get_num_nodes_processed() if mixed else None
+    bound = answer.MIP.get_best_objective() if mixed else None
     if not answer.is_primal_feasible():
         status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
-        return told(status, words)
+        return told(status, words, bound=bound, nodes=nodes)
     status = Status.OPTIMAL_GLOBAL if "optimal" in words else Status.LIMIT_WITH_POINT
-    bound = answer.MIP.get_best_objective() if mixed else None
-    objective = answer.get_objective_value()
-    return told(status, words, names, answer.get_values(), objective=objective, bound=bound)
+    numbers = {"objective": answer.get_objective_value(), "bound": bound, "nodes": nodes}
+    return told(status, words, names, answer.get_values(), **numbers)

@@ -129,8 +129,11 @@ _MODEL_STATUS: Final = {
 _NORMAL: Final = 1
 
 
-def solve(path: Path, seconds: float, solver: str) -> RawSolution:
-    """The answer of one of GAMS's solvers within the time, from the CSV that our models write."""
+def solve(path: Path, seconds: float, solver: str, _gap: float = 0.0) -> RawSolution:
+    """The answer of one of GAMS's solvers within the time, from the CSV that our models write.
+
+    The gap stands in the model itself.
+    """
     answer = Path("answer.csv").resolve()
     answer.unlink(missing_ok=True)
     said = _run(path, solver.removeprefix("gams-"), f"reslim={seconds:g}", "threads=1", f"--RESULTS={answer}")

@@ -141,9 +141,10 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
 _STATUS: Final = {"o": Status.OPTIMAL_GLOBAL, "f": Status.LIMIT_WITH_POINT, "n": Status.INFEASIBLE}
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(path: Path, seconds: float, _solver: str, gap: float = 0.0) -> RawSolution:
     """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
-    said = _run(path, "--tmlim", str(max(1, round(seconds))), "--wglp", "model.glp", "-w", "answer.txt")
+    limits = ("--tmlim", str(max(1, round(seconds))), "--mipgap", f"{gap:g}")
+    said = _run(path, *limits, "--wglp", "model.glp", "-w", "answer.txt")
     names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
     names = _ours(names, path) if path.suffix == ".mod" else names
     answer = [line.split() for line in Path("answer.txt").read_text().splitlines()]

@@ -85,11 +85,15 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     with _loaded(path) as model:
+        if start is not None:
+            model.read(str(start))
         for option, value in (
-            ("TimeLimit", seconds), ("MIPGap", 0.0), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
+            ("TimeLimit", seconds), ("MIPGap", gap), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
             ("OptimalityTol", 1e-9), ("IntFeasTol", 1e-9), ("BarConvTol", 1e-12), ("Threads", 1),
         ):  # fmt: skip
             model.setParam(option, value)
@@ -102,9 +106,10 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
         status = _STATUS.get(model.Status, Status.ERROR)
         variables = model.getVars()
         names = [v.VarName for v in variables]
+        mixed = model.IsMIP or model.IsQCP
+        bound, nodes = (model.ObjBound, int(model.NodeCount)) if mixed else (None, None)
         if not model.SolCount:
             without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-            return told(without, f"status {model.Status}")
-        values = model.getAttr("X", variables)
-        bound = model.ObjBound if model.IsMIP or model.IsQCP else None
-        return told(status, f"status {model.Status}", names, values, objective=model.ObjVal, bound=bound)
+            return told(without, f"status {model.Status}", bound=bound, nodes=nodes)
+        numbers = {"objective": model.ObjVal, "bound": bound, "nodes": nodes}
+        return told(status, f"status {model.Status}", names, model.getAttr("X", variables), **numbers)

@@ -58,10 +58,14 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     highs = _load(path)
-    driver.set_options(highs, time_limit=seconds, mip_rel_gap=0.0, mip_abs_gap=1e-9, threads=1)
+    if start is not None:
+        highs.readSolution(str(start), 0)
+    driver.set_options(highs, time_limit=seconds, mip_rel_gap=gap, mip_abs_gap=1e-9, threads=1)
     if not highs.getModel().hessian_.dim_:  # its QP method ends in an error with such tolerances
         driver.set_options(highs, mip_feasibility_tolerance=1e-9, primal_feasibility_tolerance=1e-9)
     try:
@@ -71,7 +75,8 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
     words, info = highs.modelStatusToString(highs.getModelStatus()), highs.getInfo()
     status = _STATUS.get(highs.getModelStatus(), Status.ERROR)
     names, values, bound = highs.getLp().col_names_, highs.getSolution().col_value, driver.dual_bound(highs)
+    nodes = info.mip_node_count if len(highs.getLp().integrality_) else None
     if status == Status.LIMIT_WITH_POINT and not info.primal_solution_status:
-        return told(Status.LIMIT_WITHOUT_POINT, words, bound=bound)
+        return told(Status.LIMIT_WITHOUT_POINT, words, bound=bound, nodes=nodes)
     objective = info.objective_function_value if len(values) else None
-    return told(status, words, names, values, objective=objective, bound=bound)
+    return told(status, words, names, values, objective=objective, bound=bound, nodes=nodes)

@@ -6,9 +6,11 @@ A program's module is imported in a child process only (worker.py). It has
     version() -> str                                 of the program
     read(path) -> Meaning                            the algebra of an LP or MPS file, where it tells it
     evaluate(path, points) -> Evaluation             the behaviour of a file of another format
-    solve(path, seconds, solver) -> RawSolution      its answer, where it solves
+    solve(path, seconds, solver, gap) -> RawSolution its answer, where it solves
 
-and raises Refused, NotTold or TooLarge. Files come unpacked; the current folder is its own.
+The gap is the relative one that is enough. A solver for which the table has a file of starting points takes
+the path of one as a fifth argument, `start`. A module raises Refused, NotTold or TooLarge. Files come
+unpacked; the current folder is its own.
 """
 
 from __future__ import annotations

@@ -145,11 +145,12 @@ def told(
     *,
     objective: float | None = None,
     bound: float | None = None,
+    nodes: int | None = None,
 ) -> RawSolution:
     """What a program answers through an interface of its own, in the form in which files are read."""
     names = np.array([name.encode() for name in columns], dtype=np.bytes_)
     given = np.array(values, dtype=float)
-    return RawSolution(status, words, objective, names, given, bound=bound, reader=_TOLD)
+    return RawSolution(status, words, objective, names, given, bound=bound, reader=_TOLD, nodes=nodes)
 
 
 _INFINITY: Final = 1e20

@@ -177,26 +177,30 @@ _STATUS: Final = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     scip = _load(path)
     for option, value in (
         ("limits/time", seconds),
-        ("limits/gap", 0.0),
+        ("limits/gap", gap),
         ("limits/absgap", 1e-9),
         ("numerics/feastol", 1e-9),
         ("numerics/dualfeastol", 1e-9),
         ("misc/catchctrlc", False),
     ):
         scip.setParam(option, value)
+    if start is not None:
+        scip.addSol(scip.readSolFile(str(start)))
     scip.optimize()
-    words = scip.getStatus()
+    words, nodes = scip.getStatus(), scip.getNTotalNodes()
     status = _STATUS.get(words, Status.ERROR)
     if not scip.getNSols():
         without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-        return told(without, words, bound=scip.getDualbound())
+        return told(without, words, bound=scip.getDualbound(), nodes=nodes)
     best = scip.getBestSol()
     ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     values = np.array([scip.getSolVal(best, v) for v in ours])
-    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound()}
+    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound(), "nodes": nodes}
     return told(status, words, [v.name for v in ours], values, **numbers)

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -117,7 +118,10 @@ def answer_to(module: Any, task: dict[str, Any]) -> dict[str, Any]:
     try:
         if task["step"] == "version":
             return {"kind": "done", "words": module.version()}
-        save(_result(module, task), Path(task["result"]))
+        begin = time.perf_counter()
+        found = _result(module, task)
+        spent = time.perf_counter() - begin
+        save(found, Path(task["result"]))
     except Refused as refused:
         return {"kind": "refused", "words": " ".join(str(refused).split())}
     except NotTold as untold:
@@ -126,7 +130,7 @@ def answer_to(module: Any, task: dict[str, Any]) -> dict[str, Any]:
         return {"kind": "too large", "words": ""}
     except Exception as error:  # noqa: BLE001 - programs raise what they like, and the other tasks go on
         return {"kind": "failed", "words": " ".join(f"{type(error).__name__}: {error}".split())[:300]}
-    return {"kind": "done", "words": ""}
+    return {"kind": "done", "words": "", "seconds": spent}
 
 
 def _result(module: Any, task: dict[str, Any]) -> Any:
@@ -135,7 +139,8 @@ def _result(module: Any, task: dict[str, Any]) -> Any:
         return module.read(path)
     if task["step"] == "evaluate":
         return module.evaluate(path, load(Points, Path(task["points"])))
-    return module.solve(path, task["seconds"], task["solver"])
+    start = {"start": Path(task["start"])} if task.get("start") else {}
+    return module.solve(path, task["seconds"], task["solver"], task.get("gap", 0.0), **start)
 
 
 def main(arguments: list[str]) -> int:

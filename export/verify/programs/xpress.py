@@ -89,11 +89,15 @@ _STATUS = {
 }
 
 
-def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
+def solve(
+    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
+) -> RawSolution:
     """Its answer within the time."""
     model = _load(path)
+    if start is not None:
+        model.readSlxSol(str(start))
     for option, value in (
-        ("timelimit", seconds), ("miprelstop", 0.0), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("timelimit", seconds), ("miprelstop", gap), ("mipabsstop", 1e-9), ("feastol", 1e-9),
         ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
         ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
     ):  # fmt: skip
@@ -106,9 +110,9 @@ def solve(path: Path, seconds: float, _solver: str) -> RawSolution:
         _complain(error)
     words = str(found).removeprefix("SolStatus.")
     status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
-    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return told(status, words)
     mixed = model.attributes.mipents or model.attributes.qconstraints
-    bound = model.attributes.bestbound if mixed else None
-    objective = model.attributes.objval
-    return told(status, words, names, model.getSolution(), objective=objective, bound=bound)
+    bound, nodes = (model.attributes.bestbound, model.attributes.nodes) if mixed else (None, None)
+    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
+        return told(status, words, bound=bound, nodes=nodes)
+    numbers = {"objective": model.attributes.objval, "bound": bound, "nodes": nodes}
+    return told(status, words, names, model.getSolution(), **numbers)

@@ -1,0 +1,82 @@
+"""Measure what is of practical use, and make docs/study.md: `python docs/study.py --page`.
+
+    python docs/study.py [--jobs N | --scheduler ADDRESS] [--parts PART ...] [--sketches FOLDER]
+    python docs/study.py --quick --data FOLDER
+    python docs/study.py --plan | --page
+
+Without options it does all runs that have no row yet in docs/studying/data, then makes the page. Killed and
+given again it goes on where it was. --quick is the same in two minutes, small, into another folder. --plan
+counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers have
+the folder docs on their PYTHONPATH. Runs of a solver that is not installed wait for a machine where it is.
+
+The plan (studying/plan.py), every run on one thread:
+
+    proofs    30 instances on each of the rungs 4, 6, 8, 12, 16, 24: `prove` in both norms, at most 20 s, and
+              the best angles for the jumps of the greedy field; what all else is judged by
+    solvers   the same instances: nine formulations x each solver that takes them, cold, 6 s each;
+              20 variants: from the greedy field, with the printed facet, with the windows of a proof. A pair
+              that proves fewer than a tenth of a rung is not run on the next one, and a row says so
+    quality   drawings without one of their curves, surfaces with known answers, sizes 24 and 32: fields of
+              many energies, both norms, several weights; the error beside the gap to the best
+    practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: nine ways to a
+              field, 1 s or 10 s for those with a limit
+
+17,400 runs, 27 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
+leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Final
+
+from studying.plan import FULL, QUICK, Plan, expected, stages
+from studying.rows import PARTS
+from studying.work import carry_out
+
+DOCS: Final = Path(__file__).resolve().parent
+DATA: Final = DOCS / "studying" / "data"
+
+
+def told(plan: Plan, folder: Path | None) -> str:
+    """The stages of a plan, with their runs and the most hours on one core."""
+    lines, count, seconds = [], 0, 0.0
+    for stage in stages(plan, folder):
+        most = sum(map(expected, stage.runs))
+        lines.append(f"{stage.name:<14}{len(stage.runs):>6} runs, at most {most:>6.0f} s")
+        count, seconds = count + len(stage.runs), seconds + most
+    return "\n".join([*lines, f"{'all':<14}{count:>6} runs, at most {seconds / 3600:.1f} h on one core"])
+
+
+def main() -> None:
+    """Do what is left of the plan, and make the page."""
+    parser = argparse.ArgumentParser(description="Measure what is of practical use; make docs/study.md.")
+    parser.add_argument("--quick", action="store_true", help="a small plan of two minutes; give --data too")
+    parser.add_argument("--plan", action="store_true", help="only tell the runs and their seconds")
+    parser.add_argument("--page", action="store_true", help="only make the page from the rows")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the rows")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=[], help="only these parts")
+    parser.add_argument("--sketches", type=Path, help="folder of line drawings by others, beside the samples")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--scheduler", help="address of a dask scheduler whose workers do the runs")
+    given = parser.parse_args()
+    plan = QUICK if given.quick else FULL
+    if given.quick and given.data == DATA:
+        parser.error("--quick is another plan; give --data FOLDER for its rows")
+    if given.plan:
+        print(told(plan, given.sketches))
+        return
+    if not given.page:
+        carry_out(
+            plan, given.data, jobs=given.jobs, scheduler=given.scheduler, folder=given.sketches,
+            parts=given.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
+        )  # fmt: skip
+    from studying.page import write_page
+
+    write_page(given.data, DOCS if given.data == DATA else given.data, plan)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+"""How far fields are from hidden curves and true crosses: paired differences, by drawing, and gaps."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+from crossfield.models.evaluation.hidden import Summary, summary
+from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from scipy.stats import spearmanr
+
+from .rows import Row
+
+CLOSE: Final = 1e-3
+"""Relative gap of a proof up to which its field counts as the optimum."""
+Kind = Callable[[Row], bool]
+
+
+def case_of(row: Row) -> tuple[Any, ...]:
+    """The instance that a field was made from, weights left out: drawing, size, curve, noise and its seed."""
+    noise = (row["noise"], row["seed"]) if row["hidden"] < 0 else ()
+    return (row["instance"], row["size"], row["hidden"], *noise)
+
+
+def is_surface(row: Row) -> bool:
+    """Whether it is about a surface with a known answer."""
+    return bool(row["hidden"] < 0)
+
+
+def is_default(row: Row) -> bool:
+    """Whether it has the default weights."""
+    return bool(row["w_strokes"] == STROKE_WEIGHT and row["w_beta"] == SKEW_WEIGHT)
+
+
+def usable(rows: Iterable[Row]) -> list[Row]:
+    """The rows with a field and its error."""
+    return [row for row in rows if row["error"] is not None]
+
+
+def mean_by_drawing(rows: Iterable[Row], value: Callable[[Row], float]) -> Summary | None:
+    """Count of drawings, mean over them, and its standard error."""
+    of: dict[str, list[float]] = defaultdict(list)
+    for row in rows:
+        of[row["instance"]].append(value(row))
+    return summary(np.array([np.mean(each) for each in of.values()]))
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a change does to the error: degrees, mean over drawings and standard error, and pairs."""
+
+    mean: float
+    error: float
+    drawings: int
+    pairs: int
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is beyond two standard errors."""
+        return abs(self.mean) > 2 * self.error
+
+    def __str__(self) -> str:
+        return f"{self.mean:+.2f} +- {self.error:.2f}"
+
+
+def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
+    """The error after less the error before, of the same cases; None for fewer than three drawings."""
+    old, new = defaultdict[Any, list[float]](list), defaultdict[Any, list[float]](list)
+    for row in rows:
+        for kind, kept in ((before, old), (after, new)):
+            if kind(row):
+                kept[case_of(row)].append(row["error"])
+    of: dict[str, list[float]] = defaultdict(list)
+    for case in old.keys() & new.keys():
+        of[case[0]].append(float(np.mean(new[case]) - np.mean(old[case])))
+    found = summary(np.array([np.mean(of[name]) for name in sorted(of)]))
+    if found is None or found.error is None or found.count < 3:
+        return None
+    return Change(found.mean, found.error, found.count, sum(map(len, of.values())))
+
+
+def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, bool]]:
+    """Of every case under default weights the least 2-norm energy, and whether it is the proven optimum."""
+    least: dict[tuple[Any, ...], float] = {}
+    bound: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        case = case_of(row)
+        least[case] = min(least.get(case, np.inf), row["energy_2"])
+        if row["way"] == "prove" and row["norm"] == 2 and row["bound"] is not None:
+            bound[case] = max(bound.get(case, -np.inf), row["bound"])
+    return {
+        case: (energy, energy - bound.get(case, -np.inf) <= CLOSE * energy) for case, energy in least.items()
+    }
+
+
+def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
+    """Each field under default weights, of cases whose optimum is proven, with its relative gap to it."""
+    kept = [row for row in usable(rows) if is_default(row)]
+    best = best_energies(kept)
+    return [
+        (row, (row["energy_2"] - best[case_of(row)][0]) / max(best[case_of(row)][0], 1e-9))
+        for row in kept
+        if best[case_of(row)][1]
+    ]
+
+
+def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
+    """Each field with its gap, and its error less that of the field of least energy of its instance."""
+    least: dict[Any, Row] = {}
+    for row, _ in found:
+        case = case_of(row)
+        if case not in least or row["energy_2"] < least[case]["energy_2"]:
+            least[case] = row
+    return [(row, gap, row["error"] - least[case_of(row)]["error"]) for row, gap in found]
+
+
+def medians(x: Any, y: Any, bins: int = 12) -> tuple[list[float], list[float]]:
+    """The medians of x and y in bins of x of FEW points or more: a first one of zeros, others logarithmic.
+
+    x: gaps, not negative.
+    """
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    if not len(x):
+        return [], []
+    ends = np.concatenate(
+        [[0.0, _NO_GAP], np.geomspace(5 * _NO_GAP, max(1.01 * x.max(), 10 * _NO_GAP), bins)]
+    )
+    parts = [(x >= a) & (x < b) for a, b in pairwise(ends)]
+    found = [(x[inside], y[inside]) for inside in parts if inside.sum() >= FEW]
+    return [float(np.median(a)) for a, _ in found], [float(np.median(b)) for _, b in found]
+
+
+FEW: Final = 5
+_NO_GAP: Final = 1e-4
+
+
+def correlation(found: list[tuple[Row, float]]) -> Summary | None:
+    """Rank correlation of gap and error within a case: its mean over drawings, with standard error."""
+    cases: dict[Any, list[tuple[float, float]]] = defaultdict(list)
+    for row, gap in found:
+        cases[case_of(row)].append((round(gap, 6), row["error"]))
+    of: dict[str, list[float]] = defaultdict(list)
+    for case, points in sorted(cases.items(), key=lambda item: str(item[0])):
+        gap, error = np.array(points).T
+        if len(set(gap)) > 2 and len(set(error)) > 2:
+            of[case[0]].append(float(spearmanr(gap, error).statistic))
+    return summary(np.array([np.mean(each) for each in of.values()]))

@@ -1,0 +1,123 @@
+"""Runs that give a field of a drawing or a surface: how far it is from a hidden curve or from the truth."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import crossfield as cf
+import numpy as np
+from crossfield.export.formats.registry import generator
+from crossfield.export.solving.methods import METHODS, Request
+from crossfield.models.errors import CrossfieldError
+from crossfield.models.evaluation.hidden import HiddenCurve
+from crossfield.models.field.field import CrossField, relabelled
+from crossfield.models.instance.instance import Instance
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.smooth.polyvector import HOLDS
+
+from .instances import curves, drawing, noisy
+from .rows import Run
+from .solving import FAILED, energies, sizes
+
+MOST_CURVES: Final = 8
+"""Curves of a drawing that are hidden in turn, the longest ones."""
+PERTURBED: Final = "perturbed"
+SHARES: Final = (0.02, 0.1, 0.3)
+"""Of the pixels of a perturbed field that get another cross at random."""
+Found = tuple[CrossField, dict[str, Any]]
+
+
+def hidden(run: Run, folder: Path | None) -> HiddenCurve:
+    """The curve that a run hides."""
+    return curves(run.instance, run.size, MOST_CURVES, folder)[run.hidden]
+
+
+@lru_cache(maxsize=4)
+def surface(name: str, size: int) -> Any:
+    """A surface with its true field."""
+    return cf.analytic(name, size)
+
+
+def asked(run: Run, folder: Path | None) -> Instance:
+    """The instance that a run makes a field from."""
+    if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
+        found = noisy(surface(run.instance, run.size).instance, run.noise, run.seed)
+    else:
+        found = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
+    return found.with_weights(w_strokes=run.w_strokes, w_beta=run.w_beta)
+
+
+def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
+    """Mean degrees from a field to the hidden curve, or to the true crosses; None where neither is."""
+    if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
+        truth = surface(run.instance, run.size)
+        return float(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
+    return None if run.hidden < 0 else float(np.degrees(hidden(run, folder).deviation(field)))
+
+
+def fielded(run: Run, folder: Path | None) -> dict[str, Any]:
+    """The row of a field."""
+    instance = asked(run, folder)
+    facts: dict[str, Any] = {"version": generator(), **sizes(instance)}
+    begin = time.perf_counter()
+    try:
+        field, told = _field(run, instance)
+    except CrossfieldError as failure:
+        spent = time.perf_counter() - begin
+        return facts | {"status": FAILED, "seconds": spent, "note": str(failure)}
+    facts |= {"status": "field", "seconds": time.perf_counter() - begin, **energies(field)}
+    norm = 1 if run.norm == 1 else 2
+    facts |= {"objective": field.energy(norm).total, "error": error(run, field, folder)}
+    return facts | {"off": float(np.degrees(field.shape.mean_deviation))} | told
+
+
+def _field(run: Run, instance: Instance) -> Found:
+    if run.way == "prove" and run.part == "quality":
+        return _proven(run, instance)
+    if run.way.startswith(PERTURBED):
+        return perturbed(instance, float(run.way.split()[1]), run.seed), {}
+    if run.way in PLAIN:
+        return PLAIN[run.way](instance), {}
+    if run.way == "search":
+        return cf.search(instance, seconds=run.limit, jobs=1, seed=run.seed).field, {}
+    return _by_method(run, instance)
+
+
+def _proven(run: Run, instance: Instance) -> Found:
+    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, seconds=run.limit, jobs=1)
+    return proof.field, {"status": proof.status, "bound": proof.bound, "note": proof.ended}
+
+
+def _by_method(run: Run, instance: Instance) -> Found:
+    """The last field of a method of the table."""
+    with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
+        request = Request(instance, Path(folder), cf.Limits(run.limit, threads=1))
+        *_, found = METHODS[run.way].find(request)
+    if found.proof is not None:
+        return found.field, {"status": found.proof.status, "bound": found.proof.bound}
+    return found.field, {}
+
+
+def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
+    """A local optimum near the greedy field: random crosses at some pixels, best jumps, then best angles."""
+    field, rng = cf.greedy(instance), np.random.default_rng([3, seed])
+    chosen = rng.random(instance.grid.size) < share
+    alpha = np.where(chosen, rng.uniform(0, np.pi, instance.grid.size), field.alpha)
+    moved = relabelled(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
+    return fitted(moved.with_best_jumps())
+
+
+PLAIN: Final[dict[str, Callable[[Instance], CrossField]]] = {
+    "greedy": cf.greedy,
+    "improved": lambda instance: cf.improved(cf.greedy(instance)),
+    "power": lambda instance: fitted(cf.power_field(instance)),
+    "polyvector": lambda instance: fitted(cf.polyvector_field(instance)),
+    "bend": lambda instance: cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS))),
+}
+"""Ways without a time limit."""

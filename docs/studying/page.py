@@ -1,0 +1,144 @@
+"""docs/study.md from the rows: answers first, then the parts, then what may be wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from crossfield.export.solvers_table import PROGRAMS
+from make import said
+
+from . import errors, practice_page, quality_page, solver_page
+from .instances import surfaces
+from .plan import Plan, stages
+from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
+from .rows import read as read_rows
+from .solver_page import percent
+from .words import QUESTION, ROWS, THREATS
+
+Kept = dict[str, list[Row]]
+COMMAND: Final = "python docs/study.py --page"
+
+
+def counted(text: str) -> dict[str, int]:
+    """From how many rows of each part a page was made, by what it says at its end."""
+    said = text.rstrip().rpartition("from the first ")[2].rstrip(".")
+    return {part: int(count) for count, part in (each.split() for each in said.split(", "))}
+
+
+def read(data: Path) -> Kept:
+    """The rows of all parts; a study may be adding others meanwhile."""
+    files = {part: data / f"{part}.csv" for part in PARTS}
+    return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
+
+
+def completeness(kept: Kept, plan: Plan) -> str:
+    """How much of the plan has been done."""
+    planned = [run for stage in stages(plan, None) for run in stage.runs]
+    done = {key_of(row) for rows in kept.values() for row in rows}
+    skipped = {key_of(row) for row in kept["solvers"] if row["status"] == NOT_RUN}
+    have = sum(run.key in done for run in planned)
+    left_out = sum((run.key[0], EVERY, *run.key[2:]) in skipped and run.key not in done for run in planned)
+    rest = len(planned) - have - left_out
+    text = f"Of {len(planned):,} planned runs {have:,} are done and {left_out:,} left out by the rule below"
+    return f"{text}; the study is complete." if not rest else (
+        f"{text}; **{rest:,} are still to come**, and all that is said here is said of those that are done. "
+        "`python docs/study.py` goes on with them."
+    )  # fmt: skip
+
+
+def answers(kept: Kept) -> str:
+    """The answers in plain words."""
+    parts = [("Can they be solved?", solvable(kept)), ("Does it matter?", matters(kept)),
+             ("What to use?", " ".join(practice_page.recommendation(kept)))]  # fmt: skip
+    return "\n\n".join(f"**{question}** {answer}" for question, answer in parts)
+
+
+def solvable(kept: Kept) -> str:
+    """How far solvers get, and how far `prove` does."""
+    found = solver_page.facts_in_short(kept)
+    standing, own = found["standing"], found["prove"][2]
+    if not standing:
+        return "Not measured yet."
+    free = {pair: of for pair, of in standing.items() if pair[0] != solver_page.JUMPS_GIVEN}
+    parts = []
+    for size in sorted({size for of in free.values() for size in of}):
+        ran = {pair: of[size] for pair, of in free.items() if size in of and of[size].tried}
+        if ran:
+            pair, rung = max(ran.items(), key=lambda each: (each[1].share, -each[1].seconds))
+            parts.append(f"{rung.proven} of {len(rung.runs)} at {size} pixels ({solver_page.label(pair)})")
+    ours = [f"{own[size].proven} of {len(own[size].runs)} at {size}" for size in sorted(own)]
+    reach = found["reach"]
+    last = max((size for of in free.values() for size, rung in of.items() if rung.tried), default=0)
+    if reach is None:
+        text = "No solver proves half of the instances of any size."
+    elif reach[0] == last:
+        text = f"Half of the instances or more at every size that is measured, up to {last} pixels a side."
+    else:
+        text = f"Only on small grids: {reach[0]} pixels a side is the most of which a solver proves half."
+    return (
+        f"{text} From a file, the best pair of formulation and solver proves {', '.join(parts)}. `prove`, "
+        f"which uses what is special about the problem, proves {', '.join(ours)}."
+    )
+
+
+def matters(kept: Kept) -> str:
+    """What the optimum does to the error, and what does more."""
+    found = quality_page.changes(kept["quality"], surfaces=False)
+    optimum = found["optimum"]
+    if optimum is None:
+        return "Not measured yet."
+    before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
+    mean = percent(float(np.mean(before or [0.0])))
+    if not optimum.sure:
+        verdict = "No: the error to hidden curves does not change beyond chance"
+    else:
+        verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error to hidden curves changes"
+    text = (
+        f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
+        "on average, to the best field that is found."
+    )
+    text = " ".join(filter(None, (text, quality_page.harmless(kept["quality"]))))
+    sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
+    if sure:
+        most = sorted(sure, key=lambda name: sure[name].mean)[:3]
+        words = "; ".join(f"{quality_page.CHANGES[name][0]} ({sure[name]})" for name in most)
+        return f"{text} What lowers the error to hidden curves, in degrees: {words}."
+    return f"{text} Nothing that was tried lowers the error to hidden curves beyond chance."
+
+
+def threats(kept: Kept) -> str:
+    """What may be wrong, with the editions and the machine."""
+    free = [f"{p.title}: {p.free}" for p in PROGRAMS.values() if p.free]
+    rows = [row for part in kept.values() for row in part if row["machine"]]
+    machines = ", ".join(sorted({row["machine"] for row in rows}))
+    loads = [row["load"] for row in rows] or [0.0]
+    machine = (
+        f"{machines}; load average while measuring {min(loads):.1f} to {max(loads):.1f}, "
+        f"{float(np.median(loads)):.1f} in the median. Other work ran beside, and seconds are too many by "
+        "what it took."
+    )
+    fields = [row for part in ("quality", "practice") for row in kept[part]]
+    known = {row["instance"] for row in fields if row["instance"] in surfaces()}
+    drawings = {row["instance"] for row in fields} - known
+    return THREATS.format(
+        drawings=len(drawings), surfaces=len(known), free="; ".join(free) + ".", machine=machine
+    )
+
+
+def page(kept: Kept, plan: Plan) -> str:
+    """The text of the page."""
+    parts = ["# Of what practical use?", said(COMMAND), QUESTION, answers(kept), completeness(kept, plan)]
+    parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
+    counts = ", ".join(f"{len(rows)} {part}" for part, rows in kept.items())
+    parts += [threats(kept).rstrip(), f"{ROWS} This page is made from the first {counts}."]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def write_page(data: Path, target: Path, plan: Plan) -> None:
+    """Make study.md in a folder, and its plots in the folder `pictures` there."""
+    kept = read(data)
+    for part in (solver_page, quality_page, practice_page):
+        part.draw(kept, target / "pictures")
+    (target / "study.md").write_text(page(kept, plan))

@@ -1,0 +1,173 @@
+"""All runs of the study, in the order in which a partial result is most useful."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+
+from .fields import MOST_CURVES, PERTURBED, PLAIN, SHARES
+from .instances import curves, drawings, rung, surfaces
+from .rows import Run
+from .solving import ANGLES, PROOF, PROOF_SECONDS, pairs
+
+FEWEST_PROVEN: Final = 0.1
+"""Share of a rung that a pair has to prove, to be run on the next one."""
+VARIANTS: Final = (
+    *(("milp-mccormick", solver, {"start": "greedy"}) for solver in ("highs", "scip", "cplex", "xpress")),
+    *(("miqp-exact", solver, {"start": "greedy"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
+    *(("milp-mccormick", solver, {"facet": "printed"}) for solver in ("highs", "scip", "cplex", "xpress")),
+    *(("miqp-mccormick", solver, {"facet": "printed"}) for solver in ("scip", "cplex")),
+    *(("miqp-exact", solver, {"windows": "proof"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
+    *(("minlp-cubic", solver, {"windows": "proof"}) for solver in ("scip", "gurobi")),
+)
+"""What is measured beside the cold runs: formulation, solver, and what differs."""
+WEIGHTS: Final = (1.0, 5.0, 80.0)
+"""Of the strokes, beside the default."""
+SKEWS: Final = (1e-4, 1e-2, 1.0)
+"""Weights of the skew, beside the default."""
+NOISE: Final = ((0.0, (0,)), (3.0, (0, 1, 2, 3)), (8.0, (0, 1, 2, 3)))
+"""Degrees of noise on the strokes of a surface, and seeds."""
+SEEDS: Final = (0, 1)
+"""Of perturbed fields."""
+SEARCHES: Final = (1.0, 3.0)
+"""Seconds of searches in the part about quality."""
+METHODS_TIMED: Final = ("search", "patches", "two-stage", "prove")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is measured: sizes, and how many of everything; seconds of a run by part."""
+
+    rungs: tuple[int, ...] = (4, 6, 8, 12, 16, 24)
+    instances: int = 30
+    limit: float = 6.0
+    proof: float = PROOF_SECONDS
+    quality: tuple[int, ...] = (24, 32)
+    quality_limit: float = 10.0
+    practice: tuple[int, ...] = (24, 48, 128, 256)
+    practice_limit: float = 10.0
+    quick_search: float = 1.0
+    hidden: int = 3
+    curves: int = MOST_CURVES
+    most: int = 99
+
+
+FULL: Final = Plan()
+QUICK: Final = Plan(
+    rungs=(4,), instances=2, limit=1.0, proof=5.0, quality=(16,), quality_limit=2.0, practice=(16, 24),
+    practice_limit=2.0, quick_search=0.5, hidden=1, curves=1, most=1,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Runs that may be done in any order; after: the rung whose proofs decide who is run, 0 for none."""
+
+    name: str
+    runs: tuple[Run, ...]
+    after: int = 0
+
+
+def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
+    """All of the plan: proofs first, small rungs before large ones, parts in turn; variants a rung later."""
+    rungs, practice, quality = (dict(enumerate(each)) for each in (plan.rungs, plan.practice, plan.quality))
+    for number in range(max(len(rungs) + 1, len(practice), len(quality))):
+        before = rungs.get(number - 1, 0)
+        if number in rungs:
+            size = rungs[number]
+            yield Stage(f"proofs {size}", tuple(proofs(plan, size)))
+            yield Stage(f"solvers {size}", tuple(cold(plan, size)), before)
+        if number in practice:
+            yield Stage(f"practice {practice[number]}", tuple(ways(plan, practice[number], folder)))
+        if number in quality:
+            yield Stage(f"quality {quality[number]}", tuple(qualities(plan, quality[number], folder)))
+        if number == 1:
+            yield Stage("weights", tuple(weights(plan, plan.quality[0], folder)))
+        if before:
+            yield Stage(f"variants {before}", tuple(variants(plan, before)), rungs.get(number - 2, 0))
+
+
+def proofs(plan: Plan, size: int) -> Iterator[Run]:
+    """The optima of a rung, in both norms and for the jumps of greedy fields."""
+    for name in rung(size)[: plan.instances]:
+        for norm in (2, 1):
+            yield Run("proofs", name, size, PROOF, norm=norm, limit=plan.proof)
+        yield Run("proofs", name, size, ANGLES)
+
+
+def cold(plan: Plan, size: int) -> Iterator[Run]:
+    """Every pair of formulation and solver on a rung, instance by instance."""
+    for name in rung(size)[: plan.instances]:
+        for formulation, solver in pairs():
+            yield Run("solvers", name, size, formulation, solver, limit=plan.limit)
+
+
+def variants(plan: Plan, size: int) -> Iterator[Run]:
+    """The variants on a rung, instance by instance, so that a certificate serves all of them."""
+    for name in rung(size)[: plan.instances]:
+        for formulation, solver, options in VARIANTS:
+            if (formulation, solver) in pairs():
+                yield Run("solvers", name, size, formulation, solver, limit=plan.limit, **options)
+
+
+def ways(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+    """Every way to a field of every drawing, whole and without one curve after the other."""
+    timed = [("search", plan.quick_search), *((name, plan.practice_limit) for name in METHODS_TIMED)]
+    plain = [(name, 0.0) for name in PLAIN if name != "improved"]
+    for curve in range(-1, plan.hidden):
+        for name in drawings(folder)[: plan.most]:
+            if curve < len(curves(name, size, MOST_CURVES, folder)):
+                for way, limit in (*plain, *timed):
+                    yield _default("practice", name, size, way, hidden=curve, limit=limit)
+
+
+def qualities(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+    """Fields of all qualities, of drawings without a curve and of surfaces."""
+    for name, given in _instances(plan, size, folder):
+        for way in PLAIN:
+            yield _default("quality", name, size, way, **given)
+        for share in SHARES if "hidden" in given else ():
+            for seed in SEEDS:
+                yield _default("quality", name, size, f"{PERTURBED} {share}", **given, seed=seed)
+        for limit in dict.fromkeys(min(each, plan.quality_limit) for each in SEARCHES):
+            yield _default("quality", name, size, "search", **given, limit=limit)
+        for norm in (2, 1):
+            yield _default("quality", name, size, PROOF, **given, norm=norm, limit=plan.quality_limit)
+
+
+def weights(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
+    """Greedy and best fields under other weights."""
+    for name, given in _instances(plan, size, folder):
+        for strokes, skew in (
+            *((each, SKEW_WEIGHT) for each in WEIGHTS),
+            *((STROKE_WEIGHT, each) for each in SKEWS),
+        ):
+            for way, limit in (("greedy", 0.0), (PROOF, plan.quality_limit)):
+                changed = {"w_strokes": strokes, "w_beta": skew, "limit": limit}
+                yield _default("quality", name, size, way, **given | changed)
+
+
+def _instances(plan: Plan, size: int, folder: Path | None) -> Iterator[tuple[str, dict[str, float]]]:
+    """Drawings with what hides a curve, curve by curve; then surfaces with their noise."""
+    for curve in range(plan.curves):
+        for name in drawings(folder)[: plan.most]:
+            if curve < len(curves(name, size, MOST_CURVES, folder)):
+                yield name, {"hidden": curve}
+    for degrees, seeds in NOISE:
+        for seed in seeds[: plan.most]:
+            for name in surfaces()[: plan.most]:
+                yield name, {"noise": degrees, "seed": seed}
+
+
+def _default(part: str, name: str, size: int, way: str, **given: float) -> Run:
+    """A run under the default weights, where no others are given."""
+    return Run(part, name, size, way, **{"w_strokes": STROKE_WEIGHT, "w_beta": SKEW_WEIGHT} | given)  # type: ignore[arg-type]
+
+
+def expected(run: Run) -> float:
+    """The most seconds that a run takes, but for reading and writing."""
+    return run.limit

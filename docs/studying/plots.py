@@ -1,0 +1,175 @@
+"""The plots of the study: SVG, the same for the same rows, in colours that the colour-blind tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import cycle
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from .errors import medians
+
+mpl.use("svg")
+
+INK: Final = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Okabe and Ito, without the yellow, which is no ink on white paper."""
+MARKS: Final = ("o", "s", "^", "D", "v", "P", "X", "*", "h")
+DASHES: Final = ("-", "--", ":", "-.")
+OURS: Final = "crossfield prove"
+"""How the names of lines begin that are drawn thicker."""
+_STYLE: Final = {
+    "svg.hashsalt": "crossfield",
+    "svg.fonttype": "path",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "axes.axisbelow": True,
+}
+Line = tuple[list[float], list[float]]
+Bars = tuple[list[float], list[float], list[float]]
+"""Values, means and standard errors."""
+
+
+@contextmanager
+def drawn(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
+    """The axes of panels side by side; afterwards they are in the file."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(wide, high), layout="constrained")
+        figure.get_layout_engine().set(w_pad=0.1)
+        yield np.atleast_1d(figure.subplots(1, panels))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, metadata={"Date": None, "Creator": None})
+
+
+def styles(names: list[str]) -> dict[str, dict[str, Any]]:
+    """A style for each name: colour, marker and dash all differ between neighbours."""
+    looks = zip(cycle(INK), cycle(MARKS), cycle(DASHES), strict=False)
+    return {
+        name: {"color": ink, "marker": mark, "linestyle": dash, "markersize": 5, "linewidth": 1.6}
+        for name, (ink, mark, dash) in zip(names, looks, strict=False)
+    }
+
+
+def _thick(name: str) -> dict[str, float]:
+    return {"linewidth": 2.6} if name.startswith(OURS) else {}
+
+
+def profiles(path: Path, panels: dict[str, dict[str, Any]]) -> None:
+    """Performance profiles: of each panel the sorted ratios of every line."""
+    with drawn(path, len(panels), high=4.9) as axes:
+        for axis, (title, lines) in zip(axes, panels.items(), strict=True):
+            looks = styles(list(lines))
+            top = max((r[np.isfinite(r)].max(initial=1.0) for r in lines.values()), default=1.0) * 1.3
+            for name, ratios in lines.items():
+                solved = ratios[np.isfinite(ratios)]
+                x = np.concatenate([[1.0], solved, [top]])
+                y = np.concatenate([[(solved <= 1).sum()], np.arange(1, len(solved) + 1), [len(solved)]])
+                look = looks[name] | {"markevery": 0.18, "markersize": 4}
+                look |= _thick(name)
+                axis.step(x, 100 * y / max(len(ratios), 1), where="post", label=name, **look)
+            axis.set(title=title, xscale="log", xlim=(1, top), ylim=(-2, 102))
+            axis.set_xlabel("seconds, as a multiple of the quickest")
+            axis.xaxis.set_major_formatter("{x:g}")
+            axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=1)
+        axes[0].set_ylabel("instances proven, %")
+
+
+def growth(path: Path, rungs: list[int], share: dict[str, Line], seconds: dict[str, Line]) -> None:
+    """Share that is proven, and seconds, by size; a line for each formulation at its best solver."""
+    with drawn(path, 2, high=3.8) as (left, right):
+        looks = styles(list(share))
+        for name, (x, y) in share.items():
+            left.plot(x, y, label=name, **looks[name] | _thick(name))
+        for name, (x, y) in seconds.items():
+            right.plot(x, y, label=name, **looks[name] | _thick(name))
+        for axis in (left, right):
+            axis.set(xscale="log", xlabel="pixels of the longer side")
+            axis.set_xticks(rungs, [str(rung) for rung in rungs])
+            axis.minorticks_off()
+        left.set(ylabel="instances proven, %", ylim=(-3, 103))
+        right.set(ylabel="seconds, shifted geometric mean", yscale="log")
+        right.yaxis.set_major_formatter("{x:g}")
+        right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
+    """Error beside the gap to the optimum: points by kind of field, and medians of bins."""
+    with drawn(path, len(panels), high=3.8) as axes:
+        names = list(dict.fromkeys(name for kinds in panels.values() for name in kinds))
+        looks = styles(names)
+        for axis, (title, kinds) in zip(axes, panels.items(), strict=True):
+            for name, (x, y) in kinds.items():
+                look = {"color": looks[name]["color"], "marker": looks[name]["marker"]}
+                axis.scatter(np.maximum(x, _ZERO), y, s=16, alpha=0.6, linewidths=0, label=name, **look)
+            x, y = (np.concatenate([np.array(each[i]) for each in kinds.values()] or [[]]) for i in (0, 1))
+            centre, middle = medians(x / 100, y)
+            axis.plot(
+                np.maximum(100 * np.array(centre), _ZERO),
+                middle,
+                color="#000000",
+                linewidth=2.2,
+                label="median of bins",
+            )
+            axis.set(title=title, xscale="log", xlabel="energy above the proven optimum, %")
+            axis.axhline(0, color="#888888", linewidth=0.8)
+            axis.set_xlim(_ZERO / 1.5, max(1.5 * x.max(initial=0.0), 100))
+            ticks = [tick for tick in (0.1, 1, 10, 100, 1000, 10000) if tick <= axis.get_xlim()[1]]
+            axis.set_xticks([_ZERO, *ticks], ["0", *(f"{tick:g}" for tick in ticks)])
+            axis.minorticks_off()
+        axes[0].set_ylabel("error less that of the optimum, degrees")
+        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+_ZERO: Final = 0.01
+"""Percent: where what is less is drawn."""
+
+
+def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
+    """Mean error by weight, with standard errors over drawings; panels have the names of the weights."""
+    with drawn(path, len(panels), high=3.2) as axes:
+        for axis, (title, lines) in zip(axes, panels.items(), strict=True):
+            looks = styles(list(lines))
+            for name, (x, y, bar) in lines.items():
+                axis.errorbar(x, y, yerr=bar, capsize=2, label=name, **looks[name])
+            axis.set(xscale="log", xlabel=title, ylim=(0, None))
+            axis.xaxis.set_major_formatter("{x:g}")
+        axes[0].set_ylabel("error, degrees")
+        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float, float]]]) -> None:
+    """Error to hidden curves beside seconds, a panel for each size, a mark for each way."""
+    names = list(dict.fromkeys(name for ways in panels.values() for name in ways))
+    looks = styles(names)
+    with drawn(path, len(panels), high=3.6, wide=11.0) as axes:
+        for axis, (title, ways) in zip(axes, panels.items(), strict=True):
+            for name, (x, y, bar) in ways.items():
+                look = looks[name] | {"linestyle": "none", "markersize": 8}
+                axis.errorbar([x], [y], yerr=[bar], capsize=2, label=name, elinewidth=0.8, **look)
+            axis.set(title=title, xscale="log", xlabel="seconds, median", xlim=(3e-3, 60))
+            axis.xaxis.set_major_formatter("{x:g}")
+        low = min((y - bar for ways in panels.values() for _, y, bar in ways.values()), default=0)
+        high = max((y + bar for ways in panels.values() for _, y, bar in ways.values()), default=1)
+        for axis in axes:
+            axis.set_ylim(low - 1, high + 1)
+        axes[0].set_ylabel("error to hidden curves, degrees")
+        axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _all_of(axes: Any) -> tuple[list[Any], list[str]]:
+    """The legend of all panels, each name once."""
+    found: dict[str, Any] = {}
+    for axis in axes:
+        for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    return list(found.values()), list(found)

@@ -1,0 +1,211 @@
+"""What the page says of the quality of fields: what buys a better one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from make import markdown
+
+from . import errors, plots
+from .errors import Change, Kind, change, is_default, is_surface, usable
+from .rows import Row
+from .solver_page import percent
+from .words import QUALITY_TEXT
+
+Kept = dict[str, list[Row]]
+
+
+def made_by(way: str, *, norm: int = 2, strokes: float = STROKE_WEIGHT, skew: float = SKEW_WEIGHT) -> Kind:
+    """Whether a row is of that way, norm and weights; of several searches, the longest is meant."""
+
+    def is_it(row: Row) -> bool:
+        same = (row["w_strokes"], row["w_beta"], row["norm"]) == (strokes, skew, norm)
+        return same and row["way"] == way and not (way == "search" and row["limit"] < _LONGER)
+
+    return is_it
+
+
+_LONGER: Final = 2.0
+NEAR: Final = 0.2
+"""Gap up to which a field is near the optimum."""
+
+CHANGES: Final[dict[str, tuple[str, Kind, Kind]]] = {
+    "improve": ("greedy, then improved", made_by("greedy"), made_by("improved")),
+    "search": ("greedy, then the search of 3 s", made_by("greedy"), made_by("search")),
+    "optimum": ("greedy, then the best that `prove` finds", made_by("greedy"), made_by("prove")),
+    "norm": ("the best in the 2-norm, then in the 1-norm", made_by("prove"), made_by("prove", norm=1)),
+    "strokes": (
+        "the best at weight 1 of the strokes, then 20", made_by("prove", strokes=1.0), made_by("prove"),
+    ),
+    "strokes greedy": (
+        "greedy at weight 1 of the strokes, then 20", made_by("greedy", strokes=1.0), made_by("greedy"),
+    ),
+    "more strokes": (
+        "the best at weight 20 of the strokes, then 80", made_by("prove"), made_by("prove", strokes=80.0),
+    ),
+    "skew": ("the best at weight 1e-6 of the skew, then 1", made_by("prove"), made_by("prove", skew=1.0)),
+    "power": ("greedy, then the power field", made_by("greedy"), made_by("power")),
+    "polyvector": ("greedy, then the PolyVector field", made_by("greedy"), made_by("polyvector")),
+    "bend": ("greedy, then the bend field", made_by("greedy"), made_by("bend")),
+}  # fmt: skip
+"""What may buy a better field: in words, before, after."""
+
+
+def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
+    """What each change does to the error, of drawings or of surfaces."""
+    chosen = [row for row in usable(rows) if is_surface(row) == surfaces]
+    return {name: change(chosen, before, after) for name, (_, before, after) in CHANGES.items()}
+
+
+def changes_table(rows: list[Row]) -> str:
+    """All changes, for hidden curves and surfaces; those beyond two standard errors are bold."""
+    drawn, known = changes(rows, surfaces=False), changes(rows, surfaces=True)
+    cells = [[words, _told(drawn[name]), _told(known[name])] for name, (words, *_) in CHANGES.items()]
+    cells = [line for line in cells if any(line[1:])]
+    return markdown(("change", "hidden curves, degrees", "surfaces, degrees"), cells)
+
+
+def _told(found: Change | None) -> str:
+    if found is None:
+        return ""
+    text = f"{found} ({found.pairs} pairs)"
+    return f"**{text}**" if found.sure else text
+
+
+def kind_of(row: Row) -> str:
+    """What a field is called in the plot."""
+    if row["way"] == "prove":
+        return f"best, {row['norm']:.0f}-norm"
+    return "perturbed" if row["way"].startswith("perturbed") else str(row["way"])
+
+
+def ways_table(rows: list[Row]) -> str:
+    """Gap and error of every kind of field under default weights."""
+    found = errors.gaps(rows)
+    cells = []
+    for kind in dict.fromkeys(kind_of(row) for row, _ in found):
+        mine = [(row, gap) for row, gap in found if kind_of(row) == kind]
+        line = [kind, str(len(mine)), percent(float(np.median([gap for _, gap in mine])))]
+        for surfaces in (False, True):
+            part = [row for row, _ in mine if is_surface(row) == surfaces]
+            mean = errors.mean_by_drawing(part, lambda row: row["error"])
+            line.append(
+                "" if mean is None else f"{mean.mean:.1f}" + (f" +- {mean.error:.1f}" if mean.error else "")
+            )
+        cells.append(line)
+    heads = (
+        "field",
+        "fields",
+        "energy above the optimum, median",
+        "hidden curves, degrees",
+        "surfaces, degrees",
+    )
+    return markdown(heads, cells)
+
+
+def proven_text(rows: list[Row]) -> str:
+    """Of how many instances the optimum is known."""
+    best = errors.best_energies([row for row in usable(rows) if is_default(row)])
+    closed = sum(proven for _, proven in best.values())
+    return (
+        f"`prove` closes {closed} of the {len(best)} instances to {100 * errors.CLOSE:g} % within the time; "
+        "plot and table are of these."
+    )
+
+
+def correlation_text(rows: list[Row]) -> str:
+    """How energy and error go together within an instance."""
+    parts = []
+    for surfaces, words in ((False, "drawings"), (True, "surfaces")):
+        for most, which in ((np.inf, "all fields"), (NEAR, f"those within {percent(NEAR)} of the optimum")):
+            mine = [(r, gap) for r, gap in errors.gaps(rows) if is_surface(r) == surfaces and gap <= most]
+            found = errors.correlation(mine)
+            if found is not None and found.error is not None:
+                parts.append(f"{found.mean:+.2f} +- {found.error:.2f} over {found.count} {words}, {which}")
+    return (
+        "Rank correlation of energy and error between the fields of one instance, 1 where less energy always "
+        f"means less error: {'; '.join(parts)}."
+        if parts
+        else ""
+    )
+
+
+def harmless(rows: list[Row]) -> str:
+    """From which gap on fields of drawings are worse than the optimum, in words."""
+    found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
+    gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
+    harmed = [place for place, each in enumerate(more) if each > HARM]
+    if not gap:
+        return ""
+    if not harmed:
+        return (
+            f"In no bin up to {percent(max(gap))} above the optimum are fields worse than it by more than "
+            f"{HARM:g} degrees in the median."
+        )
+    first = harmed[0]
+    before = f", and not yet at {percent(gap[first - 1])}" if first else ""
+    return (
+        f"Fields are worse than the optimum by more than {HARM:g} degrees, in the median of bins, from some "
+        f"{percent(gap[first])} above its energy on{before}."
+    )
+
+
+HARM: Final = 0.5
+"""Degrees by which a field is worse."""
+
+
+def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:
+    """Error by one of the weights: greedy and best field, drawings and surfaces, those with all weights."""
+    other, usual = ("w_beta", SKEW_WEIGHT) if which == "w_strokes" else ("w_strokes", STROKE_WEIGHT)
+    found = {}
+    for surfaces, words in ((False, "hidden curves"), (True, "surfaces")):
+        for way, name in (("greedy", "greedy"), ("prove", "best")):
+            mine = [r for r in usable(rows) if r["way"] == way and r["norm"] == 2 and r[other] == usual]
+            mine = [r for r in mine if is_surface(r) == surfaces]
+            values = sorted({row[which] for row in mine})
+            have = [{errors.case_of(r) for r in mine if r[which] == value} for value in values]
+            common = set.intersection(*have) if have else set()
+            line: plots.Bars = ([], [], [])
+            for value in values:
+                part = [r for r in mine if r[which] == value and errors.case_of(r) in common]
+                mean = errors.mean_by_drawing(part, lambda row: row["error"])
+                if mean is not None:
+                    for kept, number in zip(line, (value, mean.mean, mean.error or 0.0), strict=True):
+                        kept.append(number)
+            if len(line[0]) > 1:
+                found[f"{name}, {words}"] = line
+    return found
+
+
+def draw(kept: Kept, pictures: Path) -> None:
+    """The plots of this part."""
+    found = errors.differences(errors.gaps(kept["quality"]))
+    panels: dict[str, dict[str, plots.Line]] = {}
+    for surfaces, title in ((False, "hidden curves of drawings"), (True, "surfaces with a known answer")):
+        panels[title] = {}
+        for kind in dict.fromkeys(kind_of(each[0]) for each in found):
+            mine = [each for each in found if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
+            panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
+    plots.error_by_gap(pictures / "study_quality.svg", panels)
+    lines = {name: weight_lines(kept["quality"], name) for name in ("w_strokes", "w_beta")}
+    titles = {"w_strokes": "weight of the strokes", "w_beta": "weight of the skew"}
+    plots.error_by_weight(
+        pictures / "study_weights.svg", {titles[name]: each for name, each in lines.items()}
+    )
+
+
+def section(kept: Kept) -> list[str]:
+    """The part of the page."""
+    rows = kept["quality"]
+    if not rows:
+        return [QUALITY_TEXT["head"], "Not measured yet."]
+    weights = (
+        QUALITY_TEXT["weights"] if weight_lines(rows, "w_strokes") else "Other weights: not measured yet."
+    )
+    return [
+        QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"], harmless(rows),
+        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), weights,
+    ]  # fmt: skip

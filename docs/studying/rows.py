@@ -1,0 +1,146 @@
+"""A run and its row, and the CSV files that rows are appended to.
+
+A row is one line, flushed to the disk before the next run is handed out. What a kill leaves of a line is cut
+off when the file is read again, and that run is done again.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Final
+
+PARTS: Final = ("proofs", "solvers", "quality", "practice")
+"""One file each."""
+NOT_RUN: Final = "not run"
+"""Status of a row that stands for all runs of a rung which a rule leaves out."""
+EVERY: Final = "*"
+"""The instance of such a row."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is done: one field from one instance.
+
+    instance: what makes it (studying/instances.py). hidden: the curve that is hidden, -1 for none. noise:
+    standard deviation in degrees of what is added to each stroke. way: formulation, or method. start: `cold`
+    or `greedy`. facet: `hull` or `printed`. windows: `gauge`, or `proof` for those that a certificate leaves.
+    norm: of the energy, where the way has a choice. limit: seconds.
+    """
+
+    part: str
+    instance: str
+    size: int
+    way: str
+    solver: str = ""
+    start: str = "cold"
+    facet: str = "hull"
+    windows: str = "gauge"
+    norm: int = 2
+    w_strokes: float = 1.0
+    w_beta: float = 1e-6
+    hidden: int = -1
+    noise: float = 0.0
+    limit: float = 0.0
+    seed: int = 0
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What tells it from all others, as text."""
+        return tuple(text(getattr(self, field.name)) for field in fields(self))
+
+
+ASKED: Final = tuple(field.name for field in fields(Run))
+FOUND: Final = (
+    "version", "format", "status", "objective", "bound", "energy_2", "energy_1", "violation", "error",
+    "off", "seconds", "nodes", "pixels", "pairs", "columns", "rows", "note", "machine", "load",
+)  # fmt: skip
+"""What a run finds. error: degrees to the hidden curve or the true field; off: to the strokes shown."""
+COLUMNS: Final = ASKED + FOUND
+NUMBERS: Final = frozenset(
+    {"size", "norm", "w_strokes", "w_beta", "hidden", "noise", "limit", "seed", "objective", "bound"}
+    | {"energy_2", "energy_1", "violation", "error", "off", "seconds", "nodes", "pixels", "pairs"}
+    | {"columns", "rows", "load"}
+)
+Row = dict[str, Any]
+
+
+def text(value: Any) -> str:
+    """A value as it stands in a file: eleven digits of a number, nothing for None."""
+    if value is None:
+        return ""
+    return f"{value:.11g}" if isinstance(value, float) else " ".join(str(value).split())
+
+
+def number(given: str) -> float | None:
+    """A number of a file; None for none."""
+    return float(given) if given else None
+
+
+class Table:
+    """The rows of a part, in a file that grows by whole lines."""
+
+    def __init__(self, path: Path) -> None:
+        """Read what is there, after cutting off what is no whole line."""
+        self._path = path
+        self.rows: list[Row] = []
+        if path.exists():
+            self._mend()
+            self.rows = list(read(path))
+        self.done = {key_of(row) for row in self.rows}
+
+    def _mend(self) -> None:
+        data = self._path.read_bytes()
+        whole = data.rfind(b"\n") + 1
+        if whole < len(data):
+            with self._path.open("r+b") as file:
+                file.truncate(whole)
+
+    def append(self, run: Run, found: dict[str, Any]) -> None:
+        """Add the row of a run; it is on the disk afterwards."""
+        if run.key in self.done:
+            raise ValueError(f"{run} has a row already")
+        fresh = not self._path.exists() or not self._path.stat().st_size
+        line = [text(getattr(run, name)) for name in ASKED] + [text(found.get(name)) for name in FOUND]
+        with self._path.open("a", newline="", encoding="utf-8") as file:
+            file.write((_line(COLUMNS) if fresh else "") + _line(line))
+            file.flush()
+            os.fsync(file.fileno())
+        self.done.add(run.key)
+        self.rows.append(typed(dict(zip(COLUMNS, line, strict=True))))
+
+
+def _line(cells: tuple[str, ...] | list[str]) -> str:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerow(cells)
+    return buffer.getvalue()
+
+
+def read(path: Path) -> Iterator[Row]:
+    """The rows of a file, numbers as numbers; a last line without an end is not looked at."""
+    whole = path.read_bytes().rpartition(b"\n")[0].decode()
+    head, *lines = csv.reader(io.StringIO(whole, newline="")) if whole else [COLUMNS]
+    if tuple(head) != COLUMNS:
+        raise ValueError(f"{path.name} has other columns than this study; move it away")
+    for line in lines:
+        yield typed(dict(zip(COLUMNS, line, strict=True)))
+
+
+def typed(given: dict[str, str]) -> Row:
+    """A row with its numbers as numbers."""
+    return {name: number(value) if name in NUMBERS else value for name, value in given.items()}
+
+
+def key_of(row: Row) -> tuple[str, ...]:
+    """The key of the run of a row."""
+    return tuple(text(row[name]) for name in ASKED)
+
+
+def tables(folder: Path) -> dict[str, Table]:
+    """The table of every part in a folder, made where it is missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return {part: Table(folder / f"{part}.csv") for part in PARTS}

@@ -1,0 +1,372 @@
+"""What the page says of formulations and solvers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from crossfield.export.solvers_table import SOLVERS
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from make import markdown
+
+from . import facts, plots
+from .rows import EVERY, NOT_RUN, Row
+from .solving import FAILED, JUMPS_GIVEN, TOO_LARGE
+from .words import SOLVERS_TEXT
+
+HALF: Final = 0.5
+LINES: Final = 7  # of a panel of profiles, the best ones
+Kept = dict[str, list[Row]]
+Pair = tuple[str, str]
+
+
+def is_cold(row: Row) -> bool:
+    """Whether it is of a run with nothing but the file as it is."""
+    return (row["start"], row["facet"], row["windows"]) == ("cold", "hull", "gauge")
+
+
+def label(pair: Pair) -> str:
+    """Solver and formulation in words."""
+    return f"{SOLVERS[pair[1]].title}, {pair[0]}"
+
+
+@dataclass(frozen=True)
+class Rung:
+    """What a pair did on a rung. left_out: why it was not run, empty where it was."""
+
+    runs: tuple[Row, ...]
+    left_out: str = ""
+
+    @property
+    def proven(self) -> int:
+        """Number of instances with a proof."""
+        return sum(map(facts.is_proven, self.runs))
+
+    @property
+    def share(self) -> float:
+        """Share of the instances that are proven; nothing of what was not run."""
+        return self.proven / len(self.runs) if self.runs else 0.0
+
+    @property
+    def tried(self) -> list[Row]:
+        """The runs on instances that are not too large for the solver's edition."""
+        return [row for row in self.runs if row["status"] != TOO_LARGE]
+
+    @property
+    def seconds(self) -> float:
+        """Shifted geometric mean of those; what proves nothing counts with its limit."""
+        return facts.shifted_mean(min(facts.spent(row), row["limit"]) for row in self.tried)
+
+    def cell(self) -> str:
+        """Its cell of the table."""
+        if self.left_out:
+            return "-"
+        if not self.runs:
+            return ""
+        large = len(self.runs) - len(self.tried)
+        if not self.tried:
+            return "too large"
+        text = f"{self.proven} of {len(self.tried)}, {self.seconds:.1f} s"
+        return f"{text}; {large} too large" if large else text
+
+
+def rungs_of(rows: Iterable[Row]) -> dict[Pair, dict[int, Rung]]:
+    """What each pair did cold on each rung that has rows."""
+    found: dict[Pair, dict[int, Rung]] = {}
+    for (way, solver, size), group in facts.grouped(rows, "way", "solver", "size").items():
+        runs = tuple(facts.measured(group))
+        why = next((row["note"] for row in group if row["status"] == NOT_RUN), "")
+        found.setdefault((way, solver), {})[int(size)] = Rung(runs, why)
+    return {pair: found[pair] for pair in sorted(found, key=_place)}
+
+
+def _place(pair: Pair) -> tuple[int, int]:
+    """Where a pair stands in the tables of formulations and solvers."""
+    return list(FORMULATIONS).index(pair[0]), list(SOLVERS).index(pair[1])
+
+
+def proof_rungs(proofs: list[Row], norm: int) -> dict[int, Rung]:
+    """The same of `prove`."""
+    chosen = [row for row in proofs if row["way"] == "prove" and row["norm"] == norm]
+    return {int(size): Rung(tuple(rows)) for (size,), rows in facts.grouped(chosen, "size").items()}
+
+
+def rank(of: dict[int, Rung]) -> tuple[int, float]:
+    """What the best of several pairs has most of: proofs, then speed."""
+    return (
+        sum(each.proven for each in of.values()),
+        -sum(each.seconds for each in of.values() if each.tried),
+    )
+
+
+def best_solvers(standing: dict[Pair, dict[int, Rung]]) -> dict[str, Pair]:
+    """Of each formulation the pair that proves most."""
+    return {
+        way: max((pair for pair in standing if pair[0] == way), key=lambda pair: rank(standing[pair]))
+        for way in dict.fromkeys(pair[0] for pair in standing)
+    }
+
+
+def reach(standing: dict[Pair, dict[int, Rung]]) -> tuple[int, Pair] | None:
+    """The largest rung of which a pair with free jumps proves half or more, and the pair."""
+    found = [
+        (size, of[size].share, pair)
+        for pair, of in standing.items()
+        if pair[0] != JUMPS_GIVEN
+        for size in of
+        if of[size].share >= HALF
+    ]
+    if not found:
+        return None
+    size, _, pair = max(found)
+    return size, pair
+
+
+# Tables
+
+
+def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> str:
+    """Proofs and seconds of every pair on every rung."""
+    sizes = sorted({size for of in standing.values() for size in of} | {int(row["size"]) for row in proofs})
+    cells = [
+        [f"`{way}`", SOLVERS[solver].title, *(of[s].cell() if s in of else "" for s in sizes)]
+        for (way, solver), of in standing.items()
+    ]
+    for norm in (2, 1):
+        of = proof_rungs(proofs, norm)
+        cells.append([f"energy, {norm}-norm", "`prove`", *(of[s].cell() if s in of else "" for s in sizes)])
+    return markdown(("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells)
+
+
+def kinds_table(rows: list[Row]) -> str:
+    """Of each kind of instance and problem how many are proven by any solver, by size."""
+    sizes = sorted({int(row["size"]) for row in rows})
+    cells = []
+    for problem in facts.PROBLEMS:
+        for kind in KINDS:
+            mine = [r for r in rows if facts.problem_of(r) == problem and r["instance"].startswith(kind)]
+            line = []
+            for size in sizes:
+                have = {row["instance"] for row in mine if row["size"] == size}
+                done = {row["instance"] for row in mine if row["size"] == size and facts.is_proven(row)}
+                line.append(f"{len(done)} of {len(have)}" if have else "")
+            cells.append([problem, KINDS[kind], *line])
+    return markdown(("problem", "instances", *(f"{size} pixels" for size in sizes)), cells)
+
+
+KINDS: Final = {
+    "whole": "whole samples",
+    "crop": "squares of samples",
+    "lines": "straight strokes at random",
+    "noise": "random directions",
+}
+"""Kinds of instances by the first word of their names."""
+
+
+def open_table(rows: list[Row], known: facts.Optima) -> str:
+    """What pairs leave where they prove nothing: gap, and how far the best point is above the optimum."""
+    cells = []
+    for (way, solver), group in sorted(
+        facts.grouped(rows, "way", "solver").items(), key=lambda each: _place(each[0])
+    ):
+        for size in sorted({row["size"] for row in group}):
+            left = [row for row in group if row["size"] == size and not facts.is_proven(row)]
+            left = [row for row in left if row["status"] not in {TOO_LARGE, FAILED}]
+            if left:
+                over = [share for row in left if (share := facts.above(row, known)) is not None]
+                points = sum(row["objective"] is not None for row in left)
+                above = percent(float(np.median(over))) if over else "-"
+                cells.append(
+                    [
+                        f"`{way}`", SOLVERS[solver].title, f"{size:.0f}", str(len(left)), str(points), above,
+                        f"{100 * float(np.median([facts.gap(row) for row in left])):.0f} %",
+                    ]
+                )  # fmt: skip
+    heads = ("formulation", "solver", "pixels", "not proven", "with a point", "above the optimum", "gap")
+    return markdown(heads, cells)
+
+
+def variants_table(rows: list[Row], known: facts.Optima) -> str:
+    """Variants beside the cold runs of the same pair on the same instances."""
+    cold = {(row["way"], row["solver"], row["instance"], row["size"]): row for row in rows if is_cold(row)}
+    cells = []
+    others = [row for row in rows if not is_cold(row)]
+    for (way, solver, *kind), group in facts.grouped(
+        others, "way", "solver", "start", "facet", "windows"
+    ).items():
+        both = [
+            (cold[key], row)
+            for row in group
+            if (key := (row["way"], row["solver"], row["instance"], row["size"])) in cold
+            and TOO_LARGE not in {row["status"], cold[key]["status"]}
+        ]
+        if both:
+            before, after = (Rung(tuple(each[i] for each in both)) for i in (0, 1))
+            cells.append(
+                [
+                    f"`{way}`", SOLVERS[solver].title, variant(kind), str(len(both)),
+                    f"{before.proven} / {after.proven}", f"{before.seconds:.2f} / {after.seconds:.2f}",
+                    f"{_over(before, known)} / {_over(after, known)}",
+                ]
+            )  # fmt: skip
+    heads = (
+        "formulation", "solver", "variant", "instances", "proven: cold / variant", "s: cold / variant",
+        "above the optimum: cold / variant",
+    )  # fmt: skip
+    return markdown(heads, sorted(cells, key=lambda line: line[2])) if cells else "Not measured yet."
+
+
+def variant(kind: list[str]) -> str:
+    """A variant in words."""
+    start, facet, windows = kind
+    if start != "cold":
+        return "from the greedy field"
+    return "facet (26) as printed" if facet != "hull" else f"windows of a {windows}"
+
+
+def _over(rung: Rung, known: facts.Optima) -> str:
+    shares = [share for row in rung.runs if (share := _signed(row, known)) is not None]
+    return percent(float(np.mean(shares))) if shares else "-"
+
+
+def percent(share: float) -> str:
+    """A share in percent: two digits, or whole percents of what is more than that."""
+    if abs(share) < _NONE:
+        return "0 %"
+    return f"{100 * share:,.0f} %" if abs(share) >= _WHOLE else f"{100 * share:.2g} %"
+
+
+_NONE: Final = 5e-6  # what is less is rounding
+_WHOLE: Final = 0.1
+
+
+def _signed(row: Row, known: facts.Optima) -> float | None:
+    """By which share the objective of a point is above the optimum, below it negative."""
+    key = (facts.problem_of(row), row["instance"], row["size"])
+    if key not in known or row["objective"] is None:
+        return None
+    return float((row["objective"] - known[key][0]) / max(known[key][0], 1e-3))
+
+
+def contradictions_text(rows: list[Row], known: facts.Optima) -> str:
+    """How many claims of optimality there are, and which of all claims cannot be."""
+    claims = [row for row in rows if facts.is_proven(row) and row["facet"] == "hull"]
+    judged = [r for r in claims if (facts.problem_of(r), r["instance"], r["size"]) in known]
+    found = facts.contradictions(rows, known)
+    kinds = Counter((row["solver"], row["way"], what.split(" ")[0]) for row, what in found)
+    said = (
+        f"Of {len(claims):,} optima that solvers claim, {len(judged):,} can be held against what `prove` has "
+        "shown, or against the best point that any solver has of the mixed problem, which `prove` does not "
+        f"know; {len(found)} answers contradict these by more than {facts.WITHIN:g}, relative to 1, or to "
+        "the optimum if that is more."
+    )
+    if not found:
+        return said
+    worst = {(row["solver"], row["way"], what.split(" ")[0]): (row, what) for row, what in found}
+    cells = [
+        [SOLVERS[solver].title, f"`{way}`", str(kinds[solver, way, first]),
+         f"{row['instance']}, {row['size']:.0f} pixels: {what}"]
+        for (solver, way, first), (row, what) in worst.items()
+    ]  # fmt: skip
+    return f"{said}\n\n{markdown(('solver', 'formulation', 'how many', 'one of them'), cells)}"
+
+
+def doubts_text(rows: list[Row]) -> str:
+    """Answers that the check of points and claims did not let pass, and runs that failed."""
+    unsure = Counter((row["solver"], row["way"]) for row in rows if row["status"] == "unknown")
+    failed = Counter((row["solver"], row["way"]) for row in rows if row["status"] == FAILED)
+    parts = [
+        f"{words}: " + ", ".join(f"{label((way, solver))} {n}" for (solver, way), n in sorted(found.items()))
+        for words, found in (
+            ("Answers whose point contradicts what is claimed of it, counted as unproven", unsure),
+            ("Runs that failed", failed),
+        )
+        if found
+    ]
+    return ". ".join(parts) + "." if parts else "No run failed, and no point contradicts what is claimed."
+
+
+# Plots
+
+
+def times_of(rows: list[Row], proofs: list[Row], problem: str) -> facts.Times:
+    """Seconds of the proofs of a problem by the pairs that prove most, and by `prove`."""
+    mine = [row for row in rows if facts.problem_of(row) == problem]
+    standing = rungs_of(mine)
+    chosen = sorted((p for p in standing if rank(standing[p])[0]), key=lambda p: rank(standing[p]))[-LINES:]
+    found: facts.Times = {}
+    cases = {(row["instance"], row["size"]) for row in mine if row["instance"] != EVERY}
+    for pair in reversed(chosen):
+        runs = [row for of in standing[pair].values() for row in of.runs]
+        ran = {(row["instance"], row["size"]): facts.spent(row) for row in runs}
+        skipped = {size for size, of in standing[pair].items() if of.left_out}
+        found[label(pair)] = {case: float("inf") for case in cases if case[1] in skipped} | ran
+    norm = {"2-norm": 2, "1-norm": 1}.get(problem)
+    if norm and found:
+        found[plots.OURS] = {
+            (row["instance"], row["size"]): facts.spent(row)
+            for row in proofs
+            if row["way"] == "prove" and row["norm"] == norm
+        }
+    return found
+
+
+def growth_lines(
+    standing: dict[Pair, dict[int, Rung]], proofs: list[Row]
+) -> tuple[dict[str, plots.Line], dict[str, plots.Line]]:
+    """Share and seconds by size: of each formulation at its best solver, and of `prove`."""
+    of_all = {label(pair): standing[pair] for pair in best_solvers(standing).values()}
+    of_all |= {f"{plots.OURS}, {norm}-norm": proof_rungs(proofs, norm) for norm in (2, 1)}
+    share: dict[str, plots.Line] = {}
+    seconds: dict[str, plots.Line] = {}
+    for name, of in of_all.items():
+        sizes = sorted(of)
+        share[name] = ([float(s) for s in sizes], [100 * of[s].share for s in sizes])
+        ran = [s for s in sizes if of[s].tried]
+        seconds[name] = ([float(s) for s in ran], [max(of[s].seconds, 1e-3) for s in ran])
+    return share, seconds
+
+
+def draw(kept: Kept, pictures: Path) -> None:
+    """The plots of this part."""
+    rows = [row for row in kept["solvers"] if is_cold(row)]
+    panels = {name: facts.ratios(times_of(rows, kept["proofs"], name)) for name in facts.PROBLEMS}
+    del panels["given jumps"]
+    plots.profiles(pictures / "study_profiles.svg", panels)
+    standing = rungs_of(rows)
+    sizes = sorted({size for of in standing.values() for size in of})
+    plots.growth(pictures / "study_growth.svg", sizes, *growth_lines(standing, kept["proofs"]))
+
+
+def section(kept: Kept) -> list[str]:
+    """The part of the page."""
+    rows = kept["solvers"]
+    known = facts.optima(kept["proofs"], facts.measured(rows))
+    cold = [row for row in rows if is_cold(row)]
+    standing = rungs_of(cold)
+    return [
+        SOLVERS_TEXT["head"],
+        proven_table(standing, kept["proofs"]),
+        SOLVERS_TEXT["profiles"],
+        SOLVERS_TEXT["growth"],
+        SOLVERS_TEXT["kinds"],
+        kinds_table(facts.measured(cold)),
+        SOLVERS_TEXT["open"],
+        open_table(facts.measured(cold), known),
+        SOLVERS_TEXT["variants"],
+        variants_table(facts.measured(rows), known),
+        SOLVERS_TEXT["claims"],
+        contradictions_text(facts.measured(rows), known),
+        doubts_text(facts.measured(rows)),
+    ]
+
+
+def facts_in_short(kept: Kept) -> dict[str, Any]:
+    """What the answers at the top need: how far solvers reach, and how far `prove` does."""
+    standing = rungs_of([row for row in kept["solvers"] if is_cold(row)])
+    return {"reach": reach(standing), "standing": standing,
+            "prove": {norm: proof_rungs(kept["proofs"], norm) for norm in (2, 1)}}  # fmt: skip
