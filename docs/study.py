@@ -21,7 +21,7 @@ The plan (studying/plan.py), every run on one thread:
     practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: nine ways to a
               field, 1 s or 10 s for those with a limit
 
-17,400 runs, 27 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
+18,500 runs, 28 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
 leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
 """
 
