@@ -2,7 +2,7 @@
 
 whole NAME    the sample, its longer side as many pixels as the rung
 crop NAME     the square of the rung's size with most stroke pixels in the sample of twice that size, 24
-at least; turned by a quarter for every second sample
+at least; turned by a quarter for every second of SHAPES
 lines SEED    a full square with straight strokes at random
 noise SEED    a full square, half of its pixels with a stroke in a random direction
 """
@@ -21,6 +21,11 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.sketch.tracing import curves_of
 
+SHAPES: Final = (
+    "cylinder_bend", "mouse", "bottle", "saddle", "skew", "singular", "ring",
+    "tilted_cylinder", "torus_patch", "wave_sheet",
+)  # fmt: skip
+"""The samples of the rungs. Named here, because rows are of these whatever samples there will be."""
 RANDOM: Final = 5  # instances of each random kind on a rung
 FEWEST: Final = 3  # stroke pixels of a whole sample on a rung
 SMALLEST: Final = 24  # size of the sample of a crop
@@ -29,9 +34,9 @@ SMALLEST: Final = 24  # size of the sample of a crop
 @cache
 def rung(size: int) -> tuple[str, ...]:
     """The names of the 30 instances of a size; lines stand for samples of which too little is left."""
-    names = [f"whole {name}" for name in SAMPLES if _is_there(name, size)]
-    names += [f"crop {name}" for name in SAMPLES]
-    missing = len(SAMPLES) - sum(name.startswith("whole") for name in names)
+    names = [f"whole {name}" for name in SHAPES if _is_there(name, size)]
+    names += [f"crop {name}" for name in SHAPES]
+    missing = len(SHAPES) - sum(name.startswith("whole") for name in names)
     for seed in range(RANDOM):
         names += [f"lines {seed}", f"noise {seed}"]
     return (*names, *(f"lines {RANDOM + seed}" for seed in range(missing)))
@@ -69,7 +74,7 @@ def crop(name: str, size: int) -> Instance:
     at = whole.stroke_pixels - [row, column]
     kept = ((at >= 0) & (at < [high, wide])).all(axis=1)
     found = Instance(f"crop_{name}", whole.mask[inside], at[kept], whole.theta[kept], whole.w[kept])
-    return found.turned() if list(SAMPLES).index(name) % 2 else found
+    return found.turned() if SHAPES.index(name) % 2 else found
 
 
 def lines(seed: int, size: int) -> Instance:
