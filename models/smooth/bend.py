@@ -24,13 +24,16 @@ from .systems import factored
 _Places = NDArray[np.intp]
 
 HARMONIC: Final = 0.05
-"""Weight of plain smoothness beside bend for strokes that tremble by `TREMBLE`."""
+"""Weight of plain smoothness beside bend for strokes that tremble by `TREMBLE` or more.
+
+A greater one evens out rough strokes further, and leaves too many of them.
+"""
 TREMBLE: Final = np.radians(1.2)
 """About what 3 degrees of noise on each stroke pixel leave between strokes and lines at 48 pixels."""
 HOLD: Final = 0.25
 """Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
 
-_HARMONICS: Final = (0.01, 0.1)  # the first follows clean strokes best, the second evens out rough ones
+_LEAST_HARMONIC: Final = 0.01  # follows clean strokes best
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
 _FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
@@ -52,12 +55,13 @@ def bend_field(start: CrossField, *, harmonic: float | None = None, hold: float 
     Labels are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic.
 
     harmonic: weight of plain smoothness, above 0; None: as the strokes tremble in the field of `HARMONIC`,
-    that weight times (tremble / TREMBLE)^2, from 0.01 to 0.1. hold: factor of the stroke weights, above 0.
+    that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05. hold: factor of the stroke weights, above 0.
     """
     if harmonic is not None:
         return _bent(start, harmonic, hold)
-    rough = tremble(_bent(start, HARMONIC, hold)) / TREMBLE
-    return _bent(start, float(np.clip(HARMONIC * rough**2, *_HARMONICS)), hold)
+    smooth = _bent(start, HARMONIC, hold)
+    wanted = max(HARMONIC * (tremble(smooth) / TREMBLE) ** 2, _LEAST_HARMONIC)
+    return _bent(start, wanted, hold) if wanted < HARMONIC else smooth
 
 
 def tremble(field: CrossField) -> float:

@@ -134,7 +134,7 @@ def test_the_field_is_near_the_true_curvature_lines(surface, tmp_path):
 def test_fields_are_as_smooth_as_the_strokes_tremble():
     """Clean strokes get the least plain smoothness, those with 8 degrees of noise the most."""
     clean = cf.analytic("wave_sheet", 48).instance
-    for degrees, harmonic in ((0, 0.01), (8, 0.1)):
+    for degrees, harmonic in ((0, 0.01), (8, HARMONIC)):
         start = polyvector_field(noisy(clean, degrees, seed=1), hold=max(HOLDS))
         field = bend_field(start)
         assert (field.alpha == bend_field(start, harmonic=harmonic).alpha).all()
