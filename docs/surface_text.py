@@ -127,9 +127,9 @@ and the side is that of the truth. The cone is too steep, as no hint says how de
 
 ![Surfaces with a known answer: strokes, normal map, shaded, the true surface](pictures/surface_known.png)
 
-The samples, on the side that is taken by default. Mouse, cube, bottle, pipe, ring and the flat sheet look like
-what they are. The saddle is bent in two directions where it is wide, and says little at its tip of a pixel or
-two.
+The samples, on the side that is taken by default. Mouse, cube, bottle, pipe, ring and the flat sheet look
+like what they are. The saddle is bent in two directions where it is wide, and says little at its tip of a
+pixel or two.
 
 ![The drawn samples: strokes, normal map, shaded](pictures/surface_samples.png)
 
