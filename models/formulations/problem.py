@@ -171,9 +171,8 @@ class PlacedFamily:
     def excess(self, point: Floats) -> Floats:
         """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
         values = self.values(point)
-        if self.family.sense == "==":
-            return np.abs(values)
-        return values if self.family.sense == "<=" else -values
+        by_sense: dict[str, Floats] = {"==": np.abs(values), "<=": values, ">=": -values}
+        return by_sense[self.family.sense]
 
 
 @dataclass(frozen=True)
