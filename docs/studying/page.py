@@ -33,6 +33,17 @@ def read(data: Path) -> Kept:
     return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
 
 
+def ordered(kept: Kept, plan: Plan) -> Kept:
+    """The rows in the order of the plan, whenever they came: colours and lines of tables follow it.
+
+    Rows that are not of the plan, of other drawings, come last.
+    """
+    place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
+    return {
+        part: sorted(rows, key=lambda row: place.get(key_of(row), len(place))) for part, rows in kept.items()
+    }
+
+
 def completeness(kept: Kept, plan: Plan) -> str:
     """How much of the plan has been done."""
     planned = [run for stage in stages(plan, None) for run in stage.runs]
@@ -129,6 +140,7 @@ def threats(kept: Kept) -> str:
 
 def page(kept: Kept, plan: Plan) -> str:
     """The text of the page."""
+    kept = ordered(kept, plan)
     parts = ["# Of what practical use?", said(COMMAND), QUESTION, answers(kept), completeness(kept, plan)]
     parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
     counts = ", ".join(f"{len(rows)} {part}" for part, rows in kept.items())
@@ -138,7 +150,7 @@ def page(kept: Kept, plan: Plan) -> str:
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:
     """Make study.md in a folder, and its plots in the folder `pictures` there."""
-    kept = read(data)
+    kept = ordered(read(data), plan)
     for part in (solver_page, quality_page, practice_page):
         part.draw(kept, target / "pictures")
     (target / "study.md").write_text(page(kept, plan))
