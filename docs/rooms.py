@@ -77,7 +77,7 @@ def table(root: Path) -> list[list[str]]:
     ]
 
 
-# The picture: five columns; the data goes right in the first row and back in the third.
+# The picture: five columns; the data goes right in the first row and back in the third, surfaces below it.
 
 WIDE, HIGH, GAP, LEFT = 168, 84, 78, 30
 WHOLE: Final = 5 * WIDE + 4 * GAP
@@ -85,9 +85,10 @@ WIDTH: Final = WHOLE + 2 * LEFT
 PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
-    "models/search": (1, 470), "models/proof": (2, 470), "templates": (3, 470), "export/bundle": (4, 470),
+    "models/proof": (0, 470), "models/search": (1, 470), "templates": (3, 470), "export/bundle": (4, 470),
     "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
     "export/solving": (4, 620),
+    "export/shading": (0, 770), "export/surfaces": (1, 770), "models/surface": (2, 770),
 }  # fmt: skip
 FLOW: Final = (
     ("models/sketch", "models/instance", "strokes,", "mask"),
@@ -99,6 +100,9 @@ FLOW: Final = (
     ("export/solving", "export/solutions", "solution", "file"),
     ("export/solutions", "models/field", "Solution", ""),
     ("models/field", "export/pictures", "CrossField", ""),
+    ("models/field", "models/surface", "CrossField", ""),
+    ("models/surface", "export/surfaces", "Surface", ""),
+    ("export/surfaces", "export/shading", "normals", ""),
     ("models/instance", "models/search", "Instance", ""),
     ("templates", "export/formats", "layouts", ""),
     ("models/search", "models/field", "CrossField", ""),
@@ -123,7 +127,7 @@ orient="auto-start-reverse">
 
 def picture(root: Path) -> str:
     """The rooms and the way of data through them, as SVG."""
-    height = 790
+    height = 940
     parts = [
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
@@ -156,8 +160,8 @@ def bars(root: Path) -> list[str]:
         ),
         bar(root, "export/verify", 178, 50),
         chip("programs", LEFT + WHOLE - 132, 191, 120),
-        bar(root, GROUND, 725, 50),
-        written("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 755, "end"),
+        bar(root, GROUND, 875, 50),
+        written("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 905, "end"),
     ]
 
 

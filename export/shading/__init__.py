@@ -1,1 +1,1 @@
-"""Surfaces in light: shaded pictures, matcaps, normal maps."""
+"""Pictures of surfaces, in light."""

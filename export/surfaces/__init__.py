@@ -1,1 +1,1 @@
-"""What a surface leaves: pictures, heights, mesh, report."""
+"""The files that a surface leaves."""
