@@ -199,7 +199,7 @@ def _for_solvers(found: Fares, kept: Kept) -> str:
     least = {s: min(fare.over for fare in found[s].values()) for s in milp}
     worse = [s for s, fare in milp.items() if np.isnan(fare.over) or fare.over > least[s] + _SAME]
     without = [s for s, fare in milp.items() if fare.failed]
-    two = "the paper's two stages "
+    two = "the paper's two stages, begun at a field that is improved already, "
     two += f"give no field in time of some drawings at {_sizes(without)} pixels, and " if without else ""
     two += f"are above the least energy at {_sizes(worse)} pixels" if worse else (
         f"reach the least energy at {_sizes(milp)} pixels"
