@@ -17,11 +17,13 @@ from exhaustive import optimum, random_instance
 pytestmark = pytest.mark.numeric
 
 
+INSTANCE = random_instance(305, (3, 3), strokes=9)
+
+
 @pytest.fixture(scope="module")
 def cut():
     """A proof of three generations: a level, four branches of it, and one level after each of these."""
-    instance = random_instance(305, (3, 3), strokes=9)
-    field = first_field(instance)
+    field = first_field(INSTANCE)
     energy, records, parents = field.energy().total, [], [-1]
     with crew(1) as hands:
         root = Dual(Lattice.whole(field, 8), hands)
@@ -51,6 +53,19 @@ def test_branches_cut_one_pixel_and_hold_all_cells_together(cut):
     # Records round both shares of 12 pairs to a quantum: off by half of one, at a pixel and at the pair.
     rounded = 2 * 12 * max(level.quantum for level in cut.levels[:5])
     assert min(part.bound for part in parts) >= whole.bound - rounded
+
+
+def test_no_branch_is_below_its_level():
+    """Before what the branches hold is rounded in its turn."""
+    field = first_field(INSTANCE)
+    with crew(1) as hands:
+        root = Dual(Lattice.whole(field, 8), hands)
+        root.ascend(5)
+        whole = LevelRecord.of(root, field.energy().total)
+        for part in branches(root, 4):
+            assert part.bound() >= whole.bound - 1e-9
+            part.ascend(5)
+            assert part.bound() >= whole.bound - 1e-9
 
 
 def test_a_certificate_that_is_cut_off_has_all_branches_of_a_level_or_none(cut, tmp_path):
