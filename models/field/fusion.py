@@ -24,6 +24,9 @@ _APART: Final = 0.02  # radians of cross error up to which two crosses count as 
 _UNITS: Final = 1e6  # into which 1 + energy is divided: flows are whole numbers, whose sums no order changes
 
 
+_MOST: Final = 1e9  # units of a pixel's price, far beyond all that a choice can gain: flows have 32 bits
+
+
 def fused(one: CrossField, other: CrossField) -> CrossField:
     """The field of `one` or of `other` at each pixel, whichever lowers the 2-norm energy, with best jumps.
 
@@ -83,7 +86,7 @@ def _least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools
     source, sink, place = count, count + 1, np.arange(count)
     start = np.concatenate([np.where(price[free] > 0, source, place), number[links[0]]])
     end = np.concatenate([np.where(price[free] > 0, place, sink), number[links[1]]])
-    most = np.concatenate([np.abs(price[free]), excess]).astype(np.int32)
+    most = np.minimum(np.concatenate([np.abs(price[free]), excess]), _MOST).astype(np.int32)
     graph = sparse.csr_array((most, (start, end)), shape=(count + 2, count + 2))
     left = graph - maximum_flow(graph, source, sink).flow
     left.eliminate_zeros()

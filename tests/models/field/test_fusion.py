@@ -1,5 +1,6 @@
 """Two fields made one: never above the first, the better half of each, the best of all choices."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.fusion import fused
 from crossfield.models.field.jumps import free_jumps
-from crossfield.models.instance.instance import HALF
+from crossfield.models.instance.instance import HALF, MOST_WEIGHT
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.search.greedy import greedy
 from crossfield.models.sketch.samples import sample
@@ -31,6 +32,19 @@ def test_it_takes_the_better_half_of_each():
     for one, other in ((left, right), (right, left)):
         assert one.energy().total > 1
         assert fused(one, other).energy().total == pytest.approx(good.energy().total, abs=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_prices_beyond_32_bits_are_as_good_as_infinite():
+    """Beside an energy of 7, strokes of the greatest weight that are half a radian off."""
+    theta = np.full((8, 14), np.nan)
+    theta[2:6, [1, 12]] = 0.3
+    good = greedy(replace(sketch(np.ones(theta.shape, bool), theta), w_strokes=MOST_WEIGHT))
+    bump = np.hypot(good.instance.grid.rows - 4, good.instance.grid.columns - 6.5) < 2
+    off = np.zeros(len(bump))
+    off[good.instance.stroke_index[-2:]] = 0.5
+    one, other = (CrossField(good.instance, good.alpha + more, good.beta, good.p) for more in (bump / 2, off))
+    assert fused(one, other).energy().total == pytest.approx(0, abs=1e-9)
 
 
 def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
