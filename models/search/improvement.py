@@ -33,7 +33,7 @@ _MOST_CURVES: Final = 40  # that may change their family, those first that miss 
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
 
 
-def improved(field: CrossField, over: Over = never, *, enough: float = FALL) -> CrossField:
+def improved(field: CrossField, over: Over = never) -> CrossField:
     """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
 
     Its 2-norm energy is at most that of the one given.
@@ -41,29 +41,21 @@ def improved(field: CrossField, over: Over = never, *, enough: float = FALL) -> 
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
     turning seldom pays.
     At most 40 curves are tried, the worst first. over: says whether the time is over; then the best field so
-    far comes back. enough: as for `settle`, before curves are turned.
-    The energy is that of docs/mathematics.md, 5; deterministic.
+    far comes back. The energy is that of docs/mathematics.md, 5; deterministic.
     """
     state, solver = FreeField.of(field), LinearSolver()
-    settle(state, solver, over, enough=enough)
+    settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)
     found = state.bounded(over)
     return found if found.energy().total < field.energy().total else field
 
 
-def settle(
-    state: FreeField,
-    solver: LinearSolver,
-    over: Over = never,
-    *,
-    enough: float = FALL,
-    tolerance: float = _SETTLED,
-) -> None:
+def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
     """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts.
 
     enough: relative fall of the energy in a round below which no more rounds follow. Singularities creep by a
-    pixel a round, on fine grids for a hundred rounds. tolerance: of the angles, as for `least_in_box`.
+    pixel a round, on fine grids for a hundred rounds.
     """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
@@ -71,7 +63,7 @@ def settle(
         if over():
             break
         energy = energy_at(state.instance, state.p)
-        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=tolerance, over=over)
+        state.x = least_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
         fall = (least - reached) / (1 + reached)
         if fall >= FALL:
