@@ -53,6 +53,8 @@ def browser() -> str | None:
 OTHERS = {
     "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
     "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
+    "trimesh": (importlib.util.find_spec("trimesh"), "trimesh", "pip install trimesh"),
+    "bpy": (importlib.util.find_spec("bpy"), "Blender as a module", "pip install bpy (1 GB)"),
     "chromium": (
         importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),
         "Chromium with its driver, or selenium,",
