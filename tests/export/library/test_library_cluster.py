@@ -2,14 +2,13 @@
 one of which is killed in the middle.
 """
 
-import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from clusters import cluster
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.plan.spec import read_spec
@@ -44,70 +43,26 @@ build(read_spec(spec), folder, scheduler=address, progress=lambda line: print(li
 """
 
 
-def started(arguments, log, words):
-    """A process whose output goes to a file, once that holds what the words match; and the match."""
-    with log.open("wb") as stream:
-        process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-m", *arguments], stdout=stream, stderr=subprocess.STDOUT
-        )
-    while True:
-        found = re.search(words, log.read_text("utf-8", "replace"))
-        if found:
-            return process, found
-        assert process.poll() is None, log.read_text("utf-8", "replace")
-        time.sleep(0.05)
-
-
-@pytest.fixture
-def cluster(tmp_path):
-    """Address of a scheduler on this machine, and its two workers."""
-    arguments = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    scheduler, found = started(
-        arguments, tmp_path / "scheduler.log", r"Scheduler at: +(tcp://127\.0\.0\.1:\d+)"
-    )
-    processes = [scheduler]
-    address = found.group(1)
-    try:
-        for number in (1, 2):
-            arguments = [
-                "distributed.cli.dask_worker",
-                address,
-                "--nthreads",
-                "1",
-                "--no-nanny",
-                "--no-dashboard",
-                "--name",
-                f"w{number}",
-            ]
-            arguments += ["--local-directory", str(tmp_path / f"worker{number}")]
-            processes.append(started(arguments, tmp_path / f"worker{number}.log", "Registered to")[0])
-        yield address, processes[1:]
-    finally:
-        for process in reversed(processes):
-            process.kill()
-            process.wait()
-
-
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.slow
 @pytest.mark.needs("distributed")
-def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(tmp_path, cluster):
-    address, (first, second) = cluster
+def test_a_worker_killed_in_the_middle_loses_nothing_and_nothing_is_made_twice(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(SPEC)
     out, lines = tmp_path / "cluster", []
-    command = [sys.executable, "-c", BUILD, str(spec), str(out), address]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        for line in process.stdout:
-            lines.append(line.strip())
-            if len(lines) == 20:
-                first.kill()
-        assert process.wait() == 0
-    assert first.wait() == -signal.SIGKILL
-    assert second.poll() is None
+    with cluster(tmp_path) as (address, (first, second)):
+        command = [sys.executable, "-c", BUILD, str(spec), str(out), address]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            for line in process.stdout:
+                lines.append(line.strip())
+                if len(lines) == 20:
+                    first.kill()
+            assert process.wait() == 0
+        assert first.wait() == -signal.SIGKILL
+        assert second.poll() is None
 
     local = build(read_spec(spec), tmp_path / "local")
     names = [line.split(": ")[1] for line in lines[:-1]]
