@@ -73,9 +73,12 @@ def main() -> None:
             plan, given.data, jobs=given.jobs, scheduler=given.scheduler, folder=given.sketches,
             parts=given.parts, progress=lambda line: print(line, file=sys.stderr, flush=True),
         )  # fmt: skip
-    from studying.page import write_page
+    from make import replace_between
+    from studying.page import in_short, read, write_page
 
     write_page(given.data, DOCS if given.data == DATA else given.data, plan)
+    if given.data == DATA:
+        replace_between(DOCS / "index.md", "answers", in_short(read(DATA), plan))
 
 
 if __name__ == "__main__":

@@ -59,19 +59,26 @@ def completeness(kept: Kept, plan: Plan) -> str:
     )  # fmt: skip
 
 
-def answers(kept: Kept) -> str:
-    """The answers in plain words."""
-    parts = [("Can they be solved?", solvable(kept)), ("Does it matter?", matters(kept)),
-             ("What to use?", " ".join(practice_page.recommendation(kept)))]  # fmt: skip
-    return "\n\n".join(f"**{question}** {answer}" for question, answer in parts)
+def answers(kept: Kept) -> dict[str, list[str]]:
+    """The answers in plain words: sentences by question, the first of which says most."""
+    return {
+        "Can they be solved?": solvable(kept),
+        "Does it matter?": matters(kept),
+        "What to use?": practice_page.recommendation(kept),
+    }
 
 
-def solvable(kept: Kept) -> str:
+def told(found: dict[str, list[str]], most: int | None = None) -> str:
+    """Questions and answers as paragraphs, each of so many sentences at most."""
+    return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in found.items())
+
+
+def solvable(kept: Kept) -> list[str]:
     """How far solvers get, and how far `prove` does."""
     found = solver_page.facts_in_short(kept)
     standing, own = found["standing"], found["prove"][2]
     if not standing:
-        return "Not measured yet."
+        return ["Not measured yet."]
     free = {pair: of for pair, of in standing.items() if pair[0] != solver_page.JUMPS_GIVEN}
     parts = []
     for size in sorted({size for of in free.values() for size in of}):
@@ -88,18 +95,19 @@ def solvable(kept: Kept) -> str:
         text = f"Half of the instances or more at every size that is measured, up to {last} pixels a side."
     else:
         text = f"Only on small grids: {reach[0]} pixels a side is the most of which a solver proves half."
-    return (
-        f"{text} From a file, the best pair of formulation and solver proves {', '.join(parts)}. `prove`, "
-        f"which uses what is special about the problem, proves {', '.join(ours)}."
-    )
+    return [
+        text,
+        f"From a file, the best pair of formulation and solver proves {', '.join(parts)}.",
+        f"`prove`, which uses what is special about the problem, proves {', '.join(ours)}.",
+    ]
 
 
-def matters(kept: Kept) -> str:
+def matters(kept: Kept) -> list[str]:
     """What the optimum does to the error, and what does more."""
     found = quality_page.changes(kept["quality"], surfaces=False)
     optimum = found["optimum"]
     if optimum is None:
-        return "Not measured yet."
+        return ["Not measured yet."]
     before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
     mean = percent(float(np.mean(before or [0.0])))
     if not optimum.sure:
@@ -110,13 +118,13 @@ def matters(kept: Kept) -> str:
         f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
         "on average, to the best field that is found."
     )
-    text = " ".join(filter(None, (text, quality_page.harmless(kept["quality"]))))
     sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
+    last = "Nothing that was tried lowers the error to hidden curves beyond chance."
     if sure:
         most = sorted(sure, key=lambda name: sure[name].mean)[:3]
         words = "; ".join(f"{quality_page.CHANGES[name][0]} ({sure[name]})" for name in most)
-        return f"{text} What lowers the error to hidden curves, in degrees: {words}."
-    return f"{text} Nothing that was tried lowers the error to hidden curves beyond chance."
+        last = f"What lowers the error to hidden curves, in degrees: {words}."
+    return [*filter(None, (text, quality_page.harmless(kept["quality"]))), last]
 
 
 def threats(kept: Kept) -> str:
@@ -141,7 +149,13 @@ def threats(kept: Kept) -> str:
 def page(kept: Kept, plan: Plan) -> str:
     """The text of the page."""
     kept = ordered(kept, plan)
-    parts = ["# Of what practical use?", said(COMMAND), QUESTION, answers(kept), completeness(kept, plan)]
+    parts = [
+        "# Of what practical use?",
+        said(COMMAND),
+        QUESTION,
+        told(answers(kept)),
+        completeness(kept, plan),
+    ]
     parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
     counts = ", ".join(f"{len(rows)} {part}" for part, rows in kept.items())
     parts += [threats(kept).rstrip(), f"{ROWS} This page is made from the first {counts}."]
@@ -154,3 +168,8 @@ def write_page(data: Path, target: Path, plan: Plan) -> None:
     for part in (solver_page, quality_page, practice_page):
         part.draw(kept, target / "pictures")
     (target / "study.md").write_text(page(kept, plan))
+
+
+def in_short(kept: Kept, plan: Plan) -> str:
+    """The first sentence of each answer, for the index of all pages."""
+    return told(answers(ordered(kept, plan)), most=1)

@@ -197,6 +197,9 @@ def test_the_page_is_made_from_the_rows_beside_it(study):
     assert all(len(kept[part]) >= count > 0 for part, count in counts.items())
     first = {part: rows[: counts[part]] for part, rows in kept.items()}
     assert page == study.page.page(first, study.plan.FULL)
+    short = study.page.in_short(first, study.plan.FULL)
+    assert f" -->\n{short}\n<!-- end of answers -->" in (DOCS / "index.md").read_text()
+    assert all(line in page for line in short.split("\n\n"))
 
 
 def test_no_instance_is_proven_twice_with_two_optima(study):
