@@ -15,6 +15,7 @@ from .plan import Plan, stages
 from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
 from .rows import read as read_rows
 from .solver_page import percent
+from .solving import PROOF
 from .words import QUESTION, ROWS, THREATS
 
 Kept = dict[str, list[Row]]
@@ -118,13 +119,15 @@ def matters(kept: Kept) -> list[str]:
         f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
         "on average, to the best field that is found."
     )
+    others = quality_page.elsewhere()
+    there = f"On {others.drawings} drawings, {others.others} by others, it is {others.changes[PROOF]}."
     sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
     last = "Nothing that was tried lowers the error to hidden curves beyond chance."
     if sure:
         most = sorted(sure, key=lambda name: sure[name].mean)[:3]
         words = "; ".join(f"{quality_page.CHANGES[name][0]} ({sure[name]})" for name in most)
         last = f"What lowers the error to hidden curves, in degrees: {words}."
-    return [*filter(None, (text, quality_page.harmless(kept["quality"]))), last]
+    return [*filter(None, (text, there, quality_page.harmless(kept["quality"]))), last]
 
 
 def threats(kept: Kept) -> str:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
-from make import markdown
+from crossfield.models.sketch.samples import SAMPLES
+from make import DOCS, markdown
 
 from . import errors, plots
 from .errors import Change, Kind, change, is_default, is_surface, usable
 from .rows import Row
 from .solver_page import percent
+from .solving import PROOF
 from .words import QUALITY_TEXT
 
 Kept = dict[str, list[Row]]
@@ -75,6 +80,49 @@ def _told(found: Change | None) -> str:
     return f"**{text}**" if found.sure else text
 
 
+@dataclass(frozen=True)
+class Elsewhere:
+    """What changes from the greedy field do on the drawings of docs/fields.md, samples among them."""
+
+    drawings: int
+    others: int
+    size: int
+    changes: dict[str, Change | None]
+
+    def __str__(self) -> str:
+        parts = [f"{OTHERS[way]} {_told(found)}" for way, found in self.changes.items()]
+        return (
+            f"On {self.drawings} drawings, {self.others} of them by others, at {self.size} pixels "
+            f"([how good the fields are](fields.md)), from the greedy field: {'; '.join(parts)}."
+        )
+
+
+@cache
+def elsewhere() -> Elsewhere:
+    """The changes on the drawings of docs/fields.json, at the size at which it has proofs."""
+    kept = json.loads((DOCS / "fields.json").read_text())["rows"]["methods"]
+    size = max(row["size"] for row in kept if row["method"] == PROOF)
+    rows = [
+        {"instance": row["drawing"], "size": size, "hidden": curve, "way": row["method"], "error": degrees}
+        for row in kept
+        if row["size"] == size
+        for curve, degrees in enumerate(row["degrees"])
+    ]
+    names = {row["instance"] for row in rows}
+    found = {
+        way: change(rows, lambda row: row["way"] == "greedy", lambda row, way=way: row["way"] == way)
+        for way in OTHERS
+    }
+    return Elsewhere(len(names), len(names - SAMPLES.keys()), size, found)
+
+
+OTHERS: Final = {
+    "search": "to the search of 5 s", PROOF: "to the best that `prove` finds",
+    "polyvector": "to the PolyVector field", "bend": "to the bend field",
+}  # fmt: skip
+"""Methods of docs/fields.json, and what is said of the change to them."""
+
+
 def kind_of(row: Row) -> str:
     """What a field is called in the plot."""
     if row["way"] == "prove":
@@ -134,22 +182,20 @@ def correlation_text(rows: list[Row]) -> str:
 
 
 def harmless(rows: list[Row]) -> str:
-    """From which gap on fields of drawings are worse than the optimum, in words."""
+    """Between which gaps fields of drawings become worse than the optimum, in words."""
     found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
     gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
-    harmed = [place for place, each in enumerate(more) if each > HARM]
     if not gap:
         return ""
-    if not harmed:
-        return (
-            f"In no bin up to {percent(max(gap))} above the optimum are fields worse than it by more than "
-            f"{HARM:g} degrees in the median."
-        )
-    first = harmed[0]
-    before = f", and not yet at {percent(gap[first - 1])}" if first else ""
+    after = max((place + 1 for place, each in enumerate(more) if each <= HARM), default=0)
+    worse = f"by more than {HARM:g} degrees, in the median of a bin"
+    if after == len(gap):
+        return f"Even {percent(gap[-1])} above the optimum's energy fields are not worse than it {worse}."
+    if not after:
+        return f"Fields of more energy than the optimum are worse {worse}."
     return (
-        f"Fields are worse than the optimum by more than {HARM:g} degrees, in the median of bins, from some "
-        f"{percent(gap[first])} above its energy on{before}."
+        f"Fields become worse than the optimum {worse}, somewhere between {percent(gap[after - 1])} and "
+        f"{percent(gap[after])} above its energy."
     )
 
 
@@ -207,5 +253,5 @@ def section(kept: Kept) -> list[str]:
     )
     return [
         QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"], harmless(rows),
-        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), weights,
+        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), str(elsewhere()), weights,
     ]  # fmt: skip

@@ -89,9 +89,9 @@ Up to the left is slow and bad, down to the left quick and good. Bars: standard 
 THREATS: Final = """## What may be wrong with this
 
 - **Drawings.** {drawings} drawings and {surfaces} surfaces are few, the samples among them were made for this
-  project, and curves of one drawing are alike: hence standard errors over drawings. `--sketches FOLDER` adds
-  others. Of thirty instances for solvers on a rung twenty or fewer come from the samples; the others are
-  random and look like no drawing.
+  project, and curves of one drawing are alike: hence standard errors over drawings. What the main changes do
+  on drawings by others is told below their table; `--sketches FOLDER` adds others to all. Of thirty instances
+  for solvers on a rung twenty or fewer come from the samples; the others are random and look like no drawing.
 - **Hidden curves** measure what designers draw, not the surface that they mean. The surfaces with
   known answers are smooth and simple.
 - **Free editions.** {free} They say nothing of what the full programs do with larger files.
