@@ -116,12 +116,15 @@ def gap(row: Row) -> float:
     return float(min(max(apart, 0.0), 1.0))
 
 
-def above(row: Row, known: Optima) -> float | None:
-    """By which share the objective of a run is above the least that is known; None without a point."""
+def over(row: Row, known: Optima) -> float | None:
+    """How far the objective of a run is above the least that is known, in that measure; None without a point.
+
+    Negative below it, where a formulation is a relaxation.
+    """
     key = (problem_of(row), row["instance"], row["size"])
     if key not in known or row["objective"] is None:
         return None
-    return max(0.0, (row["objective"] - known[key][0]) / max(known[key][0], 1e-3))
+    return float((row["objective"] - known[key][0]) / scale(known[key][0]))
 
 
 def spent(row: Row) -> float:

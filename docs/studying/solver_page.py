@@ -168,69 +168,69 @@ KINDS: Final = {
 
 
 def open_table(rows: list[Row], known: facts.Optima) -> str:
-    """What pairs leave where they prove nothing: gap, and how far the best point is above the optimum."""
+    """What pairs leave where they prove nothing: how many have a point, how far above the optimum, and gap."""
+    given_up = {TOO_LARGE, FAILED}
+    left = [row for row in rows if not facts.is_proven(row) and row["status"] not in given_up]
+    sizes = sorted({int(row["size"]) for row in left})
+    groups = facts.grouped(left, "way", "solver")
     cells = []
-    for (way, solver), group in sorted(
-        facts.grouped(rows, "way", "solver").items(), key=lambda each: _place(each[0])
-    ):
-        for size in sorted({row["size"] for row in group}):
-            left = [row for row in group if row["size"] == size and not facts.is_proven(row)]
-            left = [row for row in left if row["status"] not in {TOO_LARGE, FAILED}]
-            if left:
-                over = [share for row in left if (share := facts.above(row, known)) is not None]
-                points = sum(row["objective"] is not None for row in left)
-                above = percent(float(np.median(over))) if over else "-"
-                cells.append(
-                    [
-                        f"`{way}`", SOLVERS[solver].title, f"{size:.0f}", str(len(left)), str(points), above,
-                        f"{100 * float(np.median([facts.gap(row) for row in left])):.0f} %",
-                    ]
-                )  # fmt: skip
-    heads = ("formulation", "solver", "pixels", "not proven", "with a point", "above the optimum", "gap")
-    return markdown(heads, cells)
+    for way, solver in sorted(groups, key=_place):
+        of = facts.grouped(groups[way, solver], "size")
+        line = [_left(of[size,], known) if (size,) in of else "" for size in sizes]
+        cells.append([f"`{way}`", SOLVERS[solver].title, *line])
+    return markdown(("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells)
+
+
+def _left(rows: list[Row], known: facts.Optima) -> str:
+    """A cell of that table."""
+    over = [share for row in rows if (share := facts.over(row, known)) is not None]
+    points = sum(row["objective"] is not None for row in rows)
+    gap = f"{100 * float(np.median([facts.gap(row) for row in rows])):.0f} %"
+    above = f"+{percent(max(float(np.median(over)), 0.0))}, gap {gap}" if over else f"gap {gap}"
+    return f"{points} of {len(rows)}: {above}"
 
 
 def variants_table(rows: list[Row], known: facts.Optima) -> str:
-    """Variants beside the cold runs of the same pair on the same instances."""
+    """Variants beside the cold runs of the same pair on the same instances; then all pairs together."""
     cold = {(row["way"], row["solver"], row["instance"], row["size"]): row for row in rows if is_cold(row)}
+    kinds = facts.grouped([row for row in rows if not is_cold(row)], "start", "facet", "windows")
     cells = []
-    others = [row for row in rows if not is_cold(row)]
-    for (way, solver, *kind), group in facts.grouped(
-        others, "way", "solver", "start", "facet", "windows"
-    ).items():
-        both = [
-            (cold[key], row)
-            for row in group
-            if (key := (row["way"], row["solver"], row["instance"], row["size"])) in cold
-            and TOO_LARGE not in {row["status"], cold[key]["status"]}
-        ]
-        if both:
-            before, after = (Rung(tuple(each[i] for each in both)) for i in (0, 1))
-            cells.append(
-                [
-                    f"`{way}`", SOLVERS[solver].title, variant(kind), str(len(both)),
-                    f"{before.proven} / {after.proven}", f"{before.seconds:.2f} / {after.seconds:.2f}",
-                    f"{_over(before, known)} / {_over(after, known)}",
-                ]
-            )  # fmt: skip
+    for kind in sorted(kinds, key=variant):
+        together: list[tuple[Row, Row]] = []
+        for (way, solver), group in facts.grouped(kinds[kind], "way", "solver").items():
+            both = [
+                (cold[key], row)
+                for row in group
+                if (key := (row["way"], row["solver"], row["instance"], row["size"])) in cold
+                and TOO_LARGE not in {row["status"], cold[key]["status"]}
+            ]
+            if both:
+                cells.append([f"`{way}`", SOLVERS[solver].title, variant(kind), *_beside(both, known)])
+            together += both
+        if together:
+            cells.append(["**all**", "", variant(kind), *(f"**{c}**" for c in _beside(together, known))])
     heads = (
-        "formulation", "solver", "variant", "instances", "proven: cold / variant", "s: cold / variant",
+        "formulation", "solver", "variant", "runs", "proven: cold / variant", "s: cold / variant",
         "above the optimum: cold / variant",
     )  # fmt: skip
-    return markdown(heads, sorted(cells, key=lambda line: line[2])) if cells else "Not measured yet."
+    return markdown(heads, cells) if cells else "Not measured yet."
 
 
-def variant(kind: list[str]) -> str:
+def _beside(both: list[tuple[Row, Row]], known: facts.Optima) -> list[str]:
+    """Cells of that table: runs, proofs, seconds, and means over the instances of which both have a point."""
+    before, after = (Rung(tuple(each[i] for each in both)) for i in (0, 1))
+    shares = [pair for a, b in both if None not in (pair := (facts.over(a, known), facts.over(b, known)))]
+    above = " / ".join(percent(float(each)) for each in np.mean(shares, axis=0)) if shares else "-"
+    proven, seconds = f"{before.proven} / {after.proven}", f"{before.seconds:.2f} / {after.seconds:.2f}"
+    return [str(len(both)), proven, seconds, above]
+
+
+def variant(kind: tuple[str, ...]) -> str:
     """A variant in words."""
     start, facet, windows = kind
     if start != "cold":
         return "from the greedy field"
     return "facet (26) as printed" if facet != "hull" else f"windows of a {windows}"
-
-
-def _over(rung: Rung, known: facts.Optima) -> str:
-    shares = [share for row in rung.runs if (share := _signed(row, known)) is not None]
-    return percent(float(np.mean(shares))) if shares else "-"
 
 
 def percent(share: float) -> str:
@@ -242,14 +242,6 @@ def percent(share: float) -> str:
 
 _NONE: Final = 5e-6  # what is less is rounding
 _WHOLE: Final = 0.1
-
-
-def _signed(row: Row, known: facts.Optima) -> float | None:
-    """By which share the objective of a point is above the optimum, below it negative."""
-    key = (facts.problem_of(row), row["instance"], row["size"])
-    if key not in known or row["objective"] is None:
-        return None
-    return float((row["objective"] - known[key][0]) / max(known[key][0], 1e-3))
 
 
 def contradictions_text(rows: list[Row], known: facts.Optima) -> str:

@@ -38,15 +38,17 @@ too large, it counts as proving nothing; seconds are those of instances that are
 Instances that at least one solver proves, by problem and by where they come from.""",
     "open": """### What is left where nothing is proven
 
-Runs without a proof: how many have a point, how far its objective is above the best that is known (median):
-by `prove`, or by any solver for the mixed problem; and the solver's own gap (median; 100 % where it has no
-bound).""",
+Of the runs without a proof so many have a point; how far its objective is above the best that is known
+(median): by `prove`, or by any solver for the mixed problem; and the solver's own gap (median, 100 % where it
+has no bound). Here and in the next table what is above an optimum is relative to it, or to 1 where it is
+less.""",
     "variants": """### Starts, facets and windows
 
 The same pairs and instances with one thing changed. *From the greedy field*: the complete point of that field
 is handed over. *Facet (26) as printed*: the paper's misprint, a relaxation, whose optimum may be lower than
 any field's energy. *Windows of a proof*: those that a [certificate](files.md#certificates) of `prove` leaves,
-its seconds not counted. The last column: objective above the optimum of the correct problem, mean.""",
+its seconds not counted. The last column: objective above the optimum of the correct problem, mean over the
+instances of which both have a point.""",
     "claims": "### Are the claims true?",
 }
 
