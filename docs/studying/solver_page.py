@@ -168,7 +168,7 @@ KINDS: Final = {
 
 
 def open_table(rows: list[Row], known: facts.Optima) -> str:
-    """What pairs leave where they prove nothing: how many have a point, how far above the optimum, and gap."""
+    """What pairs leave where they prove nothing: points, how far they are above the optimum, and gaps."""
     given_up = {TOO_LARGE, FAILED}
     left = [row for row in rows if not facts.is_proven(row) and row["status"] not in given_up]
     sizes = sorted({int(row["size"]) for row in left})

@@ -22,6 +22,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from ...models.errors import SolverError
 from ...models.instance.grid import Floats
 from ...models.processes.deadline import Deadline
 from ...models.processes.side_by_side import leave_with_parent
@@ -145,7 +146,8 @@ def solve(
 ) -> AmplAnswer:
     """How the solver ended. `started` is called when it is about to begin.
 
-    Must run in the main thread of a process of its own: it takes over the handling of SIGINT.
+    Must run in the main thread of a process of its own: it takes over the handling of SIGINT. Raises
+    SolverError for an error inside the solver.
     """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
     watch = Watch(model)
@@ -158,7 +160,11 @@ def solve(
     run = ca.nlpsol("solver", solver, model.problem, chosen)
     started()
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
-    answer = run(x0=model.start, **ends)
+    try:
+        answer = run(x0=model.start, **ends)
+    except RuntimeError as error:  # CasADi names places in its source first
+        why = str(error).rpartition(": ")[2]
+        raise SolverError(f"{solver.title()} ended with an error, {why!r}") from error
     words = str(run.stats()["return_status"])
     code = _CODES.get(words, _FAILURE)
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
@@ -180,7 +186,7 @@ def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
 
 
 def main(arguments: list[str]) -> int:
-    """0 when a .sol was written; the solver's status stands in it."""
+    """0 when a .sol was written, in which the status stands; else 1, and the log ends with the reason."""
     solver, path, solution, deadline, gap, stamp = arguments
     leave_with_parent()
     model = read_nl(Path(path))
@@ -188,7 +194,11 @@ def main(arguments: list[str]) -> int:
     columns, rows = len(model.start), len(model.row_lower)
     line = f"{solver}: {columns} columns, {rows} rows, at most {seconds:.3g} s"
     # What is printed is the log.
-    answer = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201
+    try:
+        answer = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201
+    except SolverError as error:
+        print(error)  # noqa: T201
+        return 1
     message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {answer.words}\n{stamp}"
     write_ampl_sol(solution, message, answer.point, rows, answer.code, columns=columns)
     return 0

@@ -1,6 +1,7 @@
 """What Ipopt leaves when it is stopped: the best feasible point that it came by."""
 
 import signal
+from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solving.casadi_driver import Watch, solve
 from crossfield.export.solving.nl_model import FEASIBLE, ca, read_nl
+from crossfield.models.errors import SolverError
 
 
 @pytest.fixture
@@ -57,3 +59,13 @@ def test_a_stop_at_an_iterate_that_breaks_rows_leaves_the_start(relaxed, own_int
     assert answer.code == 400
     assert "the best feasible point before it" in answer.words
     assert np.array_equal(answer.point, model.start)
+
+
+@pytest.mark.parametrize("solver, title", [("ipopt", "Ipopt"), ("bonmin", "Bonmin")])
+def test_an_error_inside_a_solver_is_told_without_places_in_its_source(solver, title, relaxed, own_interrupt):
+    _, model, _ = relaxed
+    crossed = replace(model, lower=model.upper + 1.0)
+    with pytest.raises(
+        SolverError, match=rf"^{title} ended with an error, 'LBX\[0\] <= UBX\[0\] was violated"
+    ):
+        solve(solver, crossed, 1.0, 0.0)
