@@ -139,12 +139,22 @@ def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
     with drawn(path, len(panels), high=3.2) as axes:
         for axis, (title, lines) in zip(axes, panels.items(), strict=True):
             looks = styles(list(lines))
-            for name, (x, y, bar) in lines.items():
-                axis.errorbar(x, y, yerr=bar, capsize=2, label=name, **looks[name])
+            ticks = sorted({value for x, _, _ in lines.values() for value in x})
+            wide = ticks[-1] / ticks[0] if ticks else 1.0
+            for place, (name, (x, y, bar)) in enumerate(lines.items()):
+                beside = np.array(x) * wide ** (
+                    _BESIDE * (place - (len(lines) - 1) / 2)
+                )  # or bars hide others
+                axis.errorbar(beside, y, yerr=bar, capsize=2, elinewidth=0.9, label=name, **looks[name])
             axis.set(xscale="log", xlabel=title, ylim=(0, None))
-            axis.xaxis.set_major_formatter("{x:g}")
+            axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+            axis.minorticks_off()
         axes[0].set_ylabel("error, degrees")
         axes[-1].legend(*_all_of(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+_BESIDE: Final = 0.0155
+"""Share of the axis between the places of two lines at the same weight."""
 
 
 def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float, float]]]) -> None:
