@@ -31,6 +31,7 @@ from ..processes.interruption import interruptible
 from ..search.improvement import improved
 from ..search.search import search
 from ..search.starts import first_field, polyvector_start
+from ..smooth.systems import one_thread
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
@@ -66,6 +67,7 @@ _SLICE: Final = 0.3  # share of the time that is left for a search where the lat
 _ROUNDS: Final = 5  # of a search without a limit of time
 
 
+@one_thread()
 def prove(
     instance: Instance,
     *,

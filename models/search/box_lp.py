@@ -21,6 +21,7 @@ from ..field.jumps import best_jumps, parity_sign
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
+from ..smooth.systems import one_thread
 
 _BETTER = 1e-9  # relative: rounding is no improvement
 
@@ -110,6 +111,7 @@ class LinearFit:
         return cls(x, multipliers, terms.bound(multipliers, lower, upper))
 
 
+@one_thread()
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     """The field of least 1-norm energy with the jumps of `field` within its windows.
 
@@ -129,6 +131,7 @@ def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     return CrossField(instance, alpha, beta, field.p), strokes
 
 
+@one_thread()
 def settled_1norm(field: CrossField, over: Over = never) -> CrossField:
     """A field whose 1-norm energy neither best jumps nor best angles lower: at most that of the one given."""
     best, least = field, field.energy(1).total

@@ -16,6 +16,7 @@ from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..instance.instance import QUARTER
 from ..processes.deadline import Over, never
+from ..smooth.systems import one_thread
 from .energy import LinearSolver, Quadratic, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
@@ -26,6 +27,7 @@ _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
+@one_thread()
 def fitted(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
-from ..smooth.systems import PULL, Solve, factored, one_thread, stroke_weight, symmetric
+from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
 
 CLOSE: Final = 1e-2
 """Relative residual of a step that ranks jumps like the exact one."""
@@ -89,6 +89,5 @@ class LinearSolver:
         """The step by few conjugate gradients with the factorisation at hand; whether they sufficed."""
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
         pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
-        with one_thread():
-            step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
+        step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)
         return step, not failed

@@ -18,7 +18,7 @@ from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
-from ..smooth.systems import locally
+from ..smooth.systems import locally, one_thread
 from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
@@ -49,6 +49,7 @@ _LARGE: Final = _Pace(1.0, 3e-2)
 _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
+@one_thread()
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, within all bounds.
 

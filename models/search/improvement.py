@@ -19,6 +19,7 @@ from ..instance.angles import line_difference
 from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
+from ..smooth.systems import one_thread
 from .box_qp import least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
@@ -33,6 +34,7 @@ _MOST_CURVES: Final = 40  # that may change their family, those first that miss 
 _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
 
 
+@one_thread()
 def improved(field: CrossField, over: Over = never) -> CrossField:
     """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
 

@@ -24,6 +24,7 @@ from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
+from ..smooth.systems import one_thread
 from .coarse import halved, prolonged
 from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
@@ -69,6 +70,7 @@ class Search:
     ended: str
 
 
+@one_thread()
 def search(
     instance: Instance,
     *,

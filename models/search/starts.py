@@ -20,7 +20,7 @@ from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
-from ..smooth.systems import locally
+from ..smooth.systems import locally, one_thread
 from .box_qp import fitted
 from .coarse import CREEP, halved, lifted
 from .energy import LinearSolver, energy_at
@@ -40,6 +40,7 @@ _HASTY: Final = 0.1  # relative residual of such a step
 _FAINT: Final = 1e-2  # of the polynomials of a hasty field, whose values fade away from strokes
 
 
+@one_thread()
 def first_field(instance: Instance, over: Over = never) -> CrossField:
     """A field of low 2-norm energy, as time allows: where searches start, and `qp-fixed`'s jumps.
 
@@ -52,6 +53,7 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     return _best_of_many(instance, over)[0].bounded(over)
 
 
+@one_thread()
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
     """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles.
 

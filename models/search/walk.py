@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
+from ..smooth.systems import one_thread
 from .kicks import Change, Kicks
 from .landscape import STEPS, Landscape, Patch, Point
 
@@ -63,7 +63,7 @@ def explore(task: Task) -> Explored:
     The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several
     threads end in other digits.
     """
-    with threadpool_limits(1, user_api="blas"), suppress(np.linalg.LinAlgError):
+    with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
     return Explored(None, whole=True)
 

@@ -19,7 +19,7 @@ from ..field.field import CrossField
 from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
-from .systems import factored
+from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
 
@@ -39,6 +39,7 @@ _ROUNDS: Final = 20  # 2 to 6 are usual
 _FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
 
 
+@one_thread()
 def bend_field(start: CrossField, *, harmonic: float | None = None, hold: float = HOLD) -> CrossField:
     """The crosses of little bend that the lines of `start` lead to, as a field with the best jumps.
 

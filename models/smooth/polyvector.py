@@ -17,7 +17,7 @@ from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps, label_of
 from ..instance.grid import Floats
 from ..instance.instance import HALF, Instance
-from .systems import factored, locally, smoothness
+from .systems import factored, locally, one_thread, smoothness
 
 _Complex = NDArray[np.complex128]
 
@@ -30,6 +30,7 @@ _HARDEST: Final = 1e4
 _DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
 
 
+@one_thread()
 def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 

@@ -12,9 +12,10 @@ from scipy import sparse
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from .systems import factored, smoothness, stroke_weight
+from .systems import factored, one_thread, smoothness, stroke_weight
 
 
+@one_thread()
 def power_field(instance: Instance) -> CrossField:
     """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
 

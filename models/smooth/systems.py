@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, Final
 
@@ -75,20 +75,23 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
     """
     inverse = 1 / (matrix.diagonal().real + PULL)
     scaled = LinearOperator(matrix.shape, matvec=lambda v: inverse * v, dtype=matrix.dtype)
-    solution: np.ndarray[Any, Any] = cg(
-        matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=_MOST_LOCAL_STEPS, M=scaled
-    )[0]
+    with one_thread():
+        solution: np.ndarray[Any, Any] = cg(
+            matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=_MOST_LOCAL_STEPS, M=scaled
+        )[0]
     return solution
 
 
-def one_thread() -> AbstractContextManager[object]:
-    """A context in which BLAS keeps to one thread.
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """A context, and a decorator, in which BLAS keeps to one thread.
 
-    The dense blocks of sparse factors are tiny, and threads would cost many times the work. Sums do not
-    depend on the number of threads either.
+    The dense blocks of sparse factors are tiny, and so are products of two vectors: threads would cost many
+    times the work, most of all where other processes are busy. Sums do not depend on the number of threads
+    either.
     """
-    limit: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
-    return limit
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
 
 
 @cache

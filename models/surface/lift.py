@@ -13,6 +13,7 @@ from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid
 from ..processes.deadline import Over, never
 from ..processes.progress import Progress, silent
+from ..smooth.systems import one_thread
 from .crosses import Crosses
 from .descent import descended
 from .equations import FORGIVEN, Equations, Weights, normals_of
@@ -35,6 +36,7 @@ TELLING: Final = np.radians(10)
 _LEVEL: Final = 0.05  # share of what leans at the border to which the leanings cancel, where none is outward
 
 
+@one_thread()
 def surface(
     field: CrossField,
     hints: Iterable[Hint] = (),

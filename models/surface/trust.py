@@ -10,7 +10,7 @@ from scipy import linalg
 
 from ..field.field import CrossField
 from ..instance.grid import Floats
-from ..smooth.systems import factored, one_thread
+from ..smooth.systems import factored
 from .crosses import Crosses
 from .equations import Equations, Rows, Weights, changes_of_normals
 from .levels import Level
@@ -103,8 +103,7 @@ def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
     least = np.zeros(_VECTORS)
     for _ in range(_ROUNDS):
         vectors = solve(turning @ vectors)
-        with one_thread():
-            small = vectors.T @ (curvature @ vectors), vectors.T @ (turning @ vectors)
-            least, turn = linalg.eigh(*small)
-            vectors = vectors @ turn
+        small = vectors.T @ (curvature @ vectors), vectors.T @ (turning @ vectors)
+        least, turn = linalg.eigh(*small)
+        vectors = vectors @ turn
     return float(np.sqrt(max(least[0], 0.0)))

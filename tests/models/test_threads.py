@@ -1,0 +1,53 @@
+"""Methods on a grid of more than 10,000 unknowns, from where on BLAS takes several threads for a product of
+two vectors: they let it take one, so that digits depend on no number of threads, and busy neighbours cost
+nothing but their share.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import hashlib, json, time
+import crossfield as cf
+from crossfield.models.search.box_lp import fitted_1norm
+from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.starts import first_field
+
+instance = cf.sample("ring", 108)
+assert 2 * instance.grid.size > 10_000
+power = cf.power_field(instance)
+methods = {
+    "power": lambda: cf.power_field(instance), "polyvector": lambda: cf.polyvector_field(instance),
+    "bend": lambda: cf.bend_field(power), "greedy": lambda: cf.greedy(instance),
+    "improved": lambda: cf.improved(power), "fitted": lambda: fitted(power),
+    "fitted_1norm": lambda: fitted_1norm(power)[0], "first": lambda: first_field(instance),
+    "surface": lambda: cf.surface(power),
+}
+told = {}
+for name, method in methods.items():
+    whole, mine = time.process_time(), time.thread_time()
+    found = method()
+    others = (time.process_time() - whole) - (time.thread_time() - mine)
+    arrays = [found.heights] if name == "surface" else [found.alpha, found.beta, found.p]
+    digest = hashlib.sha256(b"".join(each.tobytes() for each in arrays)).hexdigest()
+    told[name] = [digest, others, time.thread_time() - mine]
+print(json.dumps(told))
+"""
+
+
+@pytest.mark.slow
+def test_methods_run_in_one_thread_whatever_blas_may_take():
+    told = {}
+    for threads in ("1", "4"):
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": threads}
+        command = [sys.executable, "-c", PROGRAM]
+        said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        told[threads] = json.loads(said)
+    assert len(told["1"]) == 9
+    for name, (digest, others, mine) in told["4"].items():
+        assert digest == told["1"][name][0], name
+        assert others < 0.1 + 0.1 * mine, name  # seconds of CPU, not of a clock
