@@ -7,7 +7,8 @@
 Without options it does all runs that have no row yet in docs/studying/data, then makes the page. Killed and
 given again it goes on where it was. --quick is the same in two minutes, small, into another folder. --plan
 counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers have
-the folder docs on their PYTHONPATH. Runs of a solver that is not installed wait for a machine where it is.
+the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1. Runs of a solver that is not installed wait
+for a machine where it is.
 
 The plan (studying/plan.py), every run on one thread:
 
@@ -28,9 +29,13 @@ leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import Final
+
+# Every run is on one thread: libraries read this when they are loaded, here and in all children.
+os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
 from studying.plan import FULL, QUICK, Plan, expected, stages
 from studying.rows import PARTS
