@@ -86,7 +86,11 @@ def solvable(kept: Kept) -> list[str]:
         ran = {pair: of[size] for pair, of in free.items() if size in of and of[size].tried}
         if ran:
             pair, rung = max(ran.items(), key=lambda each: (each[1].share, -each[1].seconds))
-            parts.append(f"{rung.proven} of {len(rung.runs)} at {size} pixels ({solver_page.label(pair)})")
+            large = len(rung.runs) - len(rung.tried)
+            note = f"; {large} are too large for its free edition" if large else ""
+            parts.append(
+                f"{rung.proven} of {len(rung.runs)} at {size} pixels ({solver_page.label(pair)}{note})"
+            )
     ours = [f"{own[size].proven} of {len(own[size].runs)} at {size}" for size in sorted(own)]
     reach = found["reach"]
     last = max((size for of in free.values() for size, rung in of.items() if rung.tried), default=0)

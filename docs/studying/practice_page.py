@@ -106,25 +106,14 @@ def table(found: Fares) -> str:
     return markdown(heads, cells)
 
 
-def _mean_error(found: Fares, way: str, sizes: Iterable[int]) -> float:
-    return float(np.mean([error.mean for size in sizes if (error := found[size][way].error) is not None]))
-
-
-def compared(found: Fares, ways: Iterable[str]) -> list[int]:
-    """The sizes at which all of these ways have an error."""
-    return [size for size in found if all(way in found[size] and found[size][way].error for way in ways)]
-
-
-def nearest(found: Fares, ways: list[str]) -> list[tuple[float, str]]:
-    """Ways by their mean error over the sizes at which all of them have one, best first."""
-    sizes = compared(found, ways)
-    return sorted((_mean_error(found, way, sizes), way) for way in ways) if sizes else []
-
-
-def quick_ways(found: Fares) -> list[str]:
-    """The ways that take at most QUICK at the largest size."""
-    last = found[max(found)]
-    return [way for way, fare in last.items() if fare.seconds <= QUICK and not fare.failed]
+def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf)) -> list[str]:
+    """Ways that take more than the first and at most the second seconds, nearest to hidden curves first."""
+    found = [
+        (fare.error.mean, way)
+        for way, fare in ways.items()
+        if fare.error is not None and not fare.failed and seconds[0] < fare.seconds <= seconds[1]
+    ]
+    return [way for _, way in sorted(found)]
 
 
 def recommendation(kept: Kept) -> list[str]:
@@ -136,35 +125,62 @@ def recommendation(kept: Kept) -> list[str]:
 
 
 def _for_drawing(found: Fares, rows: list[Row]) -> str:
-    quick = quick_ways(found)
-    if not quick:
-        return f"No way takes {QUICK:g} s or less at {max(found)} pixels."
-    at = compared(found, quick)
-    if not at:
-        return "How near the ways come to hidden curves is not measured yet."
-    (error, best), *others = nearest(found, quick)
+    """What to draw with at each size, what comes next, and which slower way comes nearer."""
+    order = {size: ranking(ways, (0.0, QUICK)) for size, ways in found.items()}
+    best = {size: ways[0] for size, ways in order.items() if ways}
+    if not best:
+        return f"No way that takes {QUICK:g} s or less is measured yet."
+    mean = float(np.mean([_error(found, size, way) for size, way in best.items()]))
     text = (
-        f"While drawing, take `{best}`: of the ways that take {QUICK:g} s or less at {max(found)} pixels it "
-        f"comes nearest to hidden curves, {error:.1f} degrees on average at {_sizes(at)} pixels"
+        f"While drawing, take {_grouped(best)}: of the ways that take {QUICK:g} s or less there it comes "
+        f"nearest to hidden curves, {mean:.1f} degrees on average"
     )
+    others = [way for ways in order.values() for way in ways[1:2]]
     if others:
-        text += f" ({others[0][0]:.1f} for `{others[0][1]}`{_paired(rows, others[0][1], best)})"
-    slower = [way for way in found[max(found)] if way not in quick]
-    ahead = nearest(found, [best, *slower])
-    if not slower or not ahead:
-        return f"{text}."
-    if ahead[0][1] == best:
-        return f"{text}; no slower way comes nearer."
-    return f"{text}; slower, `{ahead[0][1]}` comes nearer{_paired(rows, best, ahead[0][1])}."
+        second = max(set(others), key=lambda way: (others.count(way), way))
+        at = [size for size, way in best.items() if way != second and second in order[size]]
+        text += f" ({_paired(rows, best, second, at)} beside `{second}`)"
+    slower = {size: ranking(found[size], (QUICK, np.inf))[:1] for size in best}
+    nearer = {
+        s: way
+        for s, ways in slower.items()
+        for way in ways
+        if _error(found, s, way) < _error(found, s, best[s])
+    }
+    ahead = [
+        f"`{nearer[size]}` at {size} pixels ({_paired(rows, nearer, best[size], [size])})" for size in nearer
+    ]
+    text += f"; slower, {', '.join(ahead)} comes nearer" if ahead else "; no slower way comes nearer there"
+    none = {size: way for size in found if size not in best for way in ranking(found[size])[:1]}
+    rest = [
+        f"at {s} pixels, where none is as quick, `{way}` does in {found[s][way].seconds:.2g} s"
+        for s, way in none.items()
+    ]
+    return f"{'; '.join([text, *rest])}."
 
 
-def _paired(rows: list[Row], before: str, after: str) -> str:
+def _error(found: Fares, size: int, way: str) -> float:
+    error = found[size][way].error
+    return np.inf if error is None else error.mean
+
+
+def _grouped(best: dict[int, str]) -> str:
+    """Ways by the sizes for which they are best."""
+    return ", ".join(
+        f"`{way}` at {_sizes(size for size in best if best[size] == way)} pixels"
+        for way in dict.fromkeys(best.values())
+    )
+
+
+def _paired(rows: list[Row], after: dict[int, str], before: str, sizes: list[int]) -> str:
+    """The paired difference of errors at some sizes, in words."""
+    chosen = [row for row in errors.usable(rows) if row["size"] in sizes]
     found = errors.change(
-        errors.usable(rows), lambda row: name_of(row) == before, lambda row: name_of(row) == after
+        chosen, lambda row: name_of(row) == before, lambda row: name_of(row) == after[int(row["size"])]
     )
     if found is None:
-        return ""
-    return f", difference {found}{'' if found.sure else ', which may be chance'}"
+        return "not measured yet"
+    return f"{found} degrees{'' if found.sure else ', which may be chance,'}"
 
 
 def _for_energy(found: Fares) -> str:
@@ -172,17 +188,13 @@ def _for_energy(found: Fares) -> str:
         size: min(ways, key=lambda way: (round(ways[way].over, 4), ways[way].seconds))
         for size, ways in found.items()
     }
-    parts = [
-        f"`{way}` at {_sizes(size for size in best if best[size] == way)} pixels"
-        for way in dict.fromkeys(best.values())
-    ]
     proven = [
         f"{fare.optimal} of {fare.runs} fields at {size}"
         for size, ways in found.items()
         for way, fare in ways.items()
         if way.startswith("prove") and fare.optimal
     ]
-    text = f"For the least energy take {', '.join(parts)}"
+    text = f"For the least energy take {_grouped(best)}"
     return f"{text}; `prove` shows {', '.join(proven)} to be optimal in its time." if proven else f"{text}."
 
 
