@@ -121,7 +121,7 @@ def matters(kept: Kept) -> list[str]:
         verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error to hidden curves changes"
     text = (
         f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
-        "on average, to the best field that is found."
+        "on average where that is proven, to the best field that is found."
     )
     others = quality_page.elsewhere()
     there = f"On {others.drawings} drawings, {others.others} by others, it is {others.changes[PROOF]}."
