@@ -100,11 +100,13 @@ def solvable(kept: Kept) -> list[str]:
         text = f"Half of the instances or more at every size that is measured, up to {last} pixels a side."
     else:
         text = f"Only on small grids: {reach[0]} pixels a side is the most of which a solver proves half."
-    return [
+    sentences = (
         text,
         f"From a file, the best pair of formulation and solver proves {', '.join(parts)}.",
         f"`prove`, which uses what is special about the problem, proves {', '.join(ours)}.",
-    ]
+        found["helped"],
+    )
+    return list(filter(None, sentences))
 
 
 def matters(kept: Kept) -> list[str]:

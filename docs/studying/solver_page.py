@@ -190,25 +190,30 @@ def _left(rows: list[Row], known: facts.Optima) -> str:
     return f"{points} of {len(rows)}: {above}"
 
 
-def variants_table(rows: list[Row], known: facts.Optima) -> str:
-    """Variants beside the cold runs of the same pair on the same instances; then all pairs together."""
+Both = list[tuple[Row, Row]]
+"""Runs of an instance: cold, and as a variant."""
+
+
+def variants(rows: list[Row]) -> dict[str, dict[Pair, Both]]:
+    """Of each variant and pair the runs beside the cold ones, on instances that are not too large."""
     cold = {(row["way"], row["solver"], row["instance"], row["size"]): row for row in rows if is_cold(row)}
-    kinds = facts.grouped([row for row in rows if not is_cold(row)], "start", "facet", "windows")
+    found: dict[str, dict[Pair, Both]] = {}
+    for row in rows:
+        key = (row["way"], row["solver"], row["instance"], row["size"])
+        if not is_cold(row) and key in cold and TOO_LARGE not in {row["status"], cold[key]["status"]}:
+            of = found.setdefault(variant(row), {})
+            of.setdefault((row["way"], row["solver"]), []).append((cold[key], row))
+    return {name: found[name] for name in sorted(found)}
+
+
+def variants_table(rows: list[Row], known: facts.Optima) -> str:
+    """Variants beside the cold runs, pair by pair; then all pairs together."""
     cells = []
-    for kind in sorted(kinds, key=variant):
-        together: list[tuple[Row, Row]] = []
-        for (way, solver), group in facts.grouped(kinds[kind], "way", "solver").items():
-            both = [
-                (cold[key], row)
-                for row in group
-                if (key := (row["way"], row["solver"], row["instance"], row["size"])) in cold
-                and TOO_LARGE not in {row["status"], cold[key]["status"]}
-            ]
-            if both:
-                cells.append([f"`{way}`", SOLVERS[solver].title, variant(kind), *_beside(both, known)])
-            together += both
-        if together:
-            cells.append(["**all**", "", variant(kind), *(f"**{c}**" for c in _beside(together, known))])
+    for name, of in variants(rows).items():
+        for (way, solver), both in of.items():
+            cells.append([f"`{way}`", SOLVERS[solver].title, name, *_beside(both, known)])
+        together = [each for both in of.values() for each in both]
+        cells.append(["**all**", "", name, *(f"**{c}**" for c in _beside(together, known))])
     heads = (
         "formulation", "solver", "variant", "runs", "proven: cold / variant", "s: cold / variant",
         "above the optimum: cold / variant",
@@ -216,7 +221,19 @@ def variants_table(rows: list[Row], known: facts.Optima) -> str:
     return markdown(heads, cells) if cells else "Not measured yet."
 
 
-def _beside(both: list[tuple[Row, Row]], known: facts.Optima) -> list[str]:
+def helped(rows: list[Row]) -> str:
+    """What a start and windows do for the number of proofs, in a sentence."""
+    parts = []
+    for name, of in variants(rows).items():
+        both = [each for pairs in of.values() for each in pairs]
+        if name != PRINTED:
+            proven = [sum(facts.is_proven(each[i]) for each in both) for i in (0, 1)]
+            parts.append(f"{name} {proven[1]} of {len(both)} runs end with a proof instead of {proven[0]}")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def _beside(both: Both, known: facts.Optima) -> list[str]:
     """Cells of that table: runs, proofs, seconds, and means over the instances of which both have a point."""
     before, after = (Rung(tuple(each[i] for each in both)) for i in (0, 1))
     shares = [pair for a, b in both if None not in (pair := (facts.over(a, known), facts.over(b, known)))]
@@ -225,12 +242,14 @@ def _beside(both: list[tuple[Row, Row]], known: facts.Optima) -> list[str]:
     return [str(len(both)), proven, seconds, above]
 
 
-def variant(kind: tuple[str, ...]) -> str:
-    """A variant in words."""
-    start, facet, windows = kind
-    if start != "cold":
-        return "from the greedy field"
-    return "facet (26) as printed" if facet != "hull" else f"windows of a {windows}"
+PRINTED: Final = "with facet (26) as printed"
+
+
+def variant(row: Row) -> str:
+    """What differs from a cold run, in words."""
+    if row["start"] != "cold":
+        return f"from the {row['start']} field"
+    return PRINTED if row["facet"] != "hull" else f"in the windows of a {row['windows']}"
 
 
 def percent(share: float) -> str:
@@ -360,5 +379,5 @@ def section(kept: Kept) -> list[str]:
 def facts_in_short(kept: Kept) -> dict[str, Any]:
     """What the answers at the top need: how far solvers reach, and how far `prove` does."""
     standing = rungs_of([row for row in kept["solvers"] if is_cold(row)])
-    return {"reach": reach(standing), "standing": standing,
+    return {"helped": helped(facts.measured(kept["solvers"])), "reach": reach(standing), "standing": standing,
             "prove": {norm: proof_rungs(kept["proofs"], norm) for norm in (2, 1)}}  # fmt: skip
