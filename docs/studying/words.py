@@ -58,10 +58,10 @@ QUALITY_TEXT: Final = {
 A designer draws some curvature lines and wants the others. So one curve of a drawing is hidden, a field is
 made from the rest, and the error is the mean angle between the curve and the nearer line of the crosses; at
 random it would be 22.5 degrees. Surfaces with a known answer have the mean angle to the true crosses, without
-noise on the strokes and with 3 and 8 degrees of it. Fields of many energies are made from each instance:
-greedy, improved, of smooth fields, local optima round random crosses, searches of 1 s and 3 s, and the best
-that `prove` finds in 10 s, in both norms. The weights are the default, 20 and 1e-6, but where others are
-named.""",
+noise on the strokes and with 3 and 8 degrees of it. Fields of many energies are made from each instance by
+[all methods](mathematics.md#10-ways-to-a-field): greedy, improved, of smooth fields, local optima round
+random crosses (*perturbed*), searches of 1 s and 3 s, and the best that `prove` finds in 10 s, in both norms.
+The weights are the default, 20 and 1e-6, but where others are named.""",
     "plot": """![Error beside the gap to the proven optimum](pictures/study_quality.svg)
 
 Each point is a field: its energy (2-norm) above the optimum, and its error less that of the field of least
@@ -79,10 +79,11 @@ PRACTICE_TEXT: Final = {
     "head": """## Practical use
 
 Every way to a field on every drawing, whole and without one of its three longest curves, on grids of 24 to
-256 pixels; one thread, default weights. `power` and `polyvector` with the best angles for their jumps.
-`two-stage` is section 5 of the paper: HiGHS on the MILP, then Ipopt on the convex QP. It, `patches` and
-`search` begin with the improved greedy field, so that their answer is no worse. Hidden curves: mean over
-drawings and standard error. The least energy is that of any way here.""",
+256 pixels; one thread, default weights. The [methods](mathematics.md#10-ways-to-a-field) are those of
+`crossfield solve --method`, `power` and `polyvector` with the best angles for their jumps. `two-stage` is
+section 5 of the paper: HiGHS on the MILP, then Ipopt on the convex QP. It, `patches`, `search` and `prove`
+begin at a field that is improved already, so that their answer is no worse. Hidden curves: mean over drawings
+and standard error. The least energy is that of any way here.""",
     "plot": """![Error to hidden curves beside seconds, by size](pictures/study_practice.svg)
 
 Up to the left is slow and bad, down to the left quick and good. Bars: standard error over drawings.""",
