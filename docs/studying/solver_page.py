@@ -206,6 +206,19 @@ def variants(rows: list[Row]) -> dict[str, dict[Pair, Both]]:
     return {name: found[name] for name in sorted(found)}
 
 
+def variant_rungs_table(rows: list[Row]) -> str:
+    """Proofs and seconds of every variant on every rung."""
+    found = facts.grouped((row | {"variant": variant(row)} for row in rows if not is_cold(row)), "variant")
+    sizes = sorted({int(row["size"]) for of in found.values() for row in of})
+    cells = [
+        [f"`{way}`", SOLVERS[solver].title, name, *(of[size].cell() if size in of else "" for size in sizes)]
+        for (name,) in sorted(found)
+        for (way, solver), of in rungs_of(found[name,]).items()
+    ]
+    heads = ("formulation", "solver", "variant", *(f"{size} pixels" for size in sizes))
+    return markdown(heads, cells) if cells else "Not measured yet."
+
+
 def variants_table(rows: list[Row], known: facts.Optima) -> str:
     """Variants beside the cold runs, pair by pair; then all pairs together."""
     cells = []
@@ -218,7 +231,7 @@ def variants_table(rows: list[Row], known: facts.Optima) -> str:
         "formulation", "solver", "variant", "runs", "proven: cold / variant", "s: cold / variant",
         "above the optimum: cold / variant",
     )  # fmt: skip
-    return markdown(heads, cells) if cells else "Not measured yet."
+    return markdown(heads, cells) if cells else ""
 
 
 def helped(rows: list[Row]) -> str:
@@ -369,6 +382,8 @@ def section(kept: Kept) -> list[str]:
         SOLVERS_TEXT["open"],
         open_table(facts.measured(cold), known),
         SOLVERS_TEXT["variants"],
+        variant_rungs_table(rows),
+        SOLVERS_TEXT["beside"],
         variants_table(facts.measured(rows), known),
         SOLVERS_TEXT["claims"],
         contradictions_text(facts.measured(rows), known),

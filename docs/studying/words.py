@@ -47,8 +47,9 @@ less.""",
 The same pairs and instances with one thing changed. *From the greedy field*: the complete point of that field
 is handed over. *In the windows of a proof*: those that a [certificate](files.md#certificates) of `prove`
 leaves, its seconds not counted. *With facet (26) as printed*: the paper's misprint, a relaxation, whose
-optimum may be lower than any field's energy. The last column: objective above the optimum of the correct
-problem, mean over the instances of which both have a point.""",
+optimum may be lower than any field's energy. Cells as above.""",
+    "beside": """The same beside the cold runs, on the instances of which both were run. The last column:
+objective above the optimum of the correct problem, mean over the instances of which both have a point.""",
     "claims": "### Are the claims true?",
 }
 
