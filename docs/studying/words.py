@@ -15,9 +15,8 @@ Thirty instances on each rung of a ladder of sizes: samples as a whole, squares 
 with straight strokes at random, and squares with random directions. The coefficients are the paper's, 1 and
 1e-6. Every solver that can be had for free gets the file of every [formulation](formulations.md) it takes, in
 the format that it reads best, on one thread, without a starting point: 6 s each, a relative gap of 1e-6,
-tolerances of 1e-9 where they can be set (CPLEX keeps its 1e-6 for the rows of an MIQP: with less its bounds
-can be wrong). Seconds are those of reading and solving. A run counts as proven when the solver says so, or
-when its bound is within 1e-6 of the objective, which is recomputed at its point.
+tolerances of 1e-9 where they can be set. Seconds are those of reading and solving. A run counts as proven
+when the solver says so, or when its bound is within 1e-6 of the objective, which is recomputed at its point.
 
 Proven of how many, and the shifted geometric mean of the seconds, runs without a proof counted with their
 limit. Sizes are pixels of the longer side. *Too large*: for the free edition. A dash: fewer than a tenth was
@@ -104,7 +103,7 @@ THREATS: Final = """## What may be wrong with this
   [Proven optima](proofs.md) has runs of a minute.
 - **Proven optima only.** Gaps are known where `prove` closes an instance in 10 s: not the hardest ones.
 - **One run of each.** How long a solver takes varies with its seed; each run is done once, with the default.
-- **Tolerances** are tighter than the defaults of most solvers, which costs them time.
+- **Tolerances** are tighter than the defaults of most solvers, which costs them time; all have the same.
 - **Formats.** A solver gets one format for a formulation; another may suit it better.
 - **One machine.** {machine}
 - **`prove`** belongs to this project, and is what the others are judged by. Its bounds come with

@@ -27,12 +27,10 @@ _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
 _NONLINEAR: Final = ("nlp", "minlp")
 _OPTIONS: Final = {
     "convert": "AmplNL out.nl\n",
-    "cplex": "epopt 1e-9\nepint 0\nbarepcomp 1e-10\n",
+    "cplex": "eprhs 1e-9\nepopt 1e-9\nepint 0\nbarepcomp 1e-10\n",
     "baron": "AbsConFeasTol 1e-9\nAbsIntFeasTol 1e-9\n",
 }
 """Option files of the solvers in GAMS: tight tolerances."""
-_ROWS: Final = {"cplex": "eprhs 1e-9\n"}
-"""For rows; with quadratic terms CPLEX keeps its default (programs/cplex.py says why)."""
 _TABLE: Final = "gmscmpun.txt"
 
 
@@ -78,9 +76,8 @@ def _run(path: Path, solver: str, *options: str) -> str:
     """The listing of a run. Raises TooLarge or Refused when GAMS does not come to its normal end."""
     kinds = _LINEAR_AND_QUADRATIC if solver == "cplex" else _LINEAR_AND_QUADRATIC + _NONLINEAR
     chosen = [f"{kind}={solver}" for kind in kinds]
-    quadratic = re.search(r"\busing miqcp\b", path.read_text(), re.IGNORECASE)
     for name, lines in _OPTIONS.items():
-        Path(f"{name}.opt").write_text(lines + ("" if quadratic else _ROWS.get(name, "")))
+        Path(f"{name}.opt").write_text(lines)
     command = [
         str(_system(solver) / "gams"),
         str(path),
