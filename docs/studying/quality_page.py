@@ -87,10 +87,14 @@ class Elsewhere:
     drawings: int
     others: int
     size: int
+    seconds: float
     changes: dict[str, Change | None]
 
     def __str__(self) -> str:
-        parts = [f"{OTHERS[way]} {_told(found)}" for way, found in self.changes.items()]
+        parts = [
+            f"{OTHERS[way].format(seconds=self.seconds)} {_told(found)}"
+            for way, found in self.changes.items()
+        ]
         return (
             f"On {self.drawings} drawings, {self.others} of them by others, at {self.size} pixels "
             f"([how good the fields are](fields.md)), from the greedy field: {'; '.join(parts)}."
@@ -100,7 +104,8 @@ class Elsewhere:
 @cache
 def elsewhere() -> Elsewhere:
     """The changes on the drawings of docs/fields.json, at the size at which it has proofs."""
-    kept = json.loads((DOCS / "fields.json").read_text())["rows"]["methods"]
+    facts = json.loads((DOCS / "fields.json").read_text())
+    kept = facts["rows"]["methods"]
     size = max(row["size"] for row in kept if row["method"] == PROOF)
     rows = [
         {"instance": row["drawing"], "size": size, "hidden": curve, "way": row["method"], "error": degrees}
@@ -113,11 +118,11 @@ def elsewhere() -> Elsewhere:
         way: change(rows, lambda row: row["way"] == "greedy", lambda row, way=way: row["way"] == way)
         for way in OTHERS
     }
-    return Elsewhere(len(names), len(names - SAMPLES.keys()), size, found)
+    return Elsewhere(len(names), len(names - SAMPLES.keys()), size, facts["seconds"], found)
 
 
 OTHERS: Final = {
-    "search": "to the search of 5 s", PROOF: "to the best that `prove` finds",
+    "search": "to the search of {seconds:g} s", PROOF: "to the best that `prove` finds",
     "polyvector": "to the PolyVector field", "bend": "to the bend field",
 }  # fmt: skip
 """Methods of docs/fields.json, and what is said of the change to them."""

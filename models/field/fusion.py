@@ -22,8 +22,6 @@ from .jumps import free_jumps, parity_sign
 
 _APART: Final = 0.02  # radians of cross error up to which two crosses count as one
 _UNITS: Final = 1e6  # into which 1 + energy is divided: flows are whole numbers, whose sums no order changes
-
-
 _MOST: Final = 1e9  # units of a pixel's price, far beyond all that a choice can gain: flows have 32 bits
 
 

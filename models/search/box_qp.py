@@ -27,7 +27,6 @@ _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
-@one_thread()
 def fitted(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
 
@@ -49,6 +48,7 @@ def fitted(field: CrossField, over: Over = never) -> CrossField:
     return CrossField(instance, alpha, beta, field.p)
 
 
+@one_thread()
 def least_in_box(
     energy: Quadratic,
     x: Floats,

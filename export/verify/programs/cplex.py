@@ -95,7 +95,7 @@ def solve(
         (tolerances.mip.tolerances.mipgap, gap),
         (tolerances.mip.tolerances.absmipgap, 1e-9),
         (tolerances.mip.tolerances.integrality, 0.0),
-        # Of some 150 runs of `minlp-quartic` two have bounds above the optimum with this, and two claim
+        # Of some 100 runs of `minlp-quartic` two have bounds above the optimum with this, and two claim
         # optima that are none with the default. Numerical emphasis may be the remedy; it is not measured.
         (tolerances.simplex.tolerances.feasibility, 1e-9),
         (tolerances.simplex.tolerances.optimality, 1e-9),
