@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
     from .export.solving.evaluate import evaluate as evaluate
-    from .export.solving.job import Limits as Limits
+    from .export.solving.limits import Limits as Limits
     from .export.solving.local import solve as solve
     from .export.solving.run import run as run
     from .export.solving.two_stage import fit_angles as fit_angles
@@ -66,7 +66,7 @@ _HOME: Final = {
     "Hint": ".models.surface.hints",
     "Instance": ".models.instance.instance",
     "Light": ".export.shading.light",
-    "Limits": ".export.solving.job",
+    "Limits": ".export.solving.limits",
     "Problem": ".models.formulations.problem",
     "Proof": ".models.proof.record",
     "Search": ".models.search.search",

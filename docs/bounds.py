@@ -13,7 +13,7 @@ from typing import Final
 import crossfield as cf
 import highspy
 import numpy as np
-from crossfield.export.solving.highs import loaded
+from crossfield.export.programs.highs import loaded
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from make import markdown, said

@@ -54,7 +54,7 @@ class Answer:
 
 def highs(path: Path, seconds: float, options: Options) -> tuple[float | None, float | None, int]:
     """Objective, dual bound and nodes of HiGHS."""
-    from crossfield.export.solving.highs import loaded
+    from crossfield.export.programs.highs import loaded
 
     model = loaded(path, threads=THREADS, time_limit=seconds, mip_rel_gap=1e-7, **options)
     model.run()

@@ -24,7 +24,7 @@ ORDER: Final = (
     "export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions/logs",
     "export/solutions",
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/solving",
-    "export/verify/programs", "export/verify",
+    "export/programs", "export/verify",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
     "export/library/building", "export/library/checking", "export/library/contributions",
     "export/library/site", "export/cli",

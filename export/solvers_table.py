@@ -1,4 +1,4 @@
-"""The one table of solvers: what each reads, refuses, starts from, proves, what brings it, what drives it.
+"""The one table of solvers: what each reads, refuses, starts from, proves, what brings it.
 
 It is true of solvers anywhere, not only of those that are installed here. `crossfield list`, the manifests,
 starting points, solving, verification, the library and the docs are generated from it; a solver is added by
@@ -124,7 +124,7 @@ PROGRAMS: Final = {
 }  # fmt: skip
 """The programs that our files are for, as far as they can be had for free.
 
-Each has a module in export/verify/programs.
+Each has a module in export/programs.
 """
 
 
@@ -153,9 +153,9 @@ class Solver:
 
     program: the name of the program that brings it. package: a Python package that it needs besides. proves:
     of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
-    start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
-    that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
-    problems for which others come first. patch: how it solves patches, where it does. vendor: who makes it,
+    start: the file it starts from beside a model, where it takes one. answers: suffix of its solution files.
+    bundled: whether it is installed with crossfield. not_for: classes of problems for which other bundled
+    solvers come first. patch: how it solves patches, where it does. vendor: who makes it,
     where others of its maker stand here too: what they find is one opinion. feasible_within: how far a row
     may be broken by the points that it tells.
     """
@@ -168,7 +168,8 @@ class Solver:
     package: str = ""
     proves: Proof = "global"
     start: StartFile | None = None
-    driver: str = ""
+    answers: str = ".sol"
+    bundled: bool = False
     not_for: tuple[str, ...] = ()
     patch: PatchUse | None = None
     vendor: str = ""
@@ -201,7 +202,7 @@ SOLVERS: Final = {
     for entry in (
         Solver(
             "gurobi", "Gurobi", ("mps", "lp"), "gurobi",
-            start=StartFile("list", ".mst", "gurobi_cl InputFile=START.mst MODEL.mps"),
+            start=StartFile("list", ".mst", "gurobi_cl InputFile=START.mst MODEL.mps"), answers=".json",
         ),
         Solver(
             "cplex", "CPLEX", ("mps", "lp"), "cplex",
@@ -222,6 +223,7 @@ SOLVERS: Final = {
         Solver(
             "xpress", "Xpress", ("mps", "lp"), "xpress",
             start=StartFile("slx", ".slx", "READPROB MODEL.mps, then READSLXSOL START.slx", convex=True),
+            answers=".slx",
         ),
         Solver(
             "highs", "HiGHS", ("mps", "lp"), "highs",
@@ -236,7 +238,7 @@ SOLVERS: Final = {
                 ),
             },
             start=StartFile("highs", ".sol", "highs --read_solution_file START.sol MODEL.mps"),
-            driver="highs", not_for=("QP",), patch=PatchUse("milp-mccormick", 5),
+            bundled=True, not_for=("QP",), patch=PatchUse("milp-mccormick", 5),
         ),
         Solver(
             "scip", "SCIP", ("nl", "mps", "lp", "osil"), "scip",
@@ -251,7 +253,7 @@ SOLVERS: Final = {
                     "write minlp-quartic, which is the same problem for whole jumps",
                 )
             },
-            package="gamspy_baron",
+            package="gamspy_baron", answers=".csv",
         ),
         Solver(
             "ipopt", "Ipopt", ("nl", "gms"), "casadi",
@@ -259,7 +261,7 @@ SOLVERS: Final = {
                 "integers": Refusal("solve", "Ipopt drops integrality; relax it, or fix the jumps"),
                 "non-convexity": Refusal("local", "Ipopt finds local optima"),
             },
-            proves="local", driver="casadi", vendor="COIN-OR",
+            proves="local", bundled=True, vendor="COIN-OR",
         ),
         Solver(
             "bonmin", "Bonmin", ("nl", "gms"), "casadi",
@@ -268,7 +270,7 @@ SOLVERS: Final = {
                     "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
                 )
             },
-            proves="convex", driver="casadi", patch=PatchUse("miqp-exact", 4), vendor="COIN-OR",
+            proves="convex", bundled=True, patch=PatchUse("miqp-exact", 4), vendor="COIN-OR",
         ),
         Solver(
             "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",
@@ -277,17 +279,17 @@ SOLVERS: Final = {
                 "quadratic rows": Refusal("solve", "CPLEX takes quadratic rows only when they are convex"),
                 "non-convexity": Refusal("solve", "CPLEX takes convex problems up to quadratic"),
             },
-            vendor="IBM",
+            answers=".csv", vendor="IBM",
         ),
         Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY, vendor="COIN-OR"),
         # What is 1e-5 from a whole number it takes for whole and tells rounded: times pi/2 and pi in rows.
         Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY, feasible_within=5e-5),
     )
 }  # fmt: skip
-"""The table of solvers. Those that are driven here stand in the order in which they are preferred."""
+"""The table of solvers. Bundled ones stand in the order in which they are preferred."""
 
-DRIVEN: Final = {name: solver for name, solver in SOLVERS.items() if solver.driver}
-"""The solvers that are driven here."""
+BUNDLED: Final = {name: solver for name, solver in SOLVERS.items() if solver.bundled}
+"""The solvers that are installed with crossfield."""
 
 
 class Taking(NamedTuple):

@@ -38,7 +38,8 @@ FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
 def pytest_sessionstart(session):
     """Compile what proofs need once, and not in every process that runs tests, while these collect them."""
     if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
-        command = [sys.executable, "-m", "crossfield.export.solving.compiling"]
+        program = "from crossfield.export.solving.compiling import compile_all; compile_all()"
+        command = [sys.executable, "-c", program]
         session.config.stash[COMPILING] = subprocess.Popen(command)
 
 

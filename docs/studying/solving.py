@@ -12,7 +12,7 @@ import crossfield as cf
 from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.formats.registry import generator
 from crossfield.export.solvers_table import SOLVERS
-from crossfield.export.verify.solve_with import Programs, format_for
+from crossfield.export.solving.local import Solvers, format_for
 from crossfield.models.errors import SolutionError, SolverError, UnsupportedBySolverError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.problem import Problem, formulate, tightened
@@ -41,21 +41,15 @@ def pairs() -> tuple[tuple[str, str], ...]:
         (problem.name, solver)
         for problem in smallest_problems()
         for solver in SOLVERS
-        if format_for(problem, solver)
+        if format_for(problem, solver).answer == "yes"
     )
 
 
 @cache
-def programs() -> Programs:
-    """The programs of this process, which end with it."""
-    folder = tempfile.TemporaryDirectory(prefix="crossfield-study-")
-    found = Programs(Path(folder.name)).__enter__()
-
-    def leave() -> None:
-        found.__exit__()
-        folder.cleanup()
-
-    Finalize(None, leave, exitpriority=10)  # children of multiprocessing run no other clean-up
+def programs() -> Solvers:
+    """The solvers of this process, whose children end with it."""
+    found = Solvers().__enter__()
+    Finalize(None, found.__exit__, exitpriority=10)  # children of multiprocessing run no other clean-up
     return found
 
 
@@ -94,13 +88,13 @@ def solved(run: Run) -> dict[str, Any]:
     start = greedy(run.instance, run.size) if run.start == "greedy" else None
     facts: dict[str, Any] = {
         "version": programs().version(run.solver),
-        "format": format_for(problem, run.solver),
+        "format": format_for(problem, run.solver).format,
         **sizes(problem.instance),
         "columns": problem.columns,
         "rows": problem.row_count,
     }
     try:
-        found = programs().solve(problem, run.solver, run.limit, gap=GAP, start=start)
+        found = programs().solve(problem, run.solver, limits=cf.Limits(run.limit, GAP, 1), start=start)
     except UnsupportedBySolverError as error:
         return facts | {"status": TOO_LARGE, "note": str(error)}
     except (SolverError, SolutionError) as error:

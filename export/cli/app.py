@@ -138,7 +138,7 @@ def run_command(
     The methods are {methods of a run}. The bend field is kept, and that of least 2-norm energy beside it.
     report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
     """
-    from ..solving.job import Limits
+    from ..solving.limits import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)

@@ -76,7 +76,7 @@ def evaluate_command(
     the rest; crosses at random have 22.5 degrees. Ctrl-C keeps the curves done so far.
     """
     from ..solving.evaluate import DEFAULT_METHODS, evaluate
-    from ..solving.job import Limits
+    from ..solving.limits import Limits
     from ..solving.methods import METHODS
 
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")

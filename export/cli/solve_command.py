@@ -97,7 +97,7 @@ def solve_command(
     """
     deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
     from ...models.field.file import read_field
-    from ..solving.job import Limits
+    from ..solving.limits import Limits
     from ..solving.methods import Request
 
     if (formulation is None) == (method is None):

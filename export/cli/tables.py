@@ -10,8 +10,8 @@ from ...models.formulations.problem import Problem
 from ...models.sketch.samples import sample, samples
 from ..formats.registry import FORMATS, carried
 from ..solutions.readers.registry import READERS
-from ..solvers_table import DRIVEN, PROGRAMS, SOLVERS, smallest, takers
-from ..solving.local import refusal
+from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest, takers
+from ..solving.local import format_for
 from ..solving.methods import METHODS
 
 Row = dict[str, Any]
@@ -30,7 +30,7 @@ def tables() -> Tables:
             [_format_row(name) for name in FORMATS],
         ),
         "solvers": (
-            ("formulation", *DRIVEN),
+            ("formulation", *BUNDLED),
             [_solver_row(problem, relaxed) for problem, relaxed in _with_relaxations()],
         ),
         "externals": (("formulation", *SOLVERS), [_external_row(problem) for problem in smallest_problems()]),
@@ -105,7 +105,8 @@ def _format_row(name: str) -> Row:
 
 
 def _solver_row(problem: Problem, relaxed: bool) -> Row:
-    answers = {name: refusal(problem, solver) or "yes" for name, solver in DRIVEN.items()}
+    taking = {name: format_for(problem, name) for name in BUNDLED}
+    answers = {name: "yes" if each.answer == "yes" else each.reason for name, each in taking.items()}
     return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
 
 

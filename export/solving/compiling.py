@@ -1,54 +1,57 @@
-"""What proofs need is compiled once on a machine, in a process of its own that a deadline can cut off.
+"""What proofs need is compiled once on a machine, in a child process that a deadline can cut off.
 
-Two such processes wait for one another, and the second finds all done.
+Two such processes wait for one another, and the second finds everything compiled.
 """
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final
 
 from filelock import FileLock
 
-from ...models.errors import SolverError
+from ...models.errors import CrossfieldError, SolverError
+from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Deadline
+from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
-from .child import run_child
-
-_COMMAND: Final = [sys.executable, "-P", "-m", __spec__.name]
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """What is done meanwhile, while all is compiled in the background unless it is."""
+    """Compile in the background what proofs need, unless it is compiled; the end of the context ends that."""
     if is_compiled():
         yield
         return
-    none = subprocess.DEVNULL
-    # Ctrl-C is for its parent, which ends it.
-    with subprocess.Popen(_COMMAND, stdin=none, stdout=none, stderr=none, start_new_session=True) as child:
-        try:
-            yield
-        finally:
-            child.kill()
+    with Child() as child:
+        threading.Thread(target=_compile_in, args=(child,), daemon=True).start()
+        yield
+
+
+def _compile_in(child: Child) -> None:
+    with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs it
+        child.call(compile_all)
 
 
 def compile_proofs(folder: Path, deadline: Deadline) -> None:
-    """Nothing, once the functions of proofs are compiled; what is done stays where it is cut off.
+    """Compile the functions of proofs unless they are; what is done stays when the deadline cuts it off.
 
-    It takes some 10 s. Raises SolverError where they are not by the deadline.
+    It takes some 10 s. Raises SolverError when they are not compiled by the deadline.
     """
     log = make_folder(folder) / "compiling.log"
-    ended = run_child(_COMMAND, log, deadline)
-    if ended.interrupted:
-        raise KeyboardInterrupt
-    if ended.code != 0:
-        reason = "what proofs compile, once on a machine, was not ready in the time; it goes on from there"
-        raise SolverError(f"{reason} the next time (or see the log)", file=log)
+    try:
+        with Child() as child:
+            child.call(compile_all, deadline=deadline, log=log)
+    except WorkerError as error:
+        if isinstance(error, KilledError) and error.interrupted:
+            raise KeyboardInterrupt from error
+        raise SolverError(
+            f"the functions of proofs, which are compiled once on a machine, were not ready: {error}; "
+            "the next run goes on from there",
+            file=log,
+        ) from error
 
 
 def is_compiled() -> bool:
@@ -59,8 +62,8 @@ def is_compiled() -> bool:
     return all_compiled()
 
 
-def main() -> None:
-    """Compile, by a proof of a few pixels."""
+def compile_all() -> None:
+    """Compile what proofs need, by a proof of a few pixels."""
     from ...models.processes.compiled import place
     from ...models.proof.prove import prove
     from ...models.sketch.samples import sample
@@ -70,7 +73,3 @@ def main() -> None:
     with FileLock(place() / "compiling.lock"):
         if not is_compiled():
             prove(sample("mouse", 4))
-
-
-if __name__ == "__main__":
-    main()

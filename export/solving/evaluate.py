@@ -18,7 +18,7 @@ from ...models.processes.progress import Progress, silent
 from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
-from .job import Limits
+from .limits import Limits
 from .methods import METHODS, Request
 
 DEFAULT_METHODS: Final = ("greedy", "search")

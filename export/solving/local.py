@@ -1,71 +1,54 @@
-"""Solving here: write the file, let a driver solve it, read the answer back as anybody's.
+"""Solving with any program of the table that is installed: one way for all of them.
 
-So a solve tests the file too. Which solvers are driven, and by which module of this folder, stands in the
-table of solvers.
+The problem is written to a file, the program solves that file in a child process and writes a solution file,
+and the solution is read back like one that somebody else made. So a solve tests the files too.
 """
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from importlib import import_module
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
 from pathlib import Path
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
-from ...models.errors import InputError, MissingSolverError, SolutionError, UnsupportedBySolverError
+from ...models.errors import (
+    InputError,
+    MissingSolverError,
+    SolutionError,
+    SolverError,
+    UnsupportedBySolverError,
+)
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
+from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Deadline
+from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, leave_manifest
+from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
+from ..programs.calls import call
+from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError
+from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
-from ..solvers_table import DRIVEN, PROGRAMS, Solver, takes_in
-from .child import FEASIBLE
-from .job import Job, Limits, RunEnd
+from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
+from ..writing.sink import save
+from .limits import Limits
 
-
-def solver_for(problem: Problem, name: str | None = None) -> Solver:
-    """The solver of that name, or the preferred one for the problem's class.
-
-    One whose format holds a weaker relaxation of the problem comes after the others. Raises
-    UnsupportedBySolverError when it does not take the class, MissingSolverError when its package is absent.
-    """
-    if name is not None and name not in DRIVEN:
-        raise InputError(f"there is no solver {name!r}; choose one of {', '.join(DRIVEN)}")
-    asked = [DRIVEN[name]] if name else [s for s in DRIVEN.values() if problem.problem_class not in s.not_for]
-    refusals = {solver.name: refusal(problem, solver) for solver in asked}
-    willing = [solver for solver in asked if not refusals[solver.name]]
-    if not willing:
-        reasons = ", ".join(f"{solver} ({reason})" for solver, reason in refusals.items())
-        raise UnsupportedBySolverError(
-            f"{problem.name} is {_described(problem)}, which is not for {reasons}; "
-            "see `crossfield list` for who takes what, or relax it"
-        )
-    installed = [solver for solver in willing if not solver.missing]
-    if not installed:
-        first, package = willing[0], PROGRAMS[willing[0].program].needs
-        raise MissingSolverError(
-            f"{first.name} needs the Python package {package}, which is not installed; {first.missing}"
-        )
-    return min(installed, key=lambda each: carried(problem, FORMATS[each.formats[0]]).formulation.weakened)
-
-
-def refusal(problem: Problem, solver: Solver) -> str:
-    """Why a solver that is driven here does not take the problem in the format it reads; empty when it does.
-
-    An answer without proof is wanted only of a solver that proves nothing anyway.
-    """
-    taking = takes_in(problem, solver.name, solver.formats[0])
-    wanted = taking.answer == "yes" or (taking.answer == "local" and solver.proves == "local")
-    return "" if wanted else taking.reason
-
-
-def _described(problem: Problem) -> str:
-    return f"{'a convex' if problem.convex else 'a non-convex'} {problem.problem_class}"
+FEASIBLE: Final = 1e-6
+"""Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
+VERSION_SECONDS: Final = 60.0
+"""Seconds in which a program has to report its version."""
+_LATE: Final = "left no answer within its time; give it more, or a start"
+_NO_BETTER: Final = "nothing better than the start"
 
 
 def solve(
@@ -76,60 +59,281 @@ def solve(
     limits: Limits | None = None,
     start: CrossField | None = None,
 ) -> Solution:
-    """The solution that a solver finds here, read back from its file and checked, all within the time limit.
+    """Solve a problem with a solver that is installed, within the time limit, and check the answer.
 
-    Written file, log and solution stay in `folder` when one is given, with the manifest that reads the
-    solution back. start: a field whose complete point is handed over as incumbent or starting point. Ctrl-C
-    ends the solver and gives its best point so far. Raises UnsupportedBySolverError, MissingSolverError,
-    SolverError, OutputError.
+    solver: a name of the table of solvers; None: HiGHS, Ipopt or Bonmin, by the problem's class. folder:
+    where the written file, log and solution stay, with the manifest that reads the solution back; None: they
+    are deleted. start: a field whose complete point is the incumbent or starting point. Ctrl-C ends the
+    solver and returns its best point so far.
+
+    Raises InputError for an unknown solver, UnsupportedBySolverError, MissingSolverError, SolverError,
+    SolutionError, OutputError.
     """
     chosen = solver_for(problem, solver)
-    if folder is None:
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
-            return _solve_in(Path(temporary), problem, chosen, limits or Limits(), start)
-    return _solve_in(make_folder(folder), problem, chosen, limits or Limits(), start, lasting=True)
+    with Solvers() as solvers:
+        return solvers.solve(problem, chosen.name, folder, limits=limits, start=start)
 
 
-def _solve_in(
-    folder: Path,
-    problem: Problem,
-    solver: Solver,
-    limits: Limits,
-    start: CrossField | None,
-    *,
-    lasting: bool = False,
-) -> Solution:
-    deadline = Deadline.after(limits.seconds)
-    stem = f"{problem.instance.name}.{problem.name}"
-    model, solution, log = (
-        folder / f"{stem}{suffix}"
-        for suffix in (FORMATS[solver.formats[0]].suffix, f".{solver.name}.sol", f".{solver.name}.log")
+def solver_for(problem: Problem, name: str | None = None) -> Solver:
+    """Return the solver of that name, or the preferred one of those that come with crossfield.
+
+    One whose format holds a weaker relaxation of the problem comes after the others. Raises InputError for an
+    unknown name, UnsupportedBySolverError when the solver does not take the problem, MissingSolverError when
+    its program is not installed.
+    """
+    if name is not None and name not in SOLVERS:
+        raise InputError(f"there is no solver {name!r}; choose one of {', '.join(SOLVERS)}")
+    asked = (
+        [SOLVERS[name]] if name else [s for s in BUNDLED.values() if problem.problem_class not in s.not_for]
     )
-    written = write(problem, model, start=start)
-    held = written.problem
-    if lasting and is_recordable(problem):
-        leave_manifest(problem, written, folder)
-    for stale in (solution, log):
-        stale.unlink(missing_ok=True)
-    begin = time.perf_counter()
-    # Reading the answer takes about as long as writing the problem did.
-    own = deadline.later(deadline.left() - limits.seconds)
-    point = None if start is None else held.point(start)
-    ended = _run(solver, Job(solver.name, model, solution, log, held, point, limits, own))
-    seconds = time.perf_counter() - begin
+    taking = {solver.name: format_for(problem, solver.name) for solver in asked}
+    willing = [solver for solver in asked if taking[solver.name].answer == "yes"]
+    if not willing:
+        reasons = ", ".join(f"{solver} ({found.reason})" for solver, found in taking.items())
+        raise UnsupportedBySolverError(
+            f"{problem.name} is {_described(problem)}, which is not for {reasons}; "
+            "`crossfield list` shows which solver takes what; or relax it"
+        )
+    present = [solver for solver in willing if not solver.missing]
+    if not present:
+        raise MissingSolverError(f"{willing[0].title} is not installed; {willing[0].missing}")
+    formats = {solver.name: FORMATS[taking[solver.name].format] for solver in present}
+    return min(present, key=lambda each: carried(problem, formats[each.name]).formulation.weakened)
+
+
+def format_for(problem: Problem, solver: str) -> Taking:
+    """Return the format in which a solver gets a problem here, or why it does not take the problem.
+
+    An answer without proof is accepted only from a solver that never proves anything.
+    """
+    entry = SOLVERS[solver]
+    readable = [name for name in entry.formats if name in PROGRAMS[entry.program].formats]
+    found = [takes_in(problem, solver, name) for name in readable]
+    local = entry.proves == "local"
+    for taking in found:
+        if taking.answer == "yes" or (local and taking.answer == "local"):
+            return taking._replace(answer="yes")
+    return found[0]
+
+
+def _described(problem: Problem) -> str:
+    return f"{'a convex' if problem.convex else 'a non-convex'} {problem.problem_class}"
+
+
+class Files(NamedTuple):
+    """The files of a solve: model, solution in the solver's own layout, log, and starting point."""
+
+    model: Path
+    solution: Path
+    log: Path
+    start: Path
+
+    @classmethod
+    def beside(cls, model: Path, solver: str) -> Self:
+        """Return the files of a solve in the folder of the model."""
+        start = STARTS[solver].suffix if solver in STARTS else ""
+        suffixes = (f".{solver}{SOLVERS[solver].answers}", f".{solver}.log", f".{solver}.start{start}")
+        return cls(model, *(model.with_name(f"{model.stem}{suffix}") for suffix in suffixes))
+
+
+class Solvers:
+    """Solvers at work: a child process for each program, started when it is first needed.
+
+    A context that ends the processes. For many solves it saves the time to start a process for each.
+    """
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self._stack = ExitStack()
+        self._children: dict[str, Child] = {}
+        self._versions: dict[str, str] = {}
+
+    def __enter__(self) -> Self:
+        """Make the folder in which programs keep files of their own."""
+        self._folder = Path(self._stack.enter_context(_folder()))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End every child process."""
+        self._stack.close()
+
+    def child(self, program: str) -> Child:
+        """Return the child process of a program, with a folder of its own."""
+        if program not in self._children:
+            folder = make_folder(self._folder / program)
+            self._children[program] = self._stack.enter_context(Child(folder))
+        return self._children[program]
+
+    def version(self, solver: str) -> str:
+        """Return the version of a solver, or that of the package that contains it, with its name.
+
+        Raises SolverError when the program does not report it.
+        """
+        if solver not in self._versions:
+            self._versions[solver] = self._version(solver)
+        return self._versions[solver]
+
+    def _version(self, solver: str) -> str:
+        program = PROGRAMS[SOLVERS[solver].program]
+        if program.name != solver:
+            try:
+                return f"{program.needs} {installed(program.needs)}"
+            except PackageNotFoundError:
+                return "not installed"
+        return self.program_version(program.name)
+
+    def ask(self, program: str, step: str, *arguments: Any, seconds: float) -> Any:
+        """Return the result of a step (see protocol.py) of a program. Raises what it raises."""
+        log, deadline = self._folder / f"{program}.log", Deadline.after(seconds)
+        return self.child(program).call(call, program, step, *arguments, deadline=deadline, log=log).value
+
+    def program_version(self, program: str) -> str:
+        """Return what a program reports as its version. Raises SolverError."""
+        try:
+            return str(self.ask(program, "version", seconds=VERSION_SECONDS))
+        except (WorkerError, RefusedError, FailedError) as error:
+            raise SolverError(f"{PROGRAMS[program].title} does not report its version: {error}") from error
+
+    def solve(
+        self,
+        problem: Problem,
+        solver: str,
+        folder: str | Path | None = None,
+        *,
+        limits: Limits | None = None,
+        start: CrossField | None = None,
+    ) -> Solution:
+        """Solve a problem; parameters, result and errors are those of the function `solve`."""
+        limits = limits or Limits()
+        deadline = Deadline.after(limits.seconds)
+        with _folder(folder) as place:
+            taking = format_for(problem, solver)
+            stem = f"{problem.instance.name}.{problem.name}"
+            files = Files.beside(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
+            written = write(problem, files.model, start=start)
+            if folder is not None and is_recordable(problem):
+                leave_manifest(problem, written, place)
+            # Reading the answer takes about as long as writing the problem did.
+            search = deadline.later(deadline.left() - limits.seconds)
+            return self.solve_file(written.problem, solver, files, limits, search, start=start)
+
+    def solve_file(
+        self,
+        held: Problem,
+        solver: str,
+        files: Files,
+        limits: Limits,
+        deadline: Deadline,
+        *,
+        start: CrossField | None = None,
+        precise: bool = False,
+        late: float = 0.0,
+    ) -> Solution:
+        """Solve a model file that was written for a solver, and read the answer.
+
+        held: the problem as the file holds it. precise: whether tolerances are as tight as the solver takes
+        them. late: seconds after the deadline at which a solver that does not look at the clock is killed.
+        """
+        entry = SOLVERS[solver]
+        for stale in (files.solution, files.log, files.start):
+            stale.unlink(missing_ok=True)
+        begins = _start_file(held, solver, start, files.start)
+        job = Job(
+            solver,
+            files.model,
+            files.solution,
+            begins,
+            deadline,
+            limits.gap,
+            limits.threads,
+            precise,
+            held.stamp,
+        )
+        point = None if start is None else held.point(start)
+        begin = time.perf_counter()
+        try:
+            outcome, interrupted = self.child(entry.program).call(
+                call, entry.program, "solve", job, deadline=deadline.later(late), log=files.log
+            )
+        except TooLargeError as error:
+            raise UnsupportedBySolverError(
+                f"{entry.title}: {held.columns} columns and {held.row_count} rows are too many for its free "
+                f"edition, which takes {PROGRAMS[entry.program].free}"
+            ) from error
+        except (RefusedError, FailedError) as error:
+            raise SolverError(f"{entry.title}: {error}", file=files.model) from error
+        except KilledError as error:
+            outcome, interrupted = Outcome(Status.LIMIT_WITHOUT_POINT, _LATE), error.interrupted
+        except WorkerError as error:
+            raise SolverError(
+                f"{entry.title}: {error}; its log is {files.log.name}", file=files.model
+            ) from error
+        finally:
+            files.start.unlink(missing_ok=True)
+        if outcome.status == Status.LIMIT_WITHOUT_POINT and not files.solution.exists():
+            outcome = _start_as_answer(held, point, files, outcome, entry)
+        found = _answer(held, files, outcome, entry)
+        return replace(
+            found,
+            interrupted=interrupted,
+            seconds=time.perf_counter() - begin,
+            start_returned=_is_start(found.point, point),
+        )
+
+
+@contextmanager
+def _folder(given: str | Path | None = None) -> Iterator[Path]:
+    """The folder that was given, or one that is deleted afterwards."""
+    if given is not None:
+        yield make_folder(given).resolve()
+        return
+    with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as temporary:
+        yield Path(temporary).resolve()
+
+
+def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:
+    """Write the starting point for a solver that takes one beside the model; None for the others.
+
+    Files of .nl and GAMS hold the point themselves.
+    """
+    if start is None or solver not in STARTS or not held.integer.any():
+        return None
     try:
-        found = read_solution(solution, held)
-    except SolutionError:
-        # It is cut off by a full disk, most likely: nobody shall take it for an answer.
-        solution.unlink(missing_ok=True)
-        raise
-    return replace(
-        found,
-        bound=ended.bound,
-        interrupted=ended.interrupted,
-        seconds=seconds,
-        start_returned=_is_start(found.point, point),
+        write_start(held, start, path, solver)
+    except UnsupportedBySolverError:  # Xpress, where the problem is not convex
+        return None
+    return path
+
+
+def _start_as_answer(
+    held: Problem, point: Floats | None, files: Files, outcome: Outcome, entry: Solver
+) -> Outcome:
+    """Write the start as the solution of a solver that ended without a point, if the start is feasible."""
+    if point is None or held.violation(point).worst > FEASIBLE:
+        return outcome
+    save(files.solution, LAYOUTS["highs"](Start(held, point)))
+    return outcome._replace(
+        status=Status.LIMIT_WITH_POINT,
+        message=f"{entry.name}: stopped at its limit or by Ctrl-C, {_NO_BETTER}",
     )
+
+
+def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Solution:
+    """Read the solution file; what the solver reported besides outweighs what the file states."""
+    if not files.solution.exists():
+        status = outcome.status or Status.NO_POINT
+        return Solution(
+            held, None, status, outcome.message, entry.title, bound=outcome.bound, nodes=outcome.nodes
+        )
+    try:
+        found = read_solution(files.solution, held)
+    except SolutionError:
+        files.solution.unlink(missing_ok=True)  # cut off, by a full disk for instance: it must not be used
+        raise
+    reported: dict[str, Any] = {
+        "claimed": outcome.status, "message": outcome.message, "bound": outcome.bound, "nodes": outcome.nodes
+    }  # fmt: skip
+    return replace(found, **{key: value for key, value in reported.items() if value not in (None, "")})
 
 
 def _is_start(point: Floats | None, start: Floats | None) -> bool | None:
@@ -137,9 +341,3 @@ def _is_start(point: Floats | None, start: Floats | None) -> bool | None:
     if point is None or start is None:
         return None
     return bool(np.abs(point - start).max(initial=0.0) <= FEASIBLE)
-
-
-def _run(solver: Solver, job: Job) -> RunEnd:
-    driver = import_module(f".{solver.driver}", __package__)
-    ended: RunEnd = driver.run(job)
-    return ended

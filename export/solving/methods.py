@@ -25,7 +25,7 @@ from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
-from .job import Limits
+from .limits import Limits
 from .patches import PATCH_SOLVERS, PatchSearch, search_patches
 from .two_stage import find_jumps, fit_angles, jumps_until
 

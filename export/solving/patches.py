@@ -20,6 +20,7 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import formulate, with_rest_fixed
 from ...models.instance.grid import Bools, Ints
+from ...models.processes.child import GRACE
 from ...models.processes.deadline import Deadline
 from ...models.processes.interruption import interruptible
 from ...models.processes.side_by_side import side_by_side
@@ -28,12 +29,11 @@ from ...models.search.excerpt import Excerpt, excerpt
 from ...models.search.free_field import FreeField
 from ...models.search.improvement import settle
 from ...models.search.walk import LOWER
-from ..solvers_table import DRIVEN
-from .child import GRACE
-from .job import Limits
+from ..solvers_table import BUNDLED
+from .limits import Limits
 from .local import solve
 
-PATCH_SOLVERS: Final = {name: solver.patch for name, solver in DRIVEN.items() if solver.patch is not None}
+PATCH_SOLVERS: Final = {name: solver.patch for name, solver in BUNDLED.items() if solver.patch is not None}
 """For each solver of patches what it solves, and the side of the first patches."""
 
 _WIDEST: Final = 8  # side at which a search ends: no solver here closes such a patch

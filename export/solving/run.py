@@ -25,7 +25,7 @@ from ..solutions.solution import Solution
 from ..surfaces.files import SHADED, write_shaded
 from ..surfaces.report import surface_facts
 from .compiling import compiling
-from .job import Limits
+from .limits import Limits
 from .methods import METHODS, Candidate, Method, Request, field_facts, finite, solution_facts
 from .proven import Proven, certified
 from .stopwatch import Stopwatch

@@ -13,7 +13,7 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
 from ...models.search.starts import first_field
 from ..solutions.solution import Solution
-from .job import Limits
+from .limits import Limits
 from .local import solve
 
 _ANGLES: Final = 0.2

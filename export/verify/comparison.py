@@ -9,10 +9,10 @@ import numpy as np
 
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
+from ..programs.reading import Evaluation, Meaning, Points, places
 from ..writing.canonical import Canonical
 from ..writing.names import ONE, column_names, row_names
 from ..writing.terms import terms
-from .programs.reading import Evaluation, Meaning, Points, places
 
 VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums are taken in another order."""

@@ -14,7 +14,6 @@ import gzip
 import json
 import shutil
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
@@ -23,21 +22,23 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.errors import InputError
+from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Floats
+from ...models.processes.deadline import Deadline
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
-from ..solutions.readers.text import RawSolution, Status, values_for
-from ..solutions.solution import ROUND
+from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
+from ..programs.reading import Points
+from ..solutions.readers.text import Status
+from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
+from ..solving.limits import Limits
+from ..solving.local import Files, Solvers
 from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
 from .leeway import saved
-from .programs.reading import Evaluation, Meaning, Points, load, save
-from .programs.worker import Worker
 
 RESULT: Final = "verify.json"
 SEED: Final = 1
@@ -47,7 +48,12 @@ FEASIBLE: Final = 2
 """Complete points of random fields at which files are evaluated as well."""
 TOLERANCE: Final = 1e-6
 """Relative difference up to which optima agree (absolute below 1)."""
-READING_SECONDS: Final = 60.0
+READING_SECONDS: Final = 80.0
+"""Seconds in which a program has to read a file."""
+LATE: Final = 20.0
+"""Seconds beyond its limit after which a solver that does not look at the clock is killed."""
+GAP: Final = 0.0
+"""Relative gap of a solve: none, so that optima can be compared."""
 
 
 class Verdict(StrEnum):
@@ -135,7 +141,7 @@ class _Subject:
     name: str
     format: str
     path: Path
-    points: Path
+    points: Points
 
     def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
@@ -172,9 +178,9 @@ def verify(
         found.checks.extend(broken)
         for program in (each for each in wanted if each.present):
             chosen = [subject for subject in subjects if subject.format in program.formats]
-            with Worker(program.name, Path(temporary) / program.name) as worker:
-                bench = _Bench(program, worker, Path(temporary) / program.name / "result.npz", seconds)
-                found.versions[program.name] = worker.ask({"step": "version"}, READING_SECONDS)["words"]
+            with Solvers() as solvers:
+                bench = _Bench(program, solvers, seconds)
+                found.versions[program.name] = solvers.program_version(program.name)
                 for subject in chosen:
                     progress(f"{subject.name}: {program.title}")
                     found.checks.extend(bench.checks(subject))
@@ -191,6 +197,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
         problem = manifest.problem()
         place = temporary / f"set{number}"
         place.mkdir()
+        points: dict[int, Points] = {}
         for entry in manifest.document["files"]:
             about, source = (_title(problem), entry["name"], "", "read"), manifest.folder / entry["name"]
             if not source.is_file() or sha256_of(source) != entry["sha256"]:
@@ -205,10 +212,11 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             if said != holds:
                 words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
                 broken.append(Check(*about, Verdict.DIFFERS, words))
-            points = place / f"points_{len(held.blocks)}.npz"
-            if not points.exists():
-                save(_points(held), points)
-            subjects.append(_Subject(problem, held, entry["name"], entry["format"], path, points))
+            if len(held.blocks) not in points:
+                points[len(held.blocks)] = _points(held)
+            subjects.append(
+                _Subject(problem, held, entry["name"], entry["format"], path, points[len(held.blocks)])
+            )
     return subjects, broken
 
 
@@ -243,16 +251,15 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """A program at work: its child process, where that leaves arrays, and seconds for a solve."""
+    """A program at work: its child process, and the seconds for a solve."""
 
     program: Program
-    worker: Worker
-    result: Path
+    solvers: Solvers
     seconds: float | None
     solved: set[tuple[str, str]] = field(default_factory=set)
 
     def checks(self, subject: _Subject) -> Iterator[Check]:
-        """What the program and its solvers make of a file; files of the same problem are solved once."""
+        """Check how the program reads a file and solves it; files of the same problem are solved once."""
         read = self._read(subject)
         yield read
         if self.seconds is None:
@@ -261,61 +268,60 @@ class _Bench:
             key = (solver, subject.held.sha256)
             if read.verdict in {Verdict.AGREES, Verdict.NOT_TRIED} and key not in self.solved:
                 self.solved.add(key)
-                yield self._solve(subject, solver)
-
-    def _ask(self, subject: _Subject, step: str, seconds: float, **more: Any) -> dict[str, Any]:
-        self.result.unlink(missing_ok=True)
-        paths = {"path": subject.path, "points": subject.points, "result": self.result}
-        task = {"step": step, "seconds": seconds} | {name: str(path) for name, path in paths.items()} | more
-        return self.worker.ask(task, seconds)
+                yield self._solve(subject, solver, self.seconds)
 
     def _read(self, subject: _Subject) -> Check:
-        algebra = subject.format in self.program.algebra
         refusal = _refusal(self.program.name, subject, "read")
-        answer = self._ask(subject, "read" if algebra else "evaluate", READING_SECONDS)
-        if answer["kind"] == "done":
-            wrong = f"it was read, though {refusal}" if refusal else self._difference(subject, algebra)
-            verdict, words = (Verdict.DIFFERS if wrong else Verdict.AGREES), wrong
-        elif answer["kind"] == "too large":
+        try:
+            wrong = self._difference(subject)
+        except TooLargeError:
             verdict, words = Verdict.NOT_TRIED, self._too_large(subject)
-        elif answer["kind"] == "not told":
-            verdict, words = Verdict.NOT_TRIED, answer["words"]
-        elif answer["kind"] == "refused" and refusal:
-            verdict, words = Verdict.REFUSED, refusal
+        except NotReportedError as error:
+            verdict, words = Verdict.NOT_TRIED, str(error)
+        except RefusedError as error:
+            verdict, words = (Verdict.REFUSED, refusal) if refusal else (Verdict.FAILED, str(error))
+        except CrossfieldError as error:
+            verdict, words = Verdict.FAILED, str(error)
         else:
-            verdict, words = Verdict.FAILED, answer["words"]
+            wrong = f"it was read, though {refusal}" if refusal else wrong
+            verdict, words = (Verdict.DIFFERS if wrong else Verdict.AGREES), wrong
         return subject.check(self.program.name, "read", verdict, words)
 
-    def _difference(self, subject: _Subject, algebra: bool) -> str:
-        """What the program read otherwise than the problem has it; empty when nothing."""
-        points = load(Points, subject.points)
-        if algebra:
-            model = load(Meaning, self.result)
-            return difference(model, subject.held, self.program.tolerance, points.values)
-        return evaluation_difference(load(Evaluation, self.result), subject.held, points)
+    def _difference(self, subject: _Subject) -> str:
+        """Return how what the program read differs from the problem; empty when it does not."""
+        program = self.program.name
+        if subject.format in self.program.algebra:
+            model = self.solvers.ask(program, "read", subject.path, seconds=READING_SECONDS)
+            return difference(model, subject.held, self.program.tolerance, subject.points.values)
+        points = subject.points
+        found = self.solvers.ask(program, "evaluate", subject.path, points, seconds=READING_SECONDS)
+        return evaluation_difference(found, subject.held, points)
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
         return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
 
-    def _solve(self, subject: _Subject, solver: str) -> Check:
-        def told(verdict: Verdict, words: str) -> Check:
+    def _solve(self, subject: _Subject, solver: str, seconds: float) -> Check:
+        def ended(verdict: Verdict, words: str) -> Check:
             return subject.check(solver, "solve", verdict, words)
 
         if refusal := _refusal(solver, subject, "solve"):
-            return told(Verdict.REFUSED, refusal)
+            return ended(Verdict.REFUSED, refusal)
         if local := _refusal(solver, subject, "local"):
-            return told(Verdict.NOT_TRIED, local)
+            return ended(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
-            return told(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
-        assert self.seconds is not None
-        begin = time.perf_counter()
-        answer = self._ask(subject, "solve", self.seconds, solver=solver)
-        if answer["kind"] == "too large":
-            return told(Verdict.NOT_TRIED, self._too_large(subject))
-        if answer["kind"] != "done":
-            return told(Verdict.FAILED, answer["words"])
-        return _judged(subject, solver, load(RawSolution, self.result), time.perf_counter() - begin)
+            return ended(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
+        files = Files.beside(subject.path, solver)
+        limits = Limits(seconds, GAP, threads=1)
+        try:
+            found = self.solvers.solve_file(
+                subject.held, solver, files, limits, Deadline.after(seconds), precise=True, late=LATE
+            )
+        except UnsupportedBySolverError:
+            return ended(Verdict.NOT_TRIED, self._too_large(subject))
+        except CrossfieldError as error:
+            return ended(Verdict.FAILED, str(error))
+        return _judged(subject, solver, found)
 
 
 def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
@@ -324,30 +330,29 @@ def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
     return "" if refusal is None else refusal.reason
 
 
-def _judged(subject: _Subject, solver: str, answer: RawSolution, seconds: float) -> Check:
-    """What a solver's answer is worth: its point checked, objective and energy computed again."""
-    held, numbers = subject.held, {"seconds": round(seconds, 2), "bound": finite(answer.bound)}
-    if not len(answer.values):
-        limit = answer.status == Status.LIMIT_WITHOUT_POINT
+def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
+    """Judge a solver's answer: its point is checked, objective and energy are computed again."""
+    held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.bound}
+    point, objective, worst = found.point, found.objective, found.violation
+    if point is None or objective is None or worst is None:
+        limit = found.claimed == Status.LIMIT_WITHOUT_POINT
         verdict = Verdict.LIMIT if limit else Verdict.FAILED
-        return subject.check(solver, "solve", verdict, f"no point: {answer.message}", **numbers)
-    point, wrong = told_point(held, answer)
-    objective = held.objective_value(point)
-    energy = subject.problem.objective_value(subject.problem.point(held.field(point)))
-    worst = held.violation(point)
+        return subject.check(solver, "solve", verdict, f"no point: {found.message}", **numbers)
+    energy = subject.problem.objective_value(subject.problem.point(found.field))
     leeway = saved(held, point)
     numbers |= {"objective": objective, "energy": energy, "leeway": leeway}
-    if not wrong and worst.worst > SOLVERS[solver].feasible_within:
+    wrong = ""
+    if worst.worst > SOLVERS[solver].feasible_within:
         wrong = f"its point violates {worst.worst_family or 'bounds'} by {worst.worst:.2g}"
-    proven = answer.status in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-    claim = answer.objective
+    proven = found.claimed in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
+    claim = found.reported
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
         # Before the end a solver's own variable for it may be loose.
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, leeway, proven=proven)
     if wrong:
         return subject.check(solver, "solve", Verdict.DIFFERS, wrong, **numbers)
-    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, answer.message)
+    verdict, words = (Verdict.AGREES, "") if proven else (Verdict.LIMIT, found.message)
     return subject.check(solver, "solve", verdict, words, proven=proven, **numbers)
 
 
@@ -363,20 +368,6 @@ def _energy_difference(
     if not proven and energy < objective:
         return ""
     return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
-
-
-def finite(value: float | None) -> float | None:
-    """A number, None for what stands for infinity."""
-    return None if value is None or abs(value) >= 1e19 else float(value)
-
-
-def told_point(problem: Problem, answer: RawSolution) -> tuple[Floats, str]:
-    """The point by name, integers rounded, what is not told at zero; and what is wrong with it."""
-    names = np.array([name.encode() for name in names_of(column_names(problem))])
-    values, missing, _ = values_for(names, replace(answer, omits_zeros=False))
-    point, wrong = np.nan_to_num(values), "it tells no column that we know" if missing == len(names) else ""
-    whole = problem.integer & (np.abs(point - np.round(point)) <= ROUND)
-    return np.where(whole, np.round(point), point), wrong
 
 
 def same(first: float, second: float) -> bool:

@@ -18,7 +18,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import IO, Any, Final, Self, TypeVar
 
-from ..errors import CrossfieldError, InputError
+from ..errors import InputError
+from .messages import WorkerError
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
@@ -27,10 +28,6 @@ MOST: Final = max(16, 2 * (os.cpu_count() or 1))
 """Most threads or processes: beyond twice the cores nothing is quicker, and each takes memory."""
 
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
-class WorkerError(CrossfieldError):
-    """A process that ended before its work was done."""
 
 
 def checked(count: int, what: str = "jobs", *, least: int = 1) -> int:

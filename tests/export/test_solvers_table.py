@@ -14,7 +14,7 @@ from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.bundle.starts import LAYOUTS, STARTS
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.solvers_table import DRIVEN, PROGRAMS, SOLVERS, Refusal, Solver, StartFile, takes
+from crossfield.export.solvers_table import BUNDLED, PROGRAMS, SOLVERS, Refusal, Solver, StartFile, takes
 from crossfield.models.formulations.catalogue import FORMULATIONS
 
 ROOT = Path(cf.__file__).parent
@@ -34,14 +34,12 @@ def test_what_the_table_names_is_there():
         assert set(solver.formats) <= set(FORMATS)
         assert (solver.proves == "global") == all(each.stage != "local" for each in solver.refusals.values())
         assert solver.start is None or solver.start.layout in LAYOUTS
-    for solver in DRIVEN.values():
-        driver = (ROOT / "export" / "solving" / f"{solver.driver}.py").read_text()
-        assert "\ndef run(job: Job) -> RunEnd:" in driver
+    for solver in BUNDLED.values():
         if solver.patch is not None:
             instance = make_instance("hole")
             assert takes(cf.formulate(instance, solver.patch.formulation), solver.name).answer == "yes"
     for program in PROGRAMS.values():
-        module = (ROOT / "export" / "verify" / "programs" / f"{program.name}.py").read_text()
+        module = (ROOT / "export" / "programs" / f"{program.name}.py").read_text()
         wanted = {
             "version": True,
             "read": program.algebra,
@@ -68,13 +66,10 @@ def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pyte
     assert PROGRAMS["cbc"].solvers == ("cbc", "toy")
 
 
-def test_a_solver_that_is_driven_here_is_one_entry_and_a_driver(monkeypatch: pytest.MonkeyPatch):
-    """Under another name HiGHS solves, for the driver reads the table alone."""
-    twin = Solver(
-        "twin", "Twin", ("lp",), "highs", driver="highs", start=StartFile("highs", ".sol", "as HiGHS does")
-    )
+def test_a_solver_is_one_entry_and_the_module_of_its_program(monkeypatch: pytest.MonkeyPatch):
+    """Under another name HiGHS solves, for everything is read from the table."""
+    twin = Solver("twin", "Twin", ("lp",), "highs", start=StartFile("highs", ".sol", "as HiGHS does"))
     monkeypatch.setitem(SOLVERS, "twin", twin)
-    monkeypatch.setitem(DRIVEN, "twin", twin)
     problem = cf.formulate(make_instance("hole"), "milp-mccormick", relax=True)
     assert cf.solve(problem, "twin").objective == pytest.approx(
         cf.solve(problem, "highs").objective, abs=1e-7
@@ -85,14 +80,14 @@ def test_a_program_that_is_not_here_says_how_to_get_it():
     absent = Solver("absent", "Absent", ("lp",), "highs", package="no_such_package")
     assert find_spec("no_such_package") is None
     assert absent.missing == "pip install no_such_package"
-    assert DRIVEN["highs"].missing == ""
+    assert BUNDLED["highs"].missing == ""
 
 
 @pytest.mark.parametrize(
     "called,place",
-    [("highspy.Highs", "export/solving/highs.py"), ("NlpBuilder", "export/solving/nl_model.py")],
+    [("highspy.Highs", "export/programs/highs.py"), ("NlpBuilder", "export/programs/nl_model.py")],
 )
-def test_one_driver_of_highs_and_one_loader_of_nl(called: str, place: str):
+def test_highs_and_nl_are_loaded_in_one_place(called: str, place: str):
     """Calls, not the lines of Python that pages show."""
     found = [
         name

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from crossfield.export.programs import asl as asl_program
+from crossfield.export.programs import highs as highs_program
+from crossfield.export.programs import scip as scip_program
+from crossfield.export.programs.nl_model import read_nl
+from crossfield.export.programs.reading import Meaning as Model
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.export.solving.nl_model import read_nl
 from crossfield.export.verify.comparison import of_problem
-from crossfield.export.verify.programs import asl as asl_program
-from crossfield.export.verify.programs import highs as highs_program
-from crossfield.export.verify.programs import scip as scip_program
-from crossfield.export.verify.programs.reading import Meaning as Model
 from crossfield.models.instance.grid import Floats
 
 __all__ = [
@@ -40,7 +40,7 @@ scip_columns = scip_program.columns
 
 def by_gurobi(path: Path) -> Model:
     """The file as Gurobi reads it; needs gurobipy."""
-    from crossfield.export.verify.programs import gurobi as gurobi_program
+    from crossfield.export.programs import gurobi as gurobi_program
 
     return gurobi_program.read(path)
 

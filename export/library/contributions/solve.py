@@ -27,10 +27,9 @@ from ....models.processes.progress import Progress, silent
 from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
-from ...solvers_table import DRIVEN, SOLVERS
-from ...solving.job import Limits
-from ...solving.local import refusal, solve
-from ...verify.solve_with import Programs, format_for
+from ...solvers_table import SOLVERS
+from ...solving.limits import Limits
+from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
@@ -67,9 +66,9 @@ def solve_library(
     library, found = read_library(folder), []
     with (
         tempfile.TemporaryDirectory(prefix="crossfield-") as temporary,
-        Programs(Path(temporary)) as programs,
+        Solvers() as at_work,
     ):
-        work = _Solving(library, programs, Path(temporary), time_limit)
+        work = _Solving(library, at_work, Path(temporary), time_limit)
         runs = list(work.runs(chosen, RUNGS[: RUNGS.index(last) + 1]))
         for number, (document, solver) in enumerate(runs):
             progress(f"{number + 1} of {len(runs)} runs: {solver} on {document['name']}")
@@ -137,8 +136,8 @@ def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
 class _Solving:
     """Runs on a library, each for so long, with a folder for what they leave."""
 
-    def __init__(self, library: Library, programs: Programs, folder: Path, limit: float) -> None:
-        self.library, self.programs, self.folder, self.limit = library, programs, folder, limit
+    def __init__(self, library: Library, solvers: Solvers, folder: Path, limit: float) -> None:
+        self.library, self.solvers, self.folder, self.limit = library, solvers, folder, limit
 
     def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
         """Sidecars and solvers of what is to be run: the solver takes it, and the ledger does not have it."""
@@ -154,7 +153,7 @@ class _Solving:
 
     def _covers(self, record: Record, solver: str) -> bool:
         """Whether a record stands for a run of the solver for so long."""
-        if record.solver != SOLVERS[solver].title or record.version != self.programs.version(solver):
+        if record.solver != SOLVERS[solver].title or record.version != self.solvers.version(solver):
             return False
         return record.status == "optimal" or (record.time_limit or 0.0) >= self.limit
 
@@ -168,7 +167,7 @@ class _Solving:
             document["name"],
             problem.sha256,
             SOLVERS[solver].title,
-            self.programs.version(solver),
+            self.solvers.version(solver),
             "no point",
             threads=1,
             time_limit=self.limit,
@@ -195,19 +194,18 @@ class _Solving:
         self, document: dict[str, Any], problem: Problem, solver: str
     ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
         """What a solver finds, and the course of its run where its log tells it."""
-        if solver not in DRIVEN:
-            return self.programs.solve(problem, solver, self.limit), ()
-        start = _start(self.library, document, problem)
+        entry, limits = SOLVERS[solver], Limits(self.limit, GAP, 1)
+        start = _start(self.library, document, problem) if entry.bundled else None
         with tempfile.TemporaryDirectory(dir=self.folder) as folder:
-            found = solve(problem, solver, folder, limits=Limits(self.limit, GAP, 1), start=start)
-            with suppress(CrossfieldError):
-                return found, read_log(next(Path(folder).glob("*.log"))).trace
+            found = self.solvers.solve(problem, solver, folder, limits=limits, start=start)
+            for log in Path(folder).glob("*.log"):
+                with suppress(CrossfieldError):
+                    return found, read_log(log).trace
         return found, ()
 
 
 def _takes(problem: Problem, solver: str) -> bool:
-    """Whether a solver takes a problem: where it is driven here, a local answer is taken of a local one."""
-    return not refusal(problem, DRIVEN[solver]) if solver in DRIVEN else bool(format_for(problem, solver))
+    return format_for(problem, solver).answer == "yes"
 
 
 def _start(library: Library, document: dict[str, Any], problem: Problem) -> CrossField | None:

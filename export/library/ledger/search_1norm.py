@@ -53,7 +53,7 @@ def _solved(problem: Problem, nodes: int, start: CrossField | None) -> CrossFiel
 
 
 def _run(model: Path, first: Path, answer: Path, nodes: int) -> None:
-    from ...solving.highs import leave, loaded, set_options, solved
+    from ...programs.highs import leave, loaded, set_options, solved
 
     highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
     if nodes:

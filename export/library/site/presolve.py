@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import highspy
 
-from ....models.errors import SolverError
-from ...solving.highs import loaded, version
+from ...programs.highs import loaded, version
+from ...programs.protocol import RefusedError
 
 LINEAR: Final = ("LP", "MILP")
 """Classes that HiGHS presolves: of a quadratic objective it presolves nothing, and quadratic rows it does not
@@ -47,7 +47,7 @@ def presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
         return None
     try:
         highs = loaded(folder / files[0], threads=1)
-    except SolverError:
+    except RefusedError:
         return None
     before = _counts(highs.getLp())
     highs.presolve()

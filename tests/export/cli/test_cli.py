@@ -15,7 +15,7 @@ import pytest
 from children import complaints as without_progress
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.solvers_table import DRIVEN
+from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.sketch.samples import SAMPLES
@@ -386,10 +386,10 @@ def test_list_says_which_go_together(crossfield):
     listed = json.loads(crossfield("list", "--json"))
     assert [row["name"] for row in listed["formulations"]] == list(FORMULATIONS)
     assert [row["name"] for row in listed["formats"]] == list(FORMATS)
-    assert all(set(DRIVEN) < set(row) for row in listed["solvers"])
+    assert all(set(BUNDLED) < set(row) for row in listed["solvers"])
     assert [row["name"] for row in listed["methods"]] == list(METHODS)
     text = crossfield("list")
-    for name in (*FORMULATIONS, *FORMATS, *DRIVEN, *(row["name"] for row in listed["readers"])):
+    for name in (*FORMULATIONS, *FORMATS, *BUNDLED, *(row["name"] for row in listed["readers"])):
         assert name in text
 
 

@@ -26,12 +26,12 @@ import pytest
 from cases import CASES, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.bundle.manifest import read_manifest, write_all, write_problem
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, carried, write
+from crossfield.export.programs import glpk as glpk_program
+from crossfield.export.programs import scip as scip_program
+from crossfield.export.programs.reading import Meaning, Points
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
-from crossfield.export.verify.programs import glpk as glpk_program
-from crossfield.export.verify.programs import scip as scip_program
-from crossfield.export.verify.programs.reading import Meaning, Points
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
 from crossfield.export.writing.curvature import probtype

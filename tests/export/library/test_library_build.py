@@ -36,7 +36,7 @@ from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.solving.job import Limits
+from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.field import CrossField

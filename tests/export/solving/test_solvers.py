@@ -19,7 +19,7 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
-from crossfield.export.solvers_table import DRIVEN
+from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
 from crossfield.export.solving.run import plan
 from crossfield.models.errors import (
@@ -201,7 +201,7 @@ def test_bonmin_and_highs_agree_on_a_milp():
 def test_three_solvers_agree_on_a_qp():
     instance = random_instance(5, 6, 6)
     problem = formulated(instance, "qp-fixed")
-    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in DRIVEN]
+    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in BUNDLED]
     assert found == pytest.approx([least_squares(instance, cf.greedy(instance).p)] * 3, abs=1e-6)
 
 
@@ -220,7 +220,7 @@ def split(label):
     return label.removesuffix(", relaxed"), label.endswith(", relaxed")
 
 
-PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in DRIVEN]
+PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in BUNDLED]
 DONE = [(label, solver) for label, solver, answer in PAIRS if answer == "yes"]
 REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer != "yes"]
 
@@ -260,7 +260,7 @@ def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, rea
 def test_the_table_is_not_trivial():
     assert len(DONE) > 15
     assert len(REFUSED) > 15
-    assert {solver for _, solver in DONE} == set(DRIVEN)
+    assert {solver for _, solver in DONE} == set(BUNDLED)
 
 
 def test_the_preferred_solver_fits_the_class(small):

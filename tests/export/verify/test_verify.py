@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,12 +15,11 @@ from cases import MASKS, make_field, make_instance
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solutions.readers.text import RawSolution, Status
+from crossfield.export.solutions.readers.text import Status
+from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.verify.comparison import names_of
-from crossfield.export.verify.programs import worker as worker_module
-from crossfield.export.verify.programs.reading import load
-from crossfield.export.verify.programs.worker import Worker
+from crossfield.export.solving.limits import Limits
+from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.verify.verify import (
     Verdict,
     Verification,
@@ -31,13 +30,13 @@ from crossfield.export.verify.verify import (
     same,
     verify,
 )
-from crossfield.export.writing.names import column_names
-from crossfield.models.errors import InputError
+from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate
+from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
+from crossfield.models.processes.deadline import Deadline
 from crossfield.models.sketch.samples import sample
 from loops import for_each
 
@@ -145,9 +144,7 @@ def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path)
     for less, verdict in ((0.0, Verdict.AGREES), (4e-6, Verdict.AGREES), (1e-4, Verdict.DIFFERS)):
         point = problem.point(random_field(problem, 1))
         point[index[cost > 0, 0]] -= less
-        names = np.array([name.encode() for name in names_of(column_names(problem))])
-        answer = RawSolution(Status.OPTIMAL_GLOBAL, "", None, names, point)
-        check = _judged(subjects[0], "highs", answer, 0.0)
+        check = _judged(subjects[0], "highs", Solution(problem, point, Status.OPTIMAL_GLOBAL, "", "test"))
         assert check.verdict == verdict, (less, check.reason)
         assert check.objective <= check.energy <= check.objective + check.leeway + 1e-9
     assert _energy_difference(problem, 1.0, 1.2, 0.1, proven=False)
@@ -285,27 +282,6 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
     assert found["well"].verdict == Verdict.AGREES
 
 
-@pytest.mark.slow
-def test_a_dead_child_and_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A process that is killed, and one that does not answer: both are told, the next task has a new one."""
-    with Worker("highs", tmp_path / "highs") as worker:
-        assert re.match(r"\d+\.", worker.ask({"step": "version"}, 250)["words"])
-        for dead_before_it_is_asked in (False, True):
-            child = worker._child
-            assert child is not None
-            child.kill()
-            if dead_before_it_is_asked:
-                child.wait()
-            assert "SIGKILL" in worker.ask({"step": "version"}, 250)["words"]
-            assert worker.ask({"step": "version"}, 250)["kind"] == "done"
-        monkeypatch.setattr(worker_module, "GRACE", 0.0)
-        late = worker.ask({"step": "version"}, 1e-6)
-        assert late["kind"] == "failed"
-        assert "took longer" in late["words"]
-        monkeypatch.undo()
-        assert worker.ask({"step": "version"}, 250)["kind"] == "done"
-
-
 def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
     monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
@@ -369,25 +345,20 @@ def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, p
 
 @needing("xpress")
 def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
-    from crossfield.export.verify.programs import xpress
-
-    write_all(sample("skew", 5), tmp_path, ["minlp-quartic"], ["lp"])
-    (path,) = tmp_path.glob("*.lp")
-    found = xpress.solve(path, 0.02, "xpress")
-    columns = [name.decode() for name in found.names]
-    assert len(found.values) == len(columns)
-    assert columns in ([], xpress.read(path).columns)
+    problem = formulate(sample("skew", 5), "minlp-quartic")
+    with Solvers() as solvers:
+        found = solvers.solve(problem, "xpress", tmp_path, limits=Limits(1.0, threads=1))
+    assert found.point is None or len(found.point) == found.problem.columns
 
 
 # the table of capabilities is true
 
 
 @pytest.fixture(scope="session")
-def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Worker]]:
-    """A child process of each program."""
-    folder = tmp_path_factory.mktemp("workers")
-    with ExitStack() as stack:
-        yield {name: stack.enter_context(Worker(name, folder / name)) for name in PROGRAMS}
+def solvers() -> Iterator[Solvers]:
+    """Solvers, with a child process for each program that is asked."""
+    with Solvers() as found:
+        yield found
 
 
 CLAIMS = [
@@ -403,7 +374,7 @@ CLAIMS = [
 @for_each("kind, name", CLAIMS)
 def test_claims_are_true(
     verified: Callable[[str], Verification],
-    workers: dict[str, Worker],
+    solvers: Solvers,
     tmp_path: Path,
     solver: str,
     kind: str,
@@ -419,18 +390,22 @@ def test_claims_are_true(
         assert {f.verdict for f in mine} & {Verdict.AGREES, Verdict.LIMIT, Verdict.NOT_TRIED}
     elif taking.answer == "no" and (path := verification.folder / f"small.{name}.{taking.format}").exists():
         optimum = min(f.objective for f in found if f.objective is not None)
-        assert not proves(workers[SOLVERS[solver].program], path, solver, optimum, tmp_path / "result.npz")
+        shutil.copytree(verification.folder, tmp_path, dirs_exist_ok=True)
+        assert not proves(
+            solvers, carried(problem, FORMATS[taking.format]), tmp_path / path.name, solver, optimum
+        )
 
 
-def proves(worker: Worker, path: Path, solver: str, optimum: float, result: Path) -> bool:
+def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: float) -> bool:
     """Whether the solver, asked all the same, gives the optimum and calls it one."""
-    task = {"step": "solve", "path": str(path), "solver": solver, "seconds": 1, "result": str(result)}
-    if worker.ask(task, 1)["kind"] != "done":
+    files, limits = Files.beside(path, solver), Limits(1.0, 0.0, 1)
+    try:
+        found = solvers.solve_file(held, solver, files, limits, Deadline.after(1.0), precise=True, late=20.0)
+    except CrossfieldError:
         return False
-    outcome = load(RawSolution, result)
-    if not outcome.status.startswith("optimal") or outcome.objective is None:
-        return False
-    return same(outcome.objective, optimum)
+    return (
+        found.claimed.startswith("optimal") and found.reported is not None and same(found.reported, optimum)
+    )
 
 
 def test_reasons_have_a_remedy_or_name_the_limit():

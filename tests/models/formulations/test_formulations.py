@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from cases import MASKS, make_field, make_instance
-from crossfield.export.solving.job import Limits
+from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import FormulationError
 from crossfield.models.field.field import CrossField

@@ -13,19 +13,20 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...solutions.readers.text import RawSolution, Status
-from ...solvers_table import PROGRAMS
-from ...writing.terms import listed
-from .protocol import Refused, started
-from .reading import Evaluation, Meaning, Points, told
+from ...models.processes.control import stopped
+from ..solutions.readers.text import Status
+from ..writing.terms import listed
+from .protocol import Job, Outcome, RefusedError, run_command, run_program
+from .reading import Evaluation, Meaning, Points
 
 _KINDS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
+_ROUNDING: Final = 1e-14
 
 
 def version() -> str:
     """Its version."""
-    found = re.search(r"(\d+\.\d+)", started("glpk", "--version").stdout)
+    found = re.search(r"(\d+\.\d+)", run_program("glpsol", "--version"))
     return found[1] if found else "unknown"
 
 
@@ -34,26 +35,26 @@ def _run(path: Path, *arguments: str) -> str:
     given = [_KINDS[kind], str(path)]
     if kind == "mod":
         given += ["--data", str(path.with_suffix(".dat"))]
-    done = started("glpk", *given, *arguments)
+    done = run_command(["glpsol", *given, *arguments])
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if line.startswith(str(path))]
-        raise Refused(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")
+        raise RefusedError(f"GLPK cannot read it: {' '.join(lines[-1:]).removeprefix(f'{path}:')}")
     return done.stdout
 
 
 def read(path: Path) -> Meaning:
     """The file as GLPK reads it."""
     _run(path, "--check", "--wglp", "model.glp")
-    lines = [line.split() for line in Path("model.glp").read_text().splitlines()]
+    lines = [line.split() for line in Path("model.glp").read_text("utf-8").splitlines()]
     head = next(line for line in lines if line[0] == "p")
     if head[2] != "min":
-        raise Refused("it is not minimised")
+        raise RefusedError("it is not minimised")
     names = {kind: [line[3] for line in lines if line[:2] == ["n", kind]] for kind in "ij"}
     entries = [
         (int(i), int(j), float(value)) for key, i, j, value in (line for line in lines if line[0] == "a")
     ]
     if any(not j for _, j, _ in entries):
-        raise Refused("it has a constant beside ONE")
+        raise RefusedError("it has a constant beside ONE")
     costs = np.zeros(len(names["j"]))
     for _, j, value in (entry for entry in entries if not entry[0]):
         costs[j - 1] = value
@@ -91,7 +92,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
         model.row_upper,
         model.objective(given),
         model.activities(given),
-        rounding=PROGRAMS["glpk"].tolerance,
+        rounding=_ROUNDING,
         may_lack=True,
     )
 
@@ -113,7 +114,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
 
 def _ours(names: list[str], path: Path) -> list[str]:
     """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
-    printed = re.search(r"_%0(\d+)d", path.read_text())
+    printed = re.search(r"_%0(\d+)d", path.read_text("utf-8"))
     assert printed
     return [_our_name(name, int(printed[1])) for name in names]
 
@@ -138,23 +139,13 @@ def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any
     return lower, upper
 
 
-_STATUS: Final = {"o": Status.OPTIMAL_GLOBAL, "f": Status.LIMIT_WITH_POINT, "n": Status.INFEASIBLE}
-
-
-def solve(path: Path, seconds: float, _solver: str, gap: float = 0.0) -> RawSolution:
-    """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
-    limits = ("--tmlim", str(max(1, round(seconds))), "--mipgap", f"{gap:g}")
-    said = _run(path, *limits, "--wglp", "model.glp", "-w", "answer.txt")
-    names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
-    names = _ours(names, path) if path.suffix == ".mod" else names
-    answer = [line.split() for line in Path("answer.txt").read_text().splitlines()]
-    head = next(line for line in answer if line[0] == "s")
-    place = 2 if head[1] == "mip" else 3
-    status = _STATUS.get(head[4], Status.LIMIT_WITHOUT_POINT)
-    words = " ".join(re.findall(r"^(.*(?:SOLUTION FOUND|TIME LIMIT).*)$", said, re.MULTILINE))
-    if head[1] == "bas":
-        status = Status.OPTIMAL_GLOBAL if head[4:6] == ["f", "f"] else Status.LIMIT_WITHOUT_POINT
-    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return told(status, words)
-    values = np.array([float(line[place]) for line in answer if line[0] == "j"])
-    return told(status, words, names, values, objective=float(head[-1]))
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is the file of `-w`, whose columns have no names."""
+    limits = ("--tmlim", str(max(1, int(job.seconds))), "--mipgap", f"{job.gap:g}")
+    try:
+        _run(job.model, *limits, "-w", str(job.solution))
+    except RefusedError:
+        if not stopped():  # an interrupt ends GLPK at once
+            raise
+        return Outcome(Status.LIMIT_WITHOUT_POINT, "interrupted")
+    return Outcome()

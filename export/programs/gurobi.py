@@ -10,10 +10,10 @@ from typing import Any
 import gurobipy
 import numpy as np
 
-from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, listed
-from .protocol import Refused, TooLarge
-from .reading import Meaning, told
+from ...models.processes.control import on_stop
+from ..writing.terms import Terms, listed
+from .protocol import Job, Outcome, RefusedError, TooLargeError
+from .reading import Meaning, finite
 
 _SIZE_LIMIT = 10010
 
@@ -24,9 +24,9 @@ def version() -> str:
 
 
 @contextmanager
-def _loaded(path: Path) -> Iterator[Any]:
+def _loaded(path: Path, *, log: bool = False) -> Iterator[Any]:
     with (
-        gurobipy.Env(params={"OutputFlag": 0}) as environment,
+        gurobipy.Env(params={"OutputFlag": int(log)}) as environment,
         gurobipy.read(str(path), environment) as model,
     ):
         yield model
@@ -36,7 +36,7 @@ def read(path: Path) -> Meaning:
     """The file as Gurobi reads it; quadratic rows come after the others."""
     with _loaded(path) as model:
         if model.ModelSense != gurobipy.GRB.MINIMIZE or model.ObjCon != 0:
-            raise Refused("it is not minimised, or has a constant beside ONE")
+            raise RefusedError("it is not minimised, or has a constant beside ONE")
         variables, plain, products = model.getVars(), model.getConstrs(), model.getQConstrs()
         senses = np.array([r.Sense for r in plain] + [r.QCSense for r in products])
         limits = np.array([r.RHS for r in plain] + [r.QCRHS for r in products])
@@ -77,39 +77,24 @@ def _products(expression: Any) -> list[tuple[int, int, float]]:
     ]
 
 
-_STATUS = {
-    gurobipy.GRB.OPTIMAL: Status.OPTIMAL_GLOBAL,
-    gurobipy.GRB.INFEASIBLE: Status.INFEASIBLE,
-    gurobipy.GRB.INF_OR_UNBD: Status.INFEASIBLE,
-    gurobipy.GRB.TIME_LIMIT: Status.LIMIT_WITH_POINT,
-}
-
-
-def solve(
-    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
-) -> RawSolution:
-    """Its answer within the time."""
-    with _loaded(path) as model:
-        if start is not None:
-            model.read(str(start))
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is a .json, which holds the status and the bound."""
+    with _loaded(job.model, log=True) as model, on_stop(model.terminate):
+        if job.start is not None:
+            model.read(str(job.start))
         for option, value in (
-            ("TimeLimit", seconds), ("MIPGap", gap), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
-            ("OptimalityTol", 1e-9), ("IntFeasTol", 1e-9), ("BarConvTol", 1e-12), ("Threads", 1),
+            ("TimeLimit", job.seconds), ("MIPGap", job.gap), ("MIPGapAbs", 1e-9), ("FeasibilityTol", 1e-9),
+            ("OptimalityTol", 1e-9), ("IntFeasTol", 1e-9), ("BarConvTol", 1e-12), ("Threads", job.threads),
         ):  # fmt: skip
             model.setParam(option, value)
         try:
             model.optimize()
         except gurobipy.GurobiError as error:
             if error.errno == _SIZE_LIMIT:
-                raise TooLarge from error
-            raise Refused(f"Gurobi error {error.errno}: {error}") from error
-        status = _STATUS.get(model.Status, Status.ERROR)
-        variables = model.getVars()
-        names = [v.VarName for v in variables]
-        mixed = model.IsMIP or model.IsQCP
-        bound, nodes = (model.ObjBound, int(model.NodeCount)) if mixed else (None, None)
-        if not model.SolCount:
-            without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-            return told(without, f"status {model.Status}", bound=bound, nodes=nodes)
-        numbers = {"objective": model.ObjVal, "bound": bound, "nodes": nodes}
-        return told(status, f"status {model.Status}", names, model.getAttr("X", variables), **numbers)
+                raise TooLargeError(str(error)) from error
+            raise RefusedError(f"Gurobi error {error.errno}: {error}") from error
+        model.setParam("JSONSolDetail", 1)  # columns at 0 too
+        model.write(str(job.solution))
+        if not (model.IsMIP or model.IsQCP):
+            return Outcome()
+        return Outcome(bound=finite(model.ObjBound), nodes=int(model.NodeCount))

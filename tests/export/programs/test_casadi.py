@@ -7,9 +7,11 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.formats.nl import Layout
-from crossfield.export.solving.casadi_driver import Watch, solve
-from crossfield.export.solving.nl_model import FEASIBLE, ca, read_nl
-from crossfield.models.errors import SolverError
+from crossfield.export.programs.casadi import Watch
+from crossfield.export.programs.casadi import solve_model as solve
+from crossfield.export.programs.nl_model import FEASIBLE, ca, read_nl
+from crossfield.export.programs.protocol import RefusedError
+from crossfield.models.processes import control
 
 
 @pytest.fixture
@@ -48,8 +50,11 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     assert seen(worse[order]) == seen(broken[order]) == start
     assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))
     assert watch.value < start
-    watch.on_signal(signal.SIGINT, None)
-    assert watch.wanted
+    control.ask_to_stop()
+    try:
+        assert watch.eval([ca.DM(np.zeros(size)) for size in watch.sizes.values()]) == [1]
+    finally:
+        control.begin()
 
 
 def test_a_stop_at_an_iterate_that_breaks_rows_leaves_the_start(relaxed, own_interrupt):
@@ -66,6 +71,6 @@ def test_an_error_inside_a_solver_is_told_without_places_in_its_source(solver, t
     _, model, _ = relaxed
     crossed = replace(model, lower=model.upper + 1.0)
     with pytest.raises(
-        SolverError, match=rf"^{title} ended with an error, 'LBX\[0\] <= UBX\[0\] was violated"
+        RefusedError, match=rf"^{title} ended with an error, 'LBX\[0\] <= UBX\[0\] was violated"
     ):
         solve(solver, crossed, 1.0, 0.0)

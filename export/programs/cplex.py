@@ -5,6 +5,7 @@ The community edition solves up to 1000 columns and rows.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import cplex
 import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
-from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, listed
-from .protocol import Refused, TooLarge
-from .reading import Meaning, infinite, told
+from ...models.processes.control import on_stop
+from ..solutions.readers.text import Status
+from ..writing.terms import Terms, listed
+from .protocol import Job, Outcome, RefusedError, TooLargeError
+from .reading import Meaning, finite, infinite
 
 _SIZE_LIMIT = 1016
 
@@ -25,14 +27,14 @@ def version() -> str:
     return str(cplex.Cplex().get_version())
 
 
-def _load(path: Path) -> Any:
+def _load(path: Path, *, log: bool = False) -> Any:
     model = cplex.Cplex()
     for stream in ("log", "results", "warning", "error"):
-        getattr(model, f"set_{stream}_stream")(None)
+        getattr(model, f"set_{stream}_stream")(sys.stdout if log else None)
     try:
         model.read(str(path))
     except CplexError as error:
-        raise Refused(str(error)) from error
+        raise RefusedError(str(error)) from error
     return model
 
 
@@ -41,7 +43,7 @@ def read(path: Path) -> Meaning:
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
-        raise Refused("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant beside ONE")
     plain, products = model.linear_constraints, model.quadratic_constraints
     senses = np.array([*plain.get_senses(), *products.get_senses()])
     limits = np.array([*plain.get_rhs(), *products.get_rhs()])
@@ -81,42 +83,41 @@ def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
     return listed(linear, indices=2), listed(cubes, indices=3, products=2)
 
 
-def solve(
-    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
-) -> RawSolution:
-    """Its answer within the time."""
-    model = _load(path)
-    if start is not None:
-        model.MIP_starts.read(str(start))
-    tolerances = model.parameters
-    tolerances.timelimit.set(seconds)
-    tolerances.threads.set(1)
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is CPLEX's XML."""
+    model = _load(job.model, log=True)
+    if job.start is not None:
+        model.MIP_starts.read(str(job.start))
+    settings = model.parameters
+    settings.timelimit.set(job.seconds)
+    settings.threads.set(job.threads)
     for parameter, value in (
-        (tolerances.mip.tolerances.mipgap, gap),
-        (tolerances.mip.tolerances.absmipgap, 1e-9),
-        (tolerances.mip.tolerances.integrality, 0.0),
+        (settings.mip.tolerances.mipgap, job.gap),
+        (settings.mip.tolerances.absmipgap, 1e-9),
+        (settings.mip.tolerances.integrality, 0.0),
         # Of some 100 runs of `minlp-quartic` two have bounds above the optimum with this, and two claim
         # optima that are none with the default. Numerical emphasis may be the remedy; it is not measured.
-        (tolerances.simplex.tolerances.feasibility, 1e-9),
-        (tolerances.simplex.tolerances.optimality, 1e-9),
-        (tolerances.barrier.convergetol, 1e-12),
-        (tolerances.barrier.qcpconvergetol, 1e-12),
+        (settings.simplex.tolerances.feasibility, 1e-9),
+        (settings.simplex.tolerances.optimality, 1e-9),
+        (settings.barrier.convergetol, 1e-12),
+        (settings.barrier.qcpconvergetol, 1e-12),
     ):
         parameter.set(value)
+    aborter = model.use_aborter(cplex.Aborter())
     try:
-        model.solve()
+        with on_stop(aborter.abort):
+            model.solve()
     except CplexSolverError as error:
         if error.args[2] == _SIZE_LIMIT:
-            raise TooLarge from error
-        raise Refused(str(error)) from error
+            raise TooLargeError(str(error)) from error
+        raise RefusedError(str(error)) from error
     answer = model.solution
-    words, names = answer.get_status_string(), model.variables.get_names()
+    words = answer.get_status_string()
     mixed = "MI" in model.problem_type[model.get_problem_type()]
     nodes = answer.progress.get_num_nodes_processed() if mixed else None
-    bound = answer.MIP.get_best_objective() if mixed else None
+    bound = finite(answer.MIP.get_best_objective()) if mixed else None
     if not answer.is_primal_feasible():
         status = Status.INFEASIBLE if "infeasible" in words else Status.LIMIT_WITHOUT_POINT
-        return told(status, words, bound=bound, nodes=nodes)
-    status = Status.OPTIMAL_GLOBAL if "optimal" in words else Status.LIMIT_WITH_POINT
-    numbers = {"objective": answer.get_objective_value(), "bound": bound, "nodes": nodes}
-    return told(status, words, names, answer.get_values(), **numbers)
+        return Outcome(status, words, bound, nodes)
+    answer.write(str(job.solution))
+    return Outcome(bound=bound, nodes=nodes)

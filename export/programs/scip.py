@@ -14,10 +14,11 @@ from typing import Any, Final
 import numpy as np
 import pyscipopt
 
-from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, listed
-from .protocol import Refused, file_names
-from .reading import Evaluation, Meaning, Points, told
+from ...models.processes.control import on_stop
+from ..solutions.readers.text import Status
+from ..writing.terms import Terms, listed
+from .protocol import Job, Outcome, RefusedError, file_names
+from .reading import Evaluation, Meaning, Points, finite
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
 _CONSTANT: Final = "objconstvar"
@@ -37,9 +38,9 @@ def _load(path: Path) -> Any:
     try:
         scip.readProblem(str(path))
     except Exception as error:  # PySCIPOpt raises plain ones
-        raise Refused(f"SCIP cannot read it: {error}") from error
+        raise RefusedError(f"SCIP cannot read it: {error}") from error
     if scip.getObjectiveSense() != "minimize":
-        raise Refused("it is not minimised")
+        raise RefusedError("it is not minimised")
     return scip
 
 
@@ -47,7 +48,7 @@ def read(path: Path) -> Meaning:
     """The LP or MPS file as SCIP reads it."""
     scip = _load(path)
     if scip.getObjoffset() != 0:
-        raise Refused("it has a constant beside ONE")
+        raise RefusedError("it has a constant beside ONE")
     variables = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     rows = [row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS]
     goals = [row for row in scip.getConss() if row.name in _OBJECTIVE_ROWS]
@@ -55,7 +56,7 @@ def read(path: Path) -> Meaning:
     matrix, cubes = _terms(scip, rows, number)
     beside, squares = _terms(scip, goals, number)
     if len(beside.value):
-        raise Refused("its quadratic objective has linear terms beside the costs")
+        raise RefusedError("its quadratic objective has linear terms beside the costs")
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in variables])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in rows])
     return Meaning.of(
@@ -87,7 +88,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
             linear += [(place, number[name], value) for name, value in scip.getValsLinear(row).items()]
             continue
         if not scip.checkQuadraticNonlinear(row):
-            raise Refused(f"row {row.name} is not quadratic there")
+            raise RefusedError(f"row {row.name} is not quadratic there")
         products, squares, rest = scip.getTermsQuadratic(row)
         square += [(place, number[a.name], number[b.name], value) for a, b, value in products]
         square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
@@ -174,33 +175,32 @@ _STATUS: Final = {
     "gaplimit": Status.OPTIMAL_GLOBAL,
     "infeasible": Status.INFEASIBLE,
     "timelimit": Status.LIMIT_WITH_POINT,
+    "userinterrupt": Status.LIMIT_WITH_POINT,
 }
 
 
-def solve(
-    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
-) -> RawSolution:
-    """Its answer within the time."""
-    scip = _load(path)
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is SCIP's .sol, without a status."""
+    scip = _load(job.model)
+    scip.hideOutput(quiet=False)
     for option, value in (
-        ("limits/time", seconds),
-        ("limits/gap", gap),
+        ("limits/time", job.seconds),
+        ("limits/gap", job.gap),
         ("limits/absgap", 1e-9),
         ("numerics/feastol", 1e-9),
         ("numerics/dualfeastol", 1e-9),
         ("misc/catchctrlc", False),
     ):
         scip.setParam(option, value)
-    if start is not None:
-        scip.addSol(scip.readSolFile(str(start)))
-    scip.optimize()
-    words, nodes = scip.getStatus(), scip.getNTotalNodes()
+    if job.start is not None:
+        scip.addSol(scip.readSolFile(str(job.start)))
+    with on_stop(scip.interruptSolve):
+        scip.optimizeNogil()
+    words = scip.getStatus()
     status = _STATUS.get(words, Status.ERROR)
-    if not scip.getNSols():
-        without = Status.LIMIT_WITHOUT_POINT if status == Status.LIMIT_WITH_POINT else status
-        return told(without, words, bound=scip.getDualbound(), nodes=nodes)
-    best = scip.getBestSol()
-    ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
-    values = np.array([scip.getSolVal(best, v) for v in ours])
-    numbers = {"objective": scip.getObjVal(), "bound": scip.getDualbound(), "nodes": nodes}
-    return told(status, words, [v.name for v in ours], values, **numbers)
+    bound, nodes = finite(scip.getDualbound()), scip.getNTotalNodes()
+    if scip.getNSols():
+        scip.writeBestSol(str(job.solution))
+    elif status == Status.LIMIT_WITH_POINT:
+        status = Status.LIMIT_WITHOUT_POINT
+    return Outcome(status, words, bound, nodes)

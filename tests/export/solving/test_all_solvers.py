@@ -1,4 +1,4 @@
-"""Programs solve with a starting point, a gap that is enough, and tell their seconds and nodes."""
+"""Every solver takes a starting point and a gap, and reports seconds and nodes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import pytest
 from cases import make_instance
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS
-from crossfield.export.verify.solve_with import Programs
+from crossfield.export.solving.limits import Limits
+from crossfield.export.solving.local import Solvers
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.proof.prove import prove
 
@@ -21,13 +22,13 @@ def best():
     return prove(make_instance("full", w_beta=1.0), norm=1, jobs=1).field
 
 
-def test_a_solver_that_is_given_the_optimum_has_no_worse_point(best, tmp_path):
+def test_a_solver_that_is_given_the_optimum_has_no_worse_point(best):
     problem = formulate(best.instance, "milp-mccormick")
     optimum = problem.objective_value(problem.point(best))
-    with Programs(tmp_path) as programs:
+    with Solvers() as solvers:
         for solver in STARTS:
             if PROGRAMS[SOLVERS[solver].program].present:
-                found = programs.solve(problem, solver, 20.0, gap=ENOUGH, start=best)
+                found = solvers.solve(problem, solver, limits=Limits(20.0, ENOUGH, 1), start=best)
                 assert found.objective == pytest.approx(optimum, abs=1e-6), solver
                 assert found.nodes is not None
                 assert found.nodes >= 0
@@ -35,12 +36,14 @@ def test_a_solver_that_is_given_the_optimum_has_no_worse_point(best, tmp_path):
                 assert found.seconds > 0
 
 
-def test_a_gap_that_is_enough_ends_a_solve(best, tmp_path):
+def test_a_gap_that_is_enough_ends_a_solve(best):
     problem, worse = formulate(best.instance, "milp-mccormick"), set()
-    with Programs(tmp_path) as programs:
+    with Solvers() as solvers:
         for solver in ("highs", "cplex", "cbc", "glpk"):
             if PROGRAMS[SOLVERS[solver].program].present:
-                first, last = (programs.solve(problem, solver, 60.0, gap=gap) for gap in (ENOUGH, 0.0))
+                first, last = (
+                    solvers.solve(problem, solver, limits=Limits(60.0, gap, 1)) for gap in (ENOUGH, 0.0)
+                )
                 assert first.objective >= last.objective - 1e-6, solver
                 worse |= {solver} if first.objective > last.objective + 1e-3 else set()
     assert "highs" in worse

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from ....models.errors import SolutionError
-from ...solutions.readers.registry import read_raw
-from ...solutions.readers.text import RawSolution, Status
+from ..solutions.readers.text import Status
 from . import casadi as casadi_program
-from .protocol import Refused, TooLarge
-from .reading import Evaluation, Points, told
+from .protocol import Job, Outcome, RefusedError, TooLargeError, run_command
+from .reading import Evaluation, Points
 
 _BARON_FILES: Final = ("baron", "libbaronnavvy64.so", "optbaron.def", "gmsba_us.run", "gmsba_ux.out")
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
@@ -60,8 +57,8 @@ def _system(solver: str) -> Path:
         _link(baron / name, folder / name)
     from gamspy_baron import verbatim
 
-    head, mark, tail = (base / _TABLE).read_text().partition("DEFAULTS")
-    (folder / _TABLE).write_text(f"{head}{verbatim}\n\n{mark}{tail}")
+    head, mark, tail = (base / _TABLE).read_text("utf-8").partition("DEFAULTS")
+    (folder / _TABLE).write_text(f"{head}{verbatim}\n\n{mark}{tail}", "utf-8")
     return folder
 
 
@@ -73,33 +70,33 @@ def _link(source: str | Path, target: str | Path) -> None:
 
 
 def _run(path: Path, solver: str, *options: str) -> str:
-    """The listing of a run. Raises TooLarge or Refused when GAMS does not come to its normal end."""
+    """Log and listing of a run. Raises TooLargeError, and RefusedError when GAMS reports an error."""
     kinds = _LINEAR_AND_QUADRATIC if solver == "cplex" else _LINEAR_AND_QUADRATIC + _NONLINEAR
     chosen = [f"{kind}={solver}" for kind in kinds]
     for name, lines in _OPTIONS.items():
-        Path(f"{name}.opt").write_text(lines)
+        Path(f"{name}.opt").write_text(lines, "utf-8")
     command = [
         str(_system(solver) / "gams"),
         str(path),
         "optfile=1",
-        "lo=2",
+        "lo=4",
         "lf=run.log",
         "o=run.lst",
         *chosen,
         *options,
     ]
-    done = subprocess.run(command, check=False, capture_output=True)
+    done = run_command(command)
     log, listing = (_text(Path(name)) for name in ("run.log", "run.lst"))
     if re.search(r"exceeds the demo license|demo license limits|Licensing Problem", log + listing):
-        raise TooLarge
+        raise TooLargeError("beyond the limits of the demo licence")
     if done.returncode:
         errors = [line for line in (log + listing).splitlines() if line.startswith(("****", "***"))]
-        raise Refused(f"GAMS ends with code {done.returncode}: {' '.join(errors[:2])}")
+        raise RefusedError(f"GAMS ends with code {done.returncode}: {' '.join(errors[:2])}")
     return log + listing
 
 
 def _text(path: Path) -> str:
-    return path.read_text(errors="replace") if path.exists() else ""
+    return path.read_text("utf-8", "replace") if path.exists() else ""
 
 
 def our_name(name: str) -> str:
@@ -112,7 +109,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():
-        raise Refused("CONVERT wrote no .nl")
+        raise RefusedError("CONVERT wrote no .nl")
     found = casadi_program.evaluate(Path("out.nl").resolve(), points, our_name)
     return replace(found, may_lack=True, rounding=1e-14)
 
@@ -126,36 +123,36 @@ _MODEL_STATUS: Final = {
     8: Status.LIMIT_WITH_POINT,
     10: Status.INFEASIBLE,
 }
+_INTEGER_SOLUTION: Final = 8
 _NORMAL: Final = 1
 
 
-def solve(path: Path, seconds: float, solver: str, _gap: float = 0.0) -> RawSolution:
-    """The answer of one of GAMS's solvers within the time, from the CSV that our models write.
+def solve(job: Job) -> Outcome:
+    """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write.
 
     The gap stands in the model itself.
     """
-    answer = Path("answer.csv").resolve()
-    answer.unlink(missing_ok=True)
-    said = _run(path, solver.removeprefix("gams-"), f"reslim={seconds:g}", "threads=1", f"--RESULTS={answer}")
+    solver = job.solver.removeprefix("gams-")
+    threads = (f"threads={job.threads}",) if job.threads else ()
+    said = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={job.solution}")
     model, state = (
         int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", said)) else 0
         for kind in ("MODEL", "SOLVER")
     )
     words = f"model status {model}, solver status {state}"
     used = re.search(r"^ +SOLVER +(\w+) +FROM LINE", said, re.MULTILINE)
-    if used and used[1].lower() != solver.removeprefix("gams-"):
-        raise Refused(f"it is of a type that GAMS gives to {used[1]}")
+    if used and used[1].lower() != solver:
+        raise RefusedError(f"it is of a type that GAMS gives to {used[1]}")
     refusal = re.search(r"\*\*\* (Cannot handle function .*)", said)
     if refusal:
-        raise Refused(refusal[1])
+        raise RefusedError(refusal[1])
     status = _MODEL_STATUS.get(model, Status.ERROR)
-    if model == 8 and state == _NORMAL:
+    if model == _INTEGER_SOLUTION and state == _NORMAL:
         status = Status.OPTIMAL_GLOBAL
-    bound = re.search(r"^Best possible *[=:] *(\S+)$", said, re.MULTILINE)
-    try:
-        raw = read_raw(answer)
-    except SolutionError as error:
-        raise Refused(f"no answer: {words}; {error}") from error
     if status in {Status.ERROR, Status.INFEASIBLE}:
-        return told(status, words)
-    return replace(raw, status=status, message=words, bound=float(bound[1]) if bound else None)
+        job.solution.unlink(missing_ok=True)  # its values are no answer
+        return Outcome(status, words)
+    if not job.solution.exists():
+        raise RefusedError(f"GAMS wrote no solution: {words}")
+    bound = re.search(r"^Best possible *[=:] *(\S+)$", said, re.MULTILINE)
+    return Outcome(status, words, float(bound[1]) if bound else None)

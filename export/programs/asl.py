@@ -14,8 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.instance.grid import Floats
-from .protocol import Refused, file_names, started
+from ...models.instance.grid import Floats
+from .protocol import file_names, run_program
 from .reading import Evaluation, Points
 
 _TOLD: Final = 1e-5
@@ -24,18 +24,14 @@ _TOLD: Final = 1e-5
 
 def version() -> str:
     """Its version, and that of the library."""
-    said = started("asl", "-v")
-    found = re.search(r"Version (\S+).*ASL\((\d+)\)", said.stdout + said.stderr)
+    found = re.search(r"Version (\S+).*ASL\((\d+)\)", run_program("gjh_asl_json", "-v"))
     return f"{found[1]} (ASL {found[2]})" if found else "unknown"
 
 
 def at_start(path: Path) -> dict[str, Any]:
     """What the library says of an .nl file, with values at its start; leaves a .json beside it."""
-    done = started("asl", str(path.with_suffix("")), folder=path.parent)
-    if done.returncode:
-        words = (done.stdout + done.stderr).strip()[-200:]
-        raise Refused(f"gjh_asl_json ends with code {done.returncode}: {words}")
-    said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text())
+    run_program("gjh_asl_json", str(path.with_suffix("")), folder=path.parent)
+    said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text("utf-8"))
     return said
 
 

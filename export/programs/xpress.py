@@ -11,10 +11,12 @@ import numpy as np
 with warnings.catch_warnings(action="ignore"):  # it tells which licence it uses
     import xpress
 
-from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, listed, of_triangle, terms
-from .protocol import Refused, TooLarge
-from .reading import Meaning, infinite, told
+from ...models.processes.control import on_stop
+from ...models.storage import replacing
+from ..solutions.readers.text import Status
+from ..writing.terms import Terms, listed, of_triangle, terms
+from .protocol import Job, Outcome, RefusedError, TooLargeError
+from .reading import Meaning, finite, infinite
 
 _ROWS, _COLUMNS = 1, 2
 
@@ -24,10 +26,10 @@ def version() -> str:
     return str(xpress.__version__)
 
 
-def _load(path: Path) -> Any:
+def _load(path: Path, *, log: bool = False) -> Any:
     with warnings.catch_warnings(action="ignore"):
         model = xpress.problem()
-    model.setControl("outputlog", 0)
+    model.setControl("outputlog", int(log))
     try:
         model.readProb(str(path))
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
@@ -37,15 +39,15 @@ def _load(path: Path) -> Any:
 
 def _complain(error: Exception) -> None:
     if "too many rows and columns" in str(error):
-        raise TooLarge from error
-    raise Refused(str(error)) from error
+        raise TooLargeError(str(error)) from error
+    raise RefusedError(str(error)) from error
 
 
 def read(path: Path) -> Meaning:
     """The file as Xpress reads it."""
     model = _load(path)
     if model.attributes.objsense != 1 or model.attributes.objrhs != 0:
-        raise Refused("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant beside ONE")
     n, m = model.attributes.cols, model.attributes.rows
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
@@ -89,30 +91,35 @@ _STATUS = {
 }
 
 
-def solve(
-    path: Path, seconds: float, _solver: str, gap: float = 0.0, start: Path | None = None
-) -> RawSolution:
-    """Its answer within the time."""
-    model = _load(path)
-    if start is not None:
-        model.readSlxSol(str(start))
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is an .slx, which has no status."""
+    model = _load(job.model, log=True)
+    if job.start is not None:
+        model.readSlxSol(str(job.start))
     for option, value in (
-        ("timelimit", seconds), ("miprelstop", gap), ("mipabsstop", 1e-9), ("feastol", 1e-9),
-        ("miptol", 1e-9), ("mipaddcutoff", -1e-9),
-        ("optimalitytol", 1e-9), ("bargapstop", 1e-12), ("threads", 1), ("concurrentthreads", 1),
+        ("timelimit", job.seconds), ("miprelstop", job.gap), ("mipabsstop", 1e-9), ("feastol", 1e-9),
+        ("miptol", 1e-9), ("mipaddcutoff", -1e-9), ("optimalitytol", 1e-9), ("bargapstop", 1e-12),
+        *((("threads", job.threads), ("concurrentthreads", job.threads)) if job.threads else ()),
     ):  # fmt: skip
         model.setControl(option, value)
     # Before the search: one that is cut short has the names of the presolved model, but values of the whole.
     names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
-        _, found = model.optimize()
+        with on_stop(model.interrupt):
+            _, found = model.optimize()
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
         _complain(error)
     words = str(found).removeprefix("SolStatus.")
     status = _STATUS.get(found.name, Status.LIMIT_WITHOUT_POINT)
     mixed = model.attributes.mipents or model.attributes.qconstraints
-    bound, nodes = (model.attributes.bestbound, model.attributes.nodes) if mixed else (None, None)
-    if status not in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
-        return told(status, words, bound=bound, nodes=nodes)
-    numbers = {"objective": model.attributes.objval, "bound": bound, "nodes": nodes}
-    return told(status, words, names, model.getSolution(), **numbers)
+    bound, nodes = (finite(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)
+    if status in {Status.OPTIMAL_GLOBAL, Status.LIMIT_WITH_POINT}:
+        _write_slx(job, names, model.getSolution())
+    return Outcome(status, words, bound, nodes)
+
+
+def _write_slx(job: Job, names: list[str], values: list[float]) -> None:
+    """Write an .slx; Xpress' own method refuses points of a search that was cut short."""
+    lines = (f"  C {name} {value!r}\n" for name, value in zip(names, map(float, values), strict=True))
+    with replacing(job.solution) as stream:
+        stream.write(f"NAME {job.stamp}\n{''.join(lines)}ENDATA\n".encode())

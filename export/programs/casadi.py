@@ -1,11 +1,4 @@
-"""A driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
-
-Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline
-gap stamp`: a crash of a solver takes the child alone, and its log is the child's output. The log's first line
-says that the solver starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point
-so far. It ends with its parent: when its standard input closes.
-
-The stamp says of which problem the model is, and is repeated in the message.
+"""CasADi as a reader of .nl, and the solvers that come with it: Ipopt and Bonmin.
 
 Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better
 points only, and the start is the answer when there is none.
@@ -14,21 +7,18 @@ points only, and the start is the answer when there is none.
 from __future__ import annotations
 
 import signal
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ...models.errors import SolverError
 from ...models.instance.grid import Floats
-from ...models.processes.deadline import Deadline
-from ...models.processes.side_by_side import leave_with_parent
+from ...models.processes.control import on_stop, stopped
 from ..solutions.readers.ampl import write_ampl_sol
-from .job import LEAST
 from .nl_model import NlModel, ca, read_nl
+from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self
+from .reading import Evaluation, Points
 
 # AMPL's solve codes: 0 solved, 100 solved?, 200 infeasible, 300 unbounded, 400 limit with point, 500 failure.
 _CODES: Final = {
@@ -56,7 +46,7 @@ _NO_POINT: Final = 1e49
 
 
 class Watch(ca.Callback):
-    """Called by Ipopt at every iterate: keeps the best feasible point, and asks it to stop on an interrupt.
+    """Callback of Ipopt at every iterate: keeps the best feasible point and passes on a request to stop.
 
     best: the lowest feasible point so far, the start to begin with; None where there is none. value: its
     objective.
@@ -68,15 +58,10 @@ class Watch(ca.Callback):
         self.model = model
         columns, rows = len(model.start), len(model.row_lower)
         self.sizes = {"x": columns, "f": 1, "g": rows, "lam_x": columns, "lam_g": rows, "lam_p": 0}
-        self.wanted = False
         start = model.feasible_value(model.start)
         self.value = np.inf if start is None else start
         self.best = None if start is None else model.start
         self.construct("watch", {})
-
-    def on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        """Remember the interrupt."""
-        self.wanted = True
 
     def get_n_in(self) -> int:
         """Number of inputs, as CasADi asks for it."""
@@ -102,7 +87,7 @@ class Watch(ca.Callback):
         """1 to stop, 0 to go on."""
         by_name = dict(zip(self.sizes, arguments, strict=True))
         self.see(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
-        return [int(self.wanted)]
+        return [int(stopped())]
 
     def see(self, point: Floats, value: Floats, rows: Floats) -> None:
         """Keep a point (n,) with its objective (1,) and rows (m,) if it is feasible and lower."""
@@ -141,30 +126,65 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
     }
 
 
-def solve(
-    solver: str, model: NlModel, seconds: float, gap: float, started: Callable[[], object] = lambda: None
-) -> AmplAnswer:
-    """How the solver ended. `started` is called when it is about to begin.
+def version() -> str:
+    """Its version."""
+    return str(ca.CasadiMeta.version())
 
-    Must run in the main thread of a process of its own: it takes over the handling of SIGINT. Raises
-    SolverError for an error inside the solver.
+
+def evaluate(path: Path, points: Points, renamed: Callable[[str], str] = str) -> Evaluation:
+    """The .nl file as CasADi reads it; names come from .col and .row, through `renamed`."""
+    model = read_nl(path)
+    columns, rows = ([renamed(name) for name in names] for names in file_names(path))
+    values = [model.evaluate(point) for point in points.of(columns)]
+    return Evaluation(
+        columns,
+        model.lower,
+        model.upper,
+        model.discrete,
+        rows,
+        model.row_lower,
+        model.row_upper,
+        np.array([objective for objective, _ in values]),
+        np.array([row for _, row in values]).reshape(len(values), len(rows)),
+    )
+
+
+def solve(job: Job) -> Outcome:
+    """Solve the file with Ipopt or Bonmin; the solution is an AMPL .sol, which repeats the stamp."""
+    model = read_nl(job.model)
+    answer = solve_model(job.solver, model, job.seconds, job.gap)
+    message = f"{job.solver} through CasADi {version()}: {answer.words}\n{job.stamp}"
+    columns, rows = len(model.start), len(model.row_lower)
+    write_ampl_sol(job.solution, message, answer.point, rows, answer.code, columns=columns)
+    return Outcome()
+
+
+def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> AmplAnswer:
+    """Solve a model in the main thread of a process of its own, for SIGINT interrupts Bonmin.
+
+    Raises RefusedError for an error inside the solver.
     """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
     watch = Watch(model)
-    signal.signal(signal.SIGINT, watch.on_signal)  # Bonmin puts a handler of its own in its place
     if solver == "ipopt":
         chosen["iteration_callback"] = watch
     else:
         chosen["discrete"] = model.discrete.tolist()
         chosen |= {} if watch.best is None else {"bonmin.cutoff": watch.value}
     run = ca.nlpsol("solver", solver, model.problem, chosen)
-    started()
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
+    size = f"{len(model.start)} columns, {len(model.row_lower)} rows"
+    print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - it goes to the log
+    hook: Callable[[], object] = stopped
+    if solver == "bonmin":
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Bonmin handles it once its search has begun
+        hook = interrupt_self
     try:
-        answer = run(x0=model.start, **ends)
+        with on_stop(hook):
+            answer = run(x0=model.start, **ends)
     except RuntimeError as error:  # CasADi names places in its source first
         why = str(error).rpartition(": ")[2]
-        raise SolverError(f"{solver.title()} ended with an error, {why!r}") from error
+        raise RefusedError(f"{solver.title()} ended with an error, {why!r}") from error
     words = str(run.stats()["return_status"])
     code = _CODES.get(words, _FAILURE)
     words += " (at the limit, or by Ctrl-C)" if words in _STOPPED else ""
@@ -183,26 +203,3 @@ def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
     if watch.best is None:
         return AmplAnswer(words, 470 if code == _LIMIT else code, np.zeros(0))
     return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, watch.best)
-
-
-def main(arguments: list[str]) -> int:
-    """0 when a .sol was written, in which the status stands; else 1, and the log ends with the reason."""
-    solver, path, solution, deadline, gap, stamp = arguments
-    leave_with_parent()
-    model = read_nl(Path(path))
-    seconds = max(Deadline(float(deadline)).left(), LEAST)
-    columns, rows = len(model.start), len(model.row_lower)
-    line = f"{solver}: {columns} columns, {rows} rows, at most {seconds:.3g} s"
-    # What is printed is the log.
-    try:
-        answer = solve(solver, model, seconds, float(gap), started=lambda: print(line, flush=True))  # noqa: T201
-    except SolverError as error:
-        print(error)  # noqa: T201
-        return 1
-    message = f"{solver} through CasADi {ca.CasadiMeta.version()}: {answer.words}\n{stamp}"
-    write_ampl_sol(solution, message, answer.point, rows, answer.code, columns=columns)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -8,15 +8,16 @@ objective and rows at points, as readers of .nl and GAMS give it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import Any, Final, Self, TypeVar
+from dataclasses import dataclass
+from typing import Any, Final, Self
 
 import numpy as np
 
-from ....models.instance.grid import Bools, Floats, Ints
-from ...solutions.readers.text import RawSolution, Status
-from ...writing.terms import Terms, terms
+from ...models.instance.grid import Bools, Floats, Ints
+from ..writing.terms import Terms, terms
+
+_INFINITY: Final = 1e20
+_INFINITE_BOUND: Final = 1e19
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,43 +138,6 @@ def infinite(values: Sequence[float]) -> Floats:
     return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
 
 
-def told(
-    status: Status,
-    words: str,
-    columns: Sequence[str] = (),
-    values: Sequence[float] | Floats = (),
-    *,
-    objective: float | None = None,
-    bound: float | None = None,
-    nodes: int | None = None,
-) -> RawSolution:
-    """What a program answers through an interface of its own, in the form in which files are read."""
-    names = np.array([name.encode() for name in columns], dtype=np.bytes_)
-    given = np.array(values, dtype=float)
-    return RawSolution(status, words, objective, names, given, bound=bound, reader=_TOLD, nodes=nodes)
-
-
-_INFINITY: Final = 1e20
-_TOLD: Final = "the program itself"
-T = TypeVar("T", Meaning, Evaluation, Points, RawSolution)
-
-
-def save(given: Meaning | Evaluation | Points | RawSolution, path: Path) -> None:
-    """Write the arrays to a .npz."""
-    arrays: dict[str, Any] = {
-        name: np.asarray(value) for name, value in vars(given).items() if value is not None
-    }
-    np.savez(path, **arrays)
-
-
-def load(kind: type[T], path: Path) -> T:
-    """What `save` wrote."""
-    with np.load(path, allow_pickle=False) as archive:
-        values = {name: _plain(value) for name, value in archive.items()}
-    if "status" in values:
-        values["status"] = Status(values["status"])
-    return kind(**dict.fromkeys(field.name for field in fields(kind)) | values)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if value.ndim == 0 or value.dtype.kind == "U" else value
+def finite(value: float | None) -> float | None:
+    """Return the number, or None for one that stands for infinity."""
+    return None if value is None or abs(value) >= _INFINITE_BOUND else float(value)

@@ -1,0 +1,116 @@
+"""HiGHS: reads LP and MPS and solves LPs, MILPs and convex QPs. It reads no quadratic rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import highspy
+import numpy as np
+
+from ...models.errors import OutputError
+from ...models.processes.control import stopped
+from ..writing.terms import of_triangle, terms
+from .protocol import Job, Outcome, RefusedError
+from .reading import Meaning, finite
+
+_RAW: Final = 0
+"""The style of solution files that HiGHS reads and writes with all digits."""
+_TICK: Final = 0.1
+"""Seconds between two looks at a running solver."""
+
+
+def version() -> str:
+    """Version of HiGHS."""
+    return str(_model().version())
+
+
+def _model() -> Any:
+    return highspy.Highs()  # type: ignore[no-untyped-call]
+
+
+def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
+    """Model of an LP or MPS file, with these options. Raises RefusedError if HiGHS cannot read it."""
+    highs = _model()
+    set_options(highs, output_flag="false" if silent else "true", **options)
+    if highs.readModel(str(path)) == highspy.HighsStatus.kError:
+        raise RefusedError("HiGHS cannot read it", file=path)
+    return highs
+
+
+def set_options(highs: Any, **options: str | float) -> None:
+    """Set options by name; a number of threads that differs from that of an earlier solve takes effect."""
+    for option, value in options.items():
+        highs.setOptionValue(option, value)
+    if options.get("threads"):
+        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - else that of the earlier solve is kept
+
+
+def solved(highs: Any, path: Path) -> Any:
+    """Solve the model of a file and return it. Raises RefusedError if HiGHS reports an error."""
+    if highs.run() == highspy.HighsStatus.kError:
+        raise RefusedError("HiGHS answers with an error (model status Not Set)", file=path)
+    return highs
+
+
+def leave(highs: Any, solution: Path) -> None:
+    """Write the solution file. Raises OutputError."""
+    beside = solution.with_suffix(".part")
+    if highs.writeSolution(str(beside), _RAW) == highspy.HighsStatus.kError:
+        beside.unlink(missing_ok=True)
+        raise OutputError("HiGHS cannot write it; free some space or choose another folder", file=solution)
+    beside.replace(solution)
+
+
+def read(path: Path) -> Meaning:
+    """The file as HiGHS reads it."""
+    highs = loaded(path)
+    lp, hessian = highs.getLp(), highs.getModel().hessian_
+    if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
+        raise RefusedError("it is not minimised, or has a constant beside ONE")
+    given: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
+    given |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
+    if len(lp.integrality_):
+        given["integer"] = [kind == highspy.HighsVarType.kInteger for kind in lp.integrality_]
+    column, row, value = _columnwise(lp.a_matrix_, lp.num_col_)
+    given["matrix"] = terms(np.stack([row, column], axis=1), value, indices=2)
+    if hessian.dim_:
+        column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
+        given["quadratic"] = of_triangle(row, column, value)
+    return Meaning.of(list(lp.col_names_), list(lp.row_names_), **given)
+
+
+def _columnwise(matrix: Any, columns: int) -> tuple[Any, Any, Any]:
+    start, index, value = (np.array(part) for part in (matrix.start_, matrix.index_, matrix.value_))
+    return np.repeat(np.arange(columns), np.diff(start)[:columns]), index, value
+
+
+def solve(job: Job) -> Outcome:
+    """Solve the file; the solution is HiGHS' raw style, which has no bound."""
+    highs = loaded(job.model, silent=False, mip_rel_gap=job.gap, time_limit=job.seconds, threads=job.threads)
+    if job.precise and not highs.getModel().hessian_.dim_:  # the QP method fails with such tolerances
+        set_options(
+            highs, mip_abs_gap=1e-9, mip_feasibility_tolerance=1e-9, primal_feasibility_tolerance=1e-9
+        )
+    if job.start is not None:
+        highs.readSolution(str(job.start), _RAW)
+    _run(highs)
+    if highs.getModelStatus() == highspy.HighsModelStatus.kNotset:
+        raise RefusedError("HiGHS answers with an error (model status Not Set)", file=job.model)
+    leave(highs, job.solution)
+    if not len(highs.getLp().integrality_):
+        return Outcome()
+    info = highs.getInfo()
+    return Outcome(bound=finite(info.mip_dual_bound), nodes=info.mip_node_count)
+
+
+def _run(highs: Any) -> None:
+    """Solve; a request to stop ends the search and keeps the incumbent."""
+    highs.HandleUserInterrupt = True
+    highs.startSolve()
+    while not (stopped() or highs.wait(_TICK)[0]):
+        pass
+    if stopped():
+        highs.cancelSolve()
+    while not highs.wait(_TICK)[0]:
+        pass

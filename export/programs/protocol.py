@@ -1,0 +1,124 @@
+"""What the module of a program offers, and what it raises.
+
+The table of solvers lists the programs. Each has a module here, which is imported in a child process only:
+
+    version() -> str                  version of the program
+    read(path) -> Meaning             the algebra of an LP or MPS file, where the program reports it
+    evaluate(path, points) -> Evaluation    the behaviour of a file of another format
+    solve(job) -> Outcome             solve a model file and write a solution file, where it solves
+
+A module raises RefusedError, NotReportedError or TooLargeError. Files are not compressed; the current folder
+is the child's own.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from ...models.errors import CrossfieldError
+from ...models.processes.control import on_stop
+from ...models.processes.deadline import Deadline
+from ..solutions.readers.text import Status
+
+_WRITING: Final = 0.2
+_LEAST: Final = 0.01
+
+
+class RefusedError(CrossfieldError):
+    """A program does not take a file; the message is the program's own."""
+
+
+class FailedError(CrossfieldError):
+    """An error of a program or of its interface that says nothing about the file."""
+
+
+class NotReportedError(CrossfieldError):
+    """A program read a file, but does not report it in a form that can be compared."""
+
+
+class TooLargeError(CrossfieldError):
+    """A model is larger than the program's free edition takes."""
+
+
+class Job(NamedTuple):
+    """A solve that a program is asked for.
+
+    solver: name in the table of solvers. model: the file to solve; solution: the file to write, in the
+    solver's own layout. start: a file with a starting point, or None. deadline: when the search has to end.
+    gap: relative gap at which a discrete search may stop. threads: 0 for the solver's choice. precise:
+    whether tolerances are as tight as the solver takes them. stamp: names the problem, for files that can
+    hold a message.
+    """
+
+    solver: str
+    model: Path
+    solution: Path
+    start: Path | None
+    deadline: Deadline
+    gap: float
+    threads: int
+    precise: bool
+    stamp: str
+
+    @property
+    def seconds(self) -> float:
+        """Seconds for the search: what is left, less the time to write the solution."""
+        return max(self.deadline.left() - _WRITING, _LEAST)
+
+
+class Outcome(NamedTuple):
+    """What a solution file does not hold: status, the solver's message, dual bound and number of nodes.
+
+    status: None where the file states it. bound and nodes: None where the solver reports none.
+    """
+
+    status: Status | None = None
+    message: str = ""
+    bound: float | None = None
+    nodes: int | None = None
+
+
+def run_program(name: str, *arguments: str, folder: Path | None = None) -> str:
+    """Run an executable and return what it prints. Raises RefusedError if it ends with an error.
+
+    When this process is asked to stop, the program receives SIGINT.
+    """
+    done = run_command([shutil.which(name) or name, *arguments], folder)
+    if done.returncode:
+        raise RefusedError(f"{name} ends with code {done.returncode}: {done.stdout.strip()[-300:]}")
+    return done.stdout
+
+
+def run_command(command: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command, print its output, and return how it ended; standard error goes to the same text."""
+    with (
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+            errors="replace",
+            cwd=folder,
+        ) as process,
+        on_stop(lambda: process.send_signal(signal.SIGINT)),
+    ):
+        text, _ = process.communicate()
+    print(text, flush=True)  # noqa: T201 - what a child prints is its log
+    return subprocess.CompletedProcess(command, process.returncode, text)
+
+
+def interrupt_self() -> None:
+    """Send this process SIGINT, for a solver that handles it itself."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def file_names(path: Path) -> tuple[list[str], list[str]]:
+    """Names of columns and rows of an .nl file, from the .col and .row beside it, the objective left out."""
+    columns, rows = (path.with_suffix(suffix).read_text("utf-8").split() for suffix in (".col", ".row"))
+    return columns, [name for name in rows if name != "obj"]

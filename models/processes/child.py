@@ -1,0 +1,236 @@
+"""Child processes that run functions of the package: start, time limit, interruption, result, failure.
+
+A child is a program of the package, not a second copy of the user's program: the pools of the standard
+library import the user's script again in every process. It gets calls through a pipe and ends when the pipe
+closes, so it never outlives its parent. Requests to stop travel through the same pipe, not as signals.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple, Self
+
+from .deadline import Deadline
+from .groups import KILLED, ending, kill, start
+from .messages import Call, Raised, Stop, WorkerError, send
+
+GRACE: Final = 0.5
+GRACE_SHARE: Final = 0.05
+"""Seconds after its deadline, plus a share of its time, in which work may return what it has."""
+PATIENCE: Final = 4.0
+"""Seconds that work may take to answer Ctrl-C: half way it is asked again, then it is killed."""
+_TICK: Final = 0.1
+_PROGRAM: Final = (
+    "import sys; sys.path += [each for each in sys.argv[1:] if each not in sys.path]; "
+    f"from {__package__}.worker import main; main()"
+)
+"""Finds modules wherever this process does, but puts no folder of the user before those of libraries."""
+_ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+class KilledError(WorkerError):
+    """Work that was killed because it did not end in time; `interrupted` tells whether the user asked."""
+
+    def __init__(self, message: str, *, interrupted: bool = False) -> None:
+        """Keep who asked for the end."""
+        super().__init__(message)
+        self.interrupted = interrupted
+
+
+class Returned(NamedTuple):
+    """The result of a call, and whether the user interrupted it."""
+
+    value: Any
+    interrupted: bool
+
+
+class Child:
+    """A process that runs functions of modules, one call at a time.
+
+    folder: its current folder, this process' own by default. one_thread: whether numerical libraries there
+    keep to one thread. The process starts with the first call, and again after one that it did not survive.
+    """
+
+    def __init__(self, folder: Path | None = None, *, one_thread: bool = False) -> None:
+        """Start nothing yet."""
+        self._folder, self._one_thread = folder, one_thread
+        self._process: subprocess.Popen[bytes] | None = None
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the process."""
+        self.end()
+
+    def call(
+        self,
+        work: Callable[..., Any],
+        *arguments: Any,
+        deadline: Deadline | None = None,
+        log: Path | None = None,
+    ) -> Returned:
+        """Call `work(*arguments)` in the child and return its result.
+
+        work: a function of an importable module. deadline: when the work is asked to stop; deadlines among
+        the arguments arrive with the seconds that are left. log: file for what the work prints. The first
+        Ctrl-C asks the work to stop as well, the second kills it and is raised.
+
+        Raises what the work raises, KilledError for work that does not stop in time, and WorkerError, with
+        the reason, when the process dies or a value cannot be sent.
+        """
+        watch = _Watch(deadline or Deadline(), self._ask_to_stop)
+        name = f"{work.__module__}.{getattr(work, '__qualname__', work)}"
+        if watch.deadline.passed():
+            raise KilledError(f"no time was left to start {name}")
+        try:
+            process = self._running(watch)
+            message = Call(_pickled(work, arguments, name), name, log)
+            assert process.stdin is not None
+            with suppress(BrokenPipeError):  # the child died; its exit code tells why
+                send(message, process.stdin)
+            answer = self._next(watch)
+        except BaseException:
+            self.end()
+            raise
+        if isinstance(answer, Raised):
+            raise answer.again()
+        return Returned(answer, watch.interrupted)
+
+    def end(self) -> None:
+        """Kill the process and all that it started."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is None:
+            return
+        kill(process)
+        process.wait()
+        if process.stdin is not None:
+            with suppress(OSError):  # what was not yet written is lost
+                process.stdin.close()
+
+    def _running(self, watch: _Watch) -> subprocess.Popen[bytes]:
+        """Return the process, started if needed and ready for a call."""
+        with self._lock:
+            process = self._process
+            fresh = process is None
+            if process is None:
+                process = self._process = self._started()
+        if fresh:
+            self._next(watch)  # the worker reports that it is ready
+        return process
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        # -P: a folder `crossfield` or a file numpy.py in the current folder must not be imported.
+        process = start(
+            [sys.executable, "-P", "-c", _PROGRAM, *sys.path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=self._folder,
+            env=os.environ | (_ONE_THREAD if self._one_thread else {}),
+        )
+        self._answers = queue.SimpleQueue()
+        threading.Thread(target=_listen, args=(process, self._answers), daemon=True).start()
+        return process
+
+    def _next(self, watch: _Watch) -> Any:
+        """Wait for the next message of the child."""
+        while True:
+            try:
+                answer = self._answers.get(timeout=_TICK)
+            except queue.Empty:
+                watch.look()
+            except KeyboardInterrupt:
+                watch.interrupt()
+            else:
+                if isinstance(answer, _Ended):
+                    raise WorkerError(self._how_it_ended())
+                return answer
+
+    def _how_it_ended(self) -> str:
+        process = self._process
+        code = None if process is None else process.wait()
+        if code is None:
+            return "the child process was ended before its work was done"
+        hint = "; the system may do so when memory is short, try fewer jobs or threads" * (code == KILLED)
+        return f"the child process {ending(code)} before its work was done{hint}"
+
+    def _ask_to_stop(self) -> None:
+        process = self._process
+        if process is not None and process.stdin is not None:
+            with suppress(OSError):
+                send(Stop(), process.stdin)
+
+
+def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...], name: str) -> bytes:
+    try:
+        return pickle.dumps((work, arguments))
+    except Exception as error:
+        raise WorkerError(f"the arguments of {name} cannot be sent: {error}") from error
+
+
+class _Ended(NamedTuple):
+    """Put in the queue of answers when the child closes its end of the pipe."""
+
+
+def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -> None:
+    assert process.stdout is not None
+    with process.stdout as stream:
+        try:
+            while True:
+                answers.put(pickle.load(stream))  # noqa: S301 - from a process of our own
+        except Exception:  # noqa: BLE001 - a message that breaks off, however pickle takes that
+            answers.put(_Ended())
+
+
+@dataclass
+class _Watch:
+    """When a call is asked to stop and when it is killed: by its deadline and by Ctrl-C."""
+
+    deadline: Deadline
+    ask: Callable[[], None]
+    asked: int = 0
+    patience: Deadline | None = None
+
+    def __post_init__(self) -> None:
+        self.kill = self.deadline.later(GRACE + GRACE_SHARE * min(self.deadline.left(), 1e9))
+
+    @property
+    def interrupted(self) -> bool:
+        return self.patience is not None
+
+    def interrupt(self) -> None:
+        """Note Ctrl-C; raise it when it is the second."""
+        if self.patience is not None:
+            raise KeyboardInterrupt
+        self.patience = Deadline.after(PATIENCE)
+        self.look()
+
+    def look(self) -> None:
+        """Ask the work to stop when it is due; raise KilledError when it had its time."""
+        if self.patience is not None and self.patience.passed():
+            raise KilledError("did not stop after Ctrl-C and was killed", interrupted=True)
+        if self.kill.passed():
+            raise KilledError("did not stop at its time limit and was killed", interrupted=self.interrupted)
+        if self.asked < self._reasons():
+            self.asked += 1
+            self.ask()
+
+    def _reasons(self) -> int:
+        """Return how many times the work should have been asked by now."""
+        late = int(self.deadline.passed())
+        if self.patience is None:
+            return late
+        return late + 1 + self.patience.later(-PATIENCE / 2).passed()

@@ -1,0 +1,49 @@
+"""Functions that tests have called in child processes."""
+
+import os
+import time
+from pathlib import Path
+
+from crossfield.models.processes import control
+from crossfield.models.processes.deadline import Deadline
+
+
+def until_stopped(begun: Path) -> str:
+    """Wait until the parent asks to stop."""
+    begun.touch()
+    while not control.stopped():
+        time.sleep(0.01)
+    return "stopped"
+
+
+def deaf(begun: Path) -> None:
+    """Work on, whatever the parent asks."""
+    begun.touch()
+    time.sleep(600)
+
+
+def left(deadline: Deadline) -> float:
+    """Seconds that are left of a deadline that was sent."""
+    return deadline.left()
+
+
+def hooked(begun: Path) -> list[str]:
+    """What a hook did when the parent asked to stop."""
+    heard: list[str] = []
+    with control.on_stop(lambda: heard.append("hook")):
+        begun.touch()
+        while not heard:
+            time.sleep(0.01)
+    return heard[:1]
+
+
+def prints() -> None:
+    """Print through Python and past it."""
+    print("from Python")
+    os.write(1, b"from C\n")
+    os.write(2, b"an error\n")
+
+
+def where() -> str:
+    """Return the current folder."""
+    return str(Path.cwd())
