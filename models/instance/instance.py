@@ -53,6 +53,8 @@ def whole_numbers(values: Any, name: str) -> Ints:
     Raises InstanceError for fractions and for numbers beyond int32, which a plain cast would change silently.
     """
     given = np.asarray(values)
+    if given.dtype.kind == "f":
+        given = given.astype(np.float64)  # the limits are beyond the numbers of half precision
     if (
         given.dtype.kind not in "iuf"
         or not ((given >= -(2**31)) & (given < 2**31)).all()
