@@ -8,6 +8,7 @@ brings it to its end.
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -79,6 +80,7 @@ def submit_point(
     file = Path(file)
     texts = {"solver": solver or UNKNOWN, "version": version or UNKNOWN, "by": by or UNKNOWN}
     check_texts(texts)
+    check_numbers({"seconds": seconds})
     library = writable_library(folder)
     with locked(library.folder, f"a submission of {file.name}", progress):
         library = settled(library, progress)
@@ -91,6 +93,13 @@ def check_texts(texts: Mapping[str, str | None]) -> None:
     for name, text in texts.items():
         if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
             raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
+
+
+def check_numbers(numbers: Mapping[str, float | None]) -> None:
+    """Nothing if a ledger can hold each number that is given. Raises InputError with its option's name."""
+    for name, value in numbers.items():
+        if value is not None and (not math.isfinite(value) or (name != "bound" and value < 0)):
+            raise InputError(f"--{name} must be a finite number{'' if name == 'bound' else ' from 0'}")
 
 
 def is_better(objective: float, known: float) -> bool:

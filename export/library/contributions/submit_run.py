@@ -8,7 +8,6 @@ log, so that `verify` can read that again.
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from dataclasses import dataclass
 from datetime import date
@@ -34,6 +33,7 @@ from ..ledger.standing import MAKERS, best_of_each
 from .submit import (
     UNKNOWN,
     by_name,
+    check_numbers,
     check_texts,
     checked_point,
     is_better,
@@ -67,10 +67,7 @@ class Told:
         """Nothing, when a ledger can hold it. Raises InputError with the name of the option at fault."""
         texts = ("solver", "version", "machine", "by")
         check_texts({name: getattr(self, name) for name in texts})
-        for name in ("bound", "seconds", "limit"):
-            value = getattr(self, name)
-            if value is not None and (not math.isfinite(value) or (name != "bound" and value < 0)):
-                raise InputError(f"--{name} must be a finite number{'' if name == 'bound' else ' from 0'}")
+        check_numbers({name: getattr(self, name) for name in ("bound", "seconds", "limit")})
         if self.threads is not None and self.threads < 0:
             raise InputError("--threads must be a whole number from 0")
         if self.status is not None and self.status not in get_args(RunStatus):

@@ -199,7 +199,7 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
 
 def _check_form(document: dict[str, Any]) -> None:
     for key, value in (("format", FORMAT), ("version", VERSION)):
-        if document.get(key) != value:
+        if document.get(key) != value or isinstance(document[key], bool):
             raise InputError(
                 f"{key}: must be {value!r}; this is no specification of a library, or another version"
             )

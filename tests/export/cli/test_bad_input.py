@@ -439,7 +439,17 @@ def test_a_manifest_beside_another_instance_is_refused(
 
 def test_damaged_manifests_are_refused(tmp_path, refused, good_solution, manifest):
     document = json.loads(manifest.read_text())
-    for change in ({"version": 7}, {"formulation": "qp-fixed"}, {"instance": {}}, {"sha256": "0" * 64}):
+    for key in ("instance", "formulation", "options", "columns", "jumps", "sha256", "files", "refused"):
+        manifest.write_text(json.dumps({name: value for name, value in document.items() if name != key}))
+        line = refused(*read(good_solution, manifest, tmp_path / "field.npz"))
+        assert line.startswith(f"{manifest}: $: '{key}' is a required property")
+    for change in (
+        {"version": 7},
+        {"version": True},
+        {"formulation": "qp-fixed"},
+        {"instance": {}},
+        {"sha256": "0" * 64},
+    ):
         manifest.write_text(json.dumps(document | change))
         assert refused(*read(good_solution, manifest, tmp_path / "field.npz")).startswith(f"{manifest}: ")
     document["instance"]["file"] = "../tiny.instance.json"

@@ -141,6 +141,7 @@ GOOD_SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
 BAD = {
     "no TOML": ("[[[", "not valid TOML"),
     "another kind": ('format = "x"\n', "format: must be 'crossfield-library-spec'"),
+    "version as truth": (HEAD.replace("version = 1", "version = true"), "version: must be 1"),
     "unknown key": (
         HEAD + 'colour = "red"\n' + GOOD_RUNG + GOOD_SKETCH,
         "colour: is unknown; the keys here are format",
