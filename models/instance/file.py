@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -107,9 +108,18 @@ def of_json(text: str) -> Instance:
 def parse_json(text: str) -> object:
     """The document that JSON text holds, with or without byte order mark, or InstanceError with the line."""
     try:
-        return cast("object", json.loads(text.removeprefix("\ufeff")))
+        return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_once))
     except (ValueError, RecursionError) as error:
         raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """An object of a JSON document. Each key must be there once: programs differ on which one counts."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        ((name, _),) = Counter(name for name, _ in pairs).most_common(1)
+        raise ValueError(f"the key {shortened(name)!r} is there twice")
+    return found
 
 
 def read_document(
