@@ -7,7 +7,6 @@ A Choice says otherwise.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
 from ..instance.reading import Reading
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..memory import available_memory
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
 from .bridges import as_points, closing, curve_ends, opened
@@ -196,19 +196,6 @@ def check_memory(pixels: int, available: int | None) -> None:
             f"a grid of {pixels} pixels needs about {needed / 1e9:.1f} GB to be written, "
             f"but {available / 1e9:.1f} GB are free; choose a smaller size"
         )
-
-
-def available_memory() -> int | None:
-    """Bytes of memory that can be had without swapping, or None where the system does not say."""
-    try:
-        text = Path("/proc/meminfo").read_text("ascii")
-        return 1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0])
-    except (OSError, ValueError, IndexError):
-        pass
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return None
 
 
 def check_size(size: int) -> None:
