@@ -196,8 +196,8 @@ def test_jump_reads_nl_files_without_a_legacy_block_and_is_said_to_lose_names(li
     assert [name for name in names if "JuMP reads no names with .nl files" in text_of(site, name)] == nl
 
 
+@pytest.mark.needs("gurobi")
 def test_the_lines_for_gurobi_read_what_gurobi_can_hold(library, site):
-    pytest.importorskip("gurobipy")
     for name in (ENTRY, f"{INSTANCE}_bilin", f"{INSTANCE}_exact"):
         lines = ways_of(site, name)["Gurobi"]
         columns = columns_of(library, library.entry(name))
