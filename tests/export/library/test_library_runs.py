@@ -320,10 +320,13 @@ def test_every_installed_program_solves_what_it_takes(lib):
     assert solve_library(lib, solvers=names, time_limit=60.0) == []
 
 
-def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch):
-    monkeypatch.setitem(SOLVERS, "glpk", replace(SOLVERS["glpk"], package="no_such_package"))
-    with pytest.raises(CrossfieldError, match="glpk is not installed; pip install no_such_package"):
+def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch, hidden):
+    hidden("glpsol")
+    with pytest.raises(CrossfieldError, match=r"^glpk is not installed; apt install glpk-utils$"):
         solve_library(lib, solvers=["glpk"])
+    monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package="no_such_package"))
+    with pytest.raises(CrossfieldError, match=r"^highs is not installed; pip install no_such_package$"):
+        solve_library(lib, solvers=["highs"])
     with pytest.raises(InputError, match="there is no solver 'none'"):
         solve_library(lib, solvers=["none"])
     assert read_library(lib).entry(MILP)["runs"] == []
