@@ -56,7 +56,7 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     except BrokenProcessPool as error:
         raise BuildError(
             "a process ended before its work was done, for want of memory most likely; "
-            "try again with fewer --jobs; of a build, what is whole is kept"
+            "try again with fewer jobs; of a build, what is whole is kept"
         ) from error
 
 
@@ -98,7 +98,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         import distributed
     except ModuleNotFoundError as error:
         raise InputError(
-            "--scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
+            "a scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
         ) from error
     try:
         client: Any = distributed.Client(  # type: ignore[no-untyped-call]
