@@ -163,7 +163,7 @@ def instance_of(
         theta=line_of(lines.direction[stroke]),
         w=np.minimum(weight[stroke], 1.0),
         gauge=gauge,
-        source=" ".join(source.split()),
+        source=choice.source(source),
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
         reading=found,
