@@ -200,7 +200,9 @@ class Instance(Pictured):
                 f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
             )
         if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
-            raise InstanceError("source holds a line break or what is no text; give one line of text")
+            raise InstanceError(
+                "source holds a line break, a control character or no text; give one line of printable text"
+            )
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():

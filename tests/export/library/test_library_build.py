@@ -44,7 +44,9 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.file import read_instance
 from crossfield.models.search.greedy import greedy
+from crossfield.models.sketch.published import redrawn
 from crossfield.models.sketch.samples import sample, sample_svg
+from crossfield.models.sketch.svg import read_svg
 from loops import for_each
 from scipy import ndimage
 
@@ -342,7 +344,9 @@ def test_the_instance_file_is_the_instance_of_the_drawing(built, spec):
     (wanted,) = (each.recipe for each in plan(read_spec(spec)) if each.recipe.name == "cf_own_n004")
     assert instance.sha256 == document["instance"]["sha256"] == instance_from(wanted).sha256
     assert (document["source"]["sketch"], document["source"]["kind"]) == ("drawn by hand.svg", "file")
-    assert (built.folder / "cf_own.sketch.svg").read_text() == sample_svg("mouse")
+    assert (built.folder / "cf_own.sketch.svg").read_bytes() == redrawn(
+        read_svg(sample_svg("mouse").encode())
+    )
     assert document["instance"]["pixels"] == instance.grid.size
     assert document["instance"]["pairs"] == len(instance.grid.first)
 
