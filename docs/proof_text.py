@@ -183,4 +183,6 @@ them, Lemmas 4 and 5 and the quadratic. Wrong shares can only make a bound worse
 error bound of every sum is taken off, so that *optimal* says: no field has less energy by more than $10^{-8}$
 of it, or of 1 if that is more. The checker is
 [one file](../models/proof/check_certificate.py) with NumPy, and repeats this proof with the rounding in it.
+It reads the archive once and refuses every archive that
+[another program could read differently](files.md#archives). crossfield shows only what it has checked.
 """

@@ -1,22 +1,31 @@
-"""Archives of arrays (.npz): equal arrays give equal bytes, and members are unpacked within limits.
+"""Archives of arrays (.npz): equal arrays give equal bytes, and one strict reader unpacks them within limits.
 
-Of an archive only the members that are asked for are read. The header of each comes first: what it promises
-(kind, shape, bytes) is checked before the data is unpacked. No pickles.
+The reader accepts what `pack_arrays`, `numpy.savez` and `numpy.savez_compressed` write, and nothing else, so
+that no other program can find other arrays in the same file:
+
+- The file consists of the members, the central directory and its end record, in this order, with nothing
+  before, between or after them. There are no comments, and no 64-bit end record.
+- Each member is stored or deflated, and is not encrypted. Its header repeats the directory exactly; the
+  64-bit sizes that NumPy adds are the only extra field.
+- Names are ASCII, end in `.npy` and differ in more than case. Each array is one that its caller expects.
+- An array has the format version 1.0, a header of 128 bytes as NumPy writes it, at least one dimension,
+  little-endian numbers in the order of rows (C), and exactly the bytes that its header promises.
+
+Sizes, kinds and shapes are checked before the data is unpacked. There are no pickles.
 """
 
 from __future__ import annotations
 
 import io
 import math
+import re
 import struct
-import tokenize
-import warnings
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,23 +34,23 @@ from .input_limits import MAX_ARCHIVE
 
 Arrays = dict[str, np.ndarray[Any, Any]]
 
-_DAMAGE: Final = (
-    ValueError,
-    TypeError,
-    KeyError,
-    OSError,
-    EOFError,
-    RuntimeError,
-    SyntaxError,
-    MemoryError,
-    OverflowError,
-    Warning,
-    struct.error,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
+_END: Final = struct.Struct("<4s4H2LH")
+_ENTRY: Final = struct.Struct("<4s6H3L5H2L")
+_LOCAL: Final = struct.Struct("<4s5H3L2H")
+_WIDE: Final = struct.Struct("<2H2Q")
+_UNKNOWN: Final = 0xFFFFFFFF  # stands for a size that the extra field of 64-bit sizes holds
+_STORED: Final = 0
+_METHODS: Final = (_STORED, zipfile.ZIP_DEFLATED)
+_HEADER: Final = 128  # bytes of an array's header, whatever the array
+_ARRAY: Final = re.compile(
+    rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '([ -&(-~]{1,20})', 'fortran_order': (False|True), "
+    rb"'shape': \(((?:[0-9]{1,10}(?:,|(?:, [0-9]{1,10})+))?)\), \} *\n"
 )
-_HEADERS: Final = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_NUMBERS: Final = re.compile(r"\|(?:b1|[iu]1)|<(?:[iu][248]|f[248])")
+
+
+class _DamagedError(Exception):
+    """What is wrong with the bytes of an archive."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +62,18 @@ class Expected:
     kinds: str = "biuf"
 
 
+@dataclass(frozen=True)
+class _Member:
+    """A member: how and where its bytes are packed, their number once unpacked, and their checksum."""
+
+    deflated: bool
+    packed: memoryview
+    length: int
+    checksum: int
+
+
 def pack_arrays(arrays: Arrays) -> bytes:
-    """The bytes of a compressed .npz that depend on the arrays alone, not on the clock.
+    """Return the bytes of a compressed .npz, which depend on the arrays alone, not on clock or processor.
 
     numpy.savez_compressed gives steady bytes too, but promises neither them nor, up to numpy 2.1, a way to
     refuse pickles; its members are 20 bytes longer.
@@ -63,69 +82,156 @@ def pack_arrays(arrays: Arrays) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             entry = io.BytesIO()
-            np.lib.format.write_array(entry, np.ascontiguousarray(array), allow_pickle=False)
+            little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+            np.lib.format.write_array(entry, little, allow_pickle=False)
             member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
             member.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(member, entry.getvalue())
     return buffer.getvalue()
 
 
-def unpack_arrays(
-    data: bytes,
-    expected: Mapping[str, Expected],
-    prefix: str = "",
-    optional: Mapping[str, Expected] = MappingProxyType({}),
-) -> Arrays:
-    """The expected arrays of an .npz, whose names there are led by a prefix, and the optional ones it holds.
+class ArrayArchive:
+    """The members of an .npz that is in memory; each is unpacked when it is asked for.
 
-    Other members are not looked at.
-
-    Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled, or
-    larger than it may be, and for a damaged archive.
+    Raises InstanceError for bytes that the module's docstring does not allow, and for members of more than
+    MAX_ARCHIVE bytes in all.
     """
-    try:
-        with warnings.catch_warnings(action="error"), zipfile.ZipFile(io.BytesIO(data)) as archive:
-            held = set(archive.namelist())
-            found = {name: kind for name, kind in optional.items() if f"{prefix}{name}.npy" in held}
-            expected = {**expected, **found}
-            members = {name: _member(archive, name, prefix) for name in expected}
-            if sum(member.file_size for member in members.values()) > MAX_ARCHIVE:
-                raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
-            return {name: _array(archive, members[name], name, expected[name]) for name in expected}
-    except _DAMAGE as error:
-        raise InstanceError(f"is a damaged or unsafe .npz: {shortened(error)}; write it again") from error
 
+    def __init__(self, data: bytes) -> None:
+        try:
+            self._members = dict(_members(memoryview(data)))
+        except (_DamagedError, struct.error) as error:
+            raise _damaged(error) from error
+        if sum(member.length for member in self._members.values()) > MAX_ARCHIVE:
+            raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
+        self._unread = set(self._members)
 
-def _member(archive: zipfile.ZipFile, name: str, prefix: str) -> zipfile.ZipInfo:
-    try:
-        return archive.getinfo(f"{prefix}{name}.npy")
-    except KeyError as error:
-        raise InstanceError(f"holds no array {name!r}; expected a file written by crossfield") from error
+    def arrays(
+        self,
+        expected: Mapping[str, Expected],
+        prefix: str = "",
+        optional: Mapping[str, Expected] = MappingProxyType({}),
+    ) -> Arrays:
+        """Return the expected arrays, and those of the optional ones that the archive holds, by name.
 
+        prefix: what precedes the names in the archive.
+        Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled,
+        damaged, or larger than it may be.
+        """
+        found = {name: kind for name, kind in optional.items() if prefix + name in self._members}
+        return {name: self._array(prefix, name, kind) for name, kind in {**expected, **found}.items()}
 
-def _array(
-    archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, expected: Expected
-) -> np.ndarray[Any, Any]:
-    """The array of one member, whose header may not promise more than the member holds."""
-    with archive.open(member) as stream:
-        shape, fortran, kind = _HEADERS[np.lib.format.read_magic(stream)](stream)
-        if kind.hasobject:
-            raise ValueError(f"array {name!r} is pickled")
-        if kind.kind not in expected.kinds:
+    def finish(self) -> None:
+        """Raise InstanceError if the archive holds an array that was never asked for."""
+        if self._unread:
             raise InstanceError(
-                f"array {name!r} holds {shortened(kind)}, not numbers of the kind that belongs there; "
-                "write it again"
+                f"holds an array {shortened(min(self._unread))!r} that does not belong in it; write it again"
             )
-        if len(shape) != expected.dimensions or max(shape) > expected.most:
-            raise InstanceError(
-                f"array {name!r} has shape {shortened(shape)}; "
-                f"expected {expected.dimensions} dimensions of at most {expected.most} entries"
-            )
-        length = math.prod(shape) * kind.itemsize
-        if length != member.file_size - stream.tell():
-            raise ValueError(f"array {name!r} has another length than its header says")
-        content = stream.read(length)
-        if stream.read(1):  # also has zipfile compare the checksum
-            raise ValueError(f"array {name!r} has more than its header says")
-    found = np.frombuffer(content, dtype=kind).reshape(shape, order="F" if fortran else "C")
-    return cast("np.ndarray[Any, Any]", found)
+
+    def _array(self, prefix: str, name: str, expected: Expected) -> np.ndarray[Any, Any]:
+        member = self._members.get(prefix + name)
+        if member is None:
+            raise InstanceError(f"holds no array {name!r}; expected a file written by crossfield")
+        self._unread.discard(prefix + name)
+        try:
+            return _array(member, name, expected)
+        except (_DamagedError, zlib.error, MemoryError) as error:
+            raise _damaged(error) from error
+
+
+def _damaged(error: Exception) -> InstanceError:
+    return InstanceError(f"is a damaged or unsafe .npz: {shortened(error)}; write it again")
+
+
+def _need(holds: object, otherwise: str) -> None:
+    """Nothing if the condition holds; otherwise the error."""
+    if not holds:
+        raise _DamagedError(otherwise)
+
+
+def _members(data: memoryview) -> Iterator[tuple[str, _Member]]:
+    """The members in their order, by name without ending."""
+    end = len(data) - _END.size
+    _need(end >= 0, "it is cut off")
+    mark, *disks, here, count, size, begin, comment = _END.unpack(data[end:])
+    _need(mark == b"PK\5\6" and not comment and not any(disks) and here == count, "its end is missing")
+    _need(begin + size == end, "its directory does not end where the archive does")
+    at, place, names = begin, 0, set[str]()
+    for _ in range(count):
+        entry = _ENTRY.unpack_from(data, at)
+        name_length, extra, remark = entry[10:13]
+        raw = bytes(data[at + _ENTRY.size : at + _ENTRY.size + name_length])
+        name = raw.decode("ascii", "replace")
+        _need(raw.isascii() and name.isprintable() and name.endswith(".npy"), f"it holds {name!r}, no .npy")
+        _need(name.lower() not in names, f"it holds {name!r} twice")
+        _need(entry[0] == b"PK\1\2" and not extra and not remark, f"the directory entry of {name!r} is wrong")
+        names.add(name.lower())
+        member, place = _member(data, place, entry, name)
+        at += _ENTRY.size + name_length
+        yield name.removesuffix(".npy"), member
+    _need((at, place) == (end, begin), "its members do not fill it")
+
+
+def _member(data: memoryview, place: int, entry: tuple[Any, ...], name: str) -> tuple[_Member, int]:
+    """The member at a place, whose header must repeat its directory entry, and the place after it."""
+    version, flags, method, time, date, checksum, packed, length = entry[2:10]
+    mark, *repeated, name_length, extra = _LOCAL.unpack_from(data, place)
+    begin = place + _LOCAL.size + len(name)
+    after = begin + extra
+    if extra == _WIDE.size and repeated[-2:] in ([packed, length], [_UNKNOWN, _UNKNOWN]):
+        _need(_WIDE.unpack(data[begin:after]) == (1, 16, length, packed), f"the sizes of {name!r} differ")
+        repeated[-2:], extra = [packed, length], 0
+    same = [version, flags, method, time, date, checksum, packed, length] == repeated
+    _need(
+        mark == b"PK\3\4" and same and not extra and entry[-1] == place and entry[13] == 0
+        and name_length == len(name) and data[begin - len(name) : begin] == name.encode(),
+        f"the header of {name!r} differs from its directory entry",
+    )  # fmt: skip
+    _need(not flags and method in _METHODS, f"{name!r} is packed in another way than NumPy packs")
+    _need(method != _STORED or packed == length, f"the sizes of {name!r} differ")
+    content = data[after : after + packed]
+    _need(len(content) == packed, "it is cut off")
+    return _Member(method != _STORED, content, length, checksum), after + packed
+
+
+def _array(member: _Member, name: str, expected: Expected) -> np.ndarray[Any, Any]:
+    """The array of a member, whose header is checked before the rest is unpacked."""
+    unpacker = zlib.decompressobj(-zlib.MAX_WBITS)
+    packed = member.packed
+    head = unpacker.decompress(packed, _HEADER) if member.deflated else bytes(packed[:_HEADER])
+    kind, shape = _described(head, name, expected)
+    length = math.prod(shape) * kind.itemsize
+    _need(length == member.length - _HEADER, f"array {name!r} has another length than its header says")
+    if member.deflated:
+        rest: bytes | memoryview = unpacker.decompress(unpacker.unconsumed_tail, length + 1)
+        _need(unpacker.eof and not unpacker.unused_data, f"array {name!r} has more than its header says")
+    else:
+        rest = packed[_HEADER:]
+    _need(len(rest) == length, f"array {name!r} has another length than its header says")
+    _need(zlib.crc32(rest, zlib.crc32(head)) == member.checksum, f"array {name!r} has another checksum")
+    found = np.frombuffer(rest, dtype=kind).reshape(shape)
+    # NumPy takes the bytes of bits as they are, and counts and inverts others than 0 and 1 wrongly.
+    _need(kind.kind != "b" or not (found.view(np.uint8) > 1).any(), f"array {name!r} has bits beyond 1")
+    return found
+
+
+def _described(head: bytes, name: str, expected: Expected) -> tuple[np.dtype[Any], tuple[int, ...]]:
+    """The kind and the shape that the header of an array promises. Raises InstanceError for other ones."""
+    found = _ARRAY.fullmatch(head)
+    if found is None:
+        raise _DamagedError(f"array {name!r} has no header as NumPy writes it")
+    kind, by_columns, sides = found[1].decode(), found[2] == b"True", found[3].decode()
+    _need("O" not in kind, f"array {name!r} is pickled")
+    if not _NUMBERS.fullmatch(kind) or np.dtype(kind).kind not in expected.kinds:
+        raise InstanceError(
+            f"array {name!r} holds {kind}, not numbers of the kind that belongs there; write it again"
+        )
+    shape = tuple(int(side) for side in sides.split(",") if side)
+    if len(shape) != expected.dimensions or max(shape) > expected.most:
+        raise InstanceError(
+            f"array {name!r} has shape {shortened(shape)}; "
+            f"expected {expected.dimensions} dimensions of at most {expected.most} entries"
+        )
+    if by_columns:
+        raise InstanceError(f"array {name!r} is stored by columns; write it with numpy.ascontiguousarray")
+    return np.dtype(kind), shape

@@ -10,7 +10,7 @@ import shutil
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Final
@@ -20,7 +20,7 @@ from .errors import InputError, OutputError
 PART: Final = ".part"
 """Ending of the names of temporary neighbours, which begin with a dot."""
 _MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
-_LONGEST: Final = 100  # characters of a name that a neighbour's name repeats
+_LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
 
 @contextmanager
@@ -46,7 +46,8 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
             f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
 def neighbour(path: Path) -> Path:
@@ -56,19 +57,23 @@ def neighbour(path: Path) -> Path:
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove temporary files that killed processes of this machine left in a folder, once a process.
+    """Remove temporary files that killed processes left in a folder; each process looks once per folder.
 
-    Those of living processes stay, and all where it cannot be said whether a process lives: on Windows, and
-    of other machines.
+    Removes only what this user's processes on this machine wrote, and keeps what cannot be removed: no write
+    needs that, because names are never used twice. Keeps everything where it is unknown whether a process is
+    alive: on Windows, and for other machines. Raises OSError when the folder cannot be listed.
     """
     for entry in os.scandir(folder):
         mark = _MARK.fullmatch(entry.name)
         if mark is None or mark[1] != _machine() or _lives(int(mark[2])):
             continue
-        if entry.is_dir(follow_symlinks=False):
-            shutil.rmtree(entry.path, ignore_errors=True)
-        else:
-            Path(entry.path).unlink(missing_ok=True)
+        with suppress(OSError):
+            if entry.stat(follow_symlinks=False).st_uid != os.geteuid():
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                Path(entry.path).unlink()
 
 
 def _machine() -> str:

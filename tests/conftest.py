@@ -3,6 +3,7 @@ says which tests were left out, and why.
 """
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,6 +34,30 @@ LEFT_OUT = pytest.StashKey[dict[str, int]]()
 COMPILING = pytest.StashKey[subprocess.Popen]()
 FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
 """Fixtures, and the program that those who use them need."""
+
+
+@pytest.fixture
+def hidden(monkeypatch, tmp_path_factory):
+    """A function that hides programs by name: `hidden("glpsol", "cbc")`.
+
+    The test, and the processes that it starts, then find no program of these names on PATH and every other
+    one. A folder that holds one of them is replaced on PATH by a folder of links to the rest.
+    """
+
+    def hide(*names):
+        folders = []
+        for folder in map(Path, os.get_exec_path()):
+            if any(shutil.which(name, path=str(folder)) for name in names):
+                rest = tmp_path_factory.mktemp("path")
+                for program in folder.iterdir():
+                    if program.name.removesuffix(".exe") not in names:
+                        (rest / program.name).symlink_to(program)
+                folders.append(rest)
+            else:
+                folders.append(folder)
+        monkeypatch.setenv("PATH", os.pathsep.join(map(str, folders)))
+
+    return hide
 
 
 def pytest_sessionstart(session):

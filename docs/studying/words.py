@@ -87,7 +87,8 @@ begin at a field that is improved already, so that their answer is no worse. Hid
 and standard error. The least energy is that of any way here.""",
     "plot": """![Error to hidden curves beside seconds, by size](pictures/study_practice.svg)
 
-Up to the left is slow and bad, down to the left quick and good. Bars: standard error over drawings.""",
+The lower left is fast and accurate, the upper right slow and inaccurate.
+Bars: standard error over drawings.""",
 }
 
 THREATS: Final = """## What may be wrong with this

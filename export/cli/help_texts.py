@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any, Final, get_args
 
+from rich.markup import escape
 from typer.core import TyperCommand
 
 
@@ -66,7 +67,14 @@ def filled(text: str) -> str:
 
 
 class Command(TyperCommand):
-    """A command whose help is filled from the tables when it is shown."""
+    """A command whose help is filled from the tables when it is shown; brackets in it are no markup."""
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        super().__init__(*args, **given)
+        self.help = escape(self.help or "")
+        for parameter in self.params:
+            if text := getattr(parameter, "help", None):
+                parameter.help = escape(text)  # type: ignore[attr-defined]
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help of the command and of its parameters, then show it."""

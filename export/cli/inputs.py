@@ -36,7 +36,8 @@ def load(
     """
     import numpy as np
 
-    from ...models.sketch.read import available_memory, check_memory
+    from ...models.memory import available_memory
+    from ...models.sketch.read import check_memory
 
     instance = _found(what, size, mask, gauge, choice).with_weights(w_strokes, w_beta)
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())

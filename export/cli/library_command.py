@@ -115,7 +115,11 @@ def solve_command(
     if as_json:
         say_json(records)
     elif not quiet:
-        say(f"{folder / 'ledger.json'}: {len(records)} new records")
+        failed = sum(record["status"] == "no point" for record in records)
+        say(
+            f"{folder / 'ledger.json'}: {len(records)} new records"
+            + (f", {failed} of them of runs that found no point" if failed else "")
+        )
 
 
 @command("verify")

@@ -51,7 +51,8 @@ Over = Annotated[
     typer.Option(
         "--over",
         metavar="DRAWING|SAMPLE",
-        help="What the instance was read from (SVG, bitmap, .scap, sample): its strokes are drawn too.",
+        help="Drawing or sample that the instance was read from; its strokes are drawn too. A .curves file is"
+        " seen as the instance records it.",
     ),
 ]
 Size = Annotated[

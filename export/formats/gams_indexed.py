@@ -12,7 +12,7 @@ places in an ordered set, hence the padded labels in their natural order; a neig
 label and no pair. Names are not told apart by case (G4), so the set is S_c and not S. `beta` and `gamma` are
 functions of GAMS, but a declared symbol of that name wins, so that variables keep the names of the paper
 (tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
-the scalar layout (gams.py).
+the scalar layout (gams_scalar.py).
 """
 
 from __future__ import annotations

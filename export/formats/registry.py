@@ -18,7 +18,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, lifted
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical
-from ..writing.sink import save
+from ..writing.sink import is_packed, save
 
 ANY_DEGREE: Final = 99
 
@@ -152,15 +152,19 @@ def generator() -> str:
 
 
 def format_of(path: str | Path) -> Format:
-    """The format that a path's suffix names, `.gz` aside. Raises InputError."""
-    name = Path(path).name.removesuffix(".gz")
-    suffix = Path(name).suffix.removeprefix(".")
-    if suffix not in FORMATS:
+    """The format of a path by its suffix, in upper or lower case and before any `.gz`. Raises InputError."""
+    suffix = Path(_unpacked(Path(path))).suffix.removeprefix(".")
+    if suffix.lower() not in FORMATS:
         raise InputError(
             f"no format has the suffix {suffix!r}; use one of {', '.join(FORMATS)}, with or without .gz",
             file=path,
         )
-    return FORMATS[suffix]
+    return FORMATS[suffix.lower()]
+
+
+def _unpacked(path: Path) -> str:
+    """The name of the file that decompression leaves."""
+    return path.stem if is_packed(path) else path.name
 
 
 def carried(problem: Problem, entry: Format) -> Problem:
@@ -235,7 +239,7 @@ def _companions(
     path: Path, name: str, form: Canonical, lines: list[str]
 ) -> Iterator[tuple[Path, Iterator[bytes]]]:
     """The files beside one: names of an .nl, never compressed, and data of a .mod, compressed as it is."""
-    stem = path.name.removesuffix(".gz").removesuffix(f".{name}")
+    stem = Path(_unpacked(path)).stem
     if name == "nl":
         yield path.with_name(f"{stem}.row"), form.layout.row_file()
         yield path.with_name(f"{stem}.col"), form.layout.column_file()
@@ -243,6 +247,6 @@ def _companions(
         from . import ampl as mod
 
         yield (
-            path.with_name(f"{stem}.dat{'.gz' if path.suffix == '.gz' else ''}"),
+            path.with_name(f"{stem}.dat{path.suffix if is_packed(path) else ''}"),
             mod.data(form.problem, lines),
         )

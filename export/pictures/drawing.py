@@ -20,6 +20,7 @@ from ...models.errors import InputError, naming
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Picture, read_picture
+from ...models.sketch.choice import Choice, view_in
 from ...models.sketch.curves import Curves, bounding_box, lines_as_cubics
 from ...models.sketch.read import DEFAULT_SIZE, bytes_of, curves_in
 from ...models.sketch.samples import SAMPLES, sample_svg
@@ -68,14 +69,14 @@ class Drawing:
 def read_drawing(what: str | Path, *, on: Instance) -> Drawing:
     """The drawing of an instance: that of a file (SVG, bitmap, .scap) or of a built-in sample.
 
-    Raises InputError, with the file, for what `read_sketch` could not read, for a computed sample, and for a
-    drawing that lies elsewhere.
+    A .curves file is seen from where the instance was, as its source records. Raises InputError, with the
+    file, for what `read_sketch` could not read, for a computed sample, and for a drawing that lies elsewhere.
     """
     path = Path(what)
     sampled = not path.is_file() and str(what) in SAMPLES
     data = sample_svg(str(what)).encode() if sampled else bytes_of(path)
     with naming(path):
-        curves = curves_in(data, ".svg" if sampled else path.suffix.lower())
+        curves = curves_in(data, ".svg" if sampled else path.suffix.lower(), Choice(view=view_in(on.source)))
         drawing = _of_ink(read_picture(data, DEFAULT_SIZE)) if curves is None else _of_curves(curves, data)
         drawing.check(on)
     return drawing

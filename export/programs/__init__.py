@@ -1,5 +1,5 @@
-"""One module a program that reads our files.
+"""Programs that read and solve our files: one module for each.
 
-Each says what the program read (reading.py) or answered, in a child process where it may crash (worker.py);
-protocol.py says how. Whether that is right is decided one folder above.
+Each module reports what its program read (reading.py) and solves files (protocol.py). It runs in a child
+process, where it may crash. Whether an answer is right is decided in export/verify and export/solutions.
 """

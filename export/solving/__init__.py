@@ -1,6 +1,5 @@
-"""Solvers that run here.
+"""Solving on this machine.
 
-Their drivers (highs.py, casadi.py and its child process), solve, the two stages, exact patches, the methods,
-and `run`. Searches that need no solver are models/search; programs that only check our files are
-export/verify.
+`solve` for every solver of the table, the two stages, exact patches, the methods, and `run`. Searches that
+need no solver are in models/search; the modules of programs are in export/programs.
 """

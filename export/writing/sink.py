@@ -42,8 +42,13 @@ _TAIL: Final = b"\x03\0"
 """An empty last block."""
 
 
+def is_packed(path: Path) -> bool:
+    """Whether a path names a compressed file: its suffix is `.gz`, in upper or lower case."""
+    return path.suffix.lower() == ".gz"
+
+
 def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
-    """Size and SHA-256 of the file now at `path`, compressed when it ends in .gz. Raises OutputError."""
+    """Writes a file, compressed if `is_packed(path)`; returns its size and SHA-256. Raises OutputError."""
     digest, size = hashlib.sha256(), 0
 
     def hash_all(share: list[bytes]) -> None:
@@ -51,7 +56,7 @@ def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
             digest.update(chunk)
 
     with replacing(path) as stream, _Beside(hash_all, stream.writelines) as beside:
-        for share, length in gathered(gzipped(chunks) if path.suffix == ".gz" else chunks, SHARE):
+        for share, length in gathered(gzipped(chunks) if is_packed(path) else chunks, SHARE):
             beside(share, wait=length < SHARE)
             size += length
     return {"bytes": size, "sha256": digest.hexdigest()}

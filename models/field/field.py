@@ -264,9 +264,10 @@ class CrossField(Pictured):
     def cross_error(self, u: Floats, v: Floats) -> Floats:
         """Angle to the crosses with line angles u and v (n,), in radians.
 
-        For both assignments of lines the mean of the two line differences, the smaller one
-        (docs/mathematics.md, 9).
+        The mean of the two line differences, for the better of the two assignments of lines
+        (docs/mathematics.md, 9). Raises InstanceError for the same u and v as `from_lines`.
         """
+        u, v = _angles(self.instance, u, "u"), _angles(self.instance, v, "v")
         mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
         straight = line_difference(mine, u) + line_difference(other, v)
         crossed = line_difference(mine, v) + line_difference(other, u)

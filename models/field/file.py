@@ -1,8 +1,8 @@
 """Field files: .npz and JSON, with field and instance, and .rawfield beside a mesh (rawfield.py).
 
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
-            version as JSON text, and the arrays of the instance's own .npz, their names led by `instance_`.
-            No pickles.
+            version as JSON text, and the arrays of the instance's own .npz, their names preceded by
+            `instance_`. Nothing else is accepted (models/array_archive.py).
 .json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from ..array_archive import Expected, pack_arrays, unpack_arrays
+from ..array_archive import ArrayArchive, Expected, pack_arrays
 from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.file import (
@@ -26,10 +26,10 @@ from ..instance.file import (
     decoded,
     head_of,
     number_table,
+    of_archive,
     of_document,
     parse_json,
     to_json,
-    unpacked,
 )
 from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
@@ -119,9 +119,11 @@ def _npz(field: CrossField) -> bytes:
 
 
 def _of_npz(data: bytes) -> CrossField:
-    arrays = unpack_arrays(data, _ARCHIVE)
+    archive = ArrayArchive(data)
+    arrays = archive.arrays(_ARCHIVE)
     check_version(head_of(arrays), FORMAT, VERSION)
-    instance = _embedded(lambda given: unpacked(given, _PREFIX), data)
+    instance = _embedded(lambda given: of_archive(given, _PREFIX), archive)
+    archive.finish()
     return _field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 
 

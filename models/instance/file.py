@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
@@ -12,7 +13,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ..array_archive import Expected, pack_arrays, unpack_arrays
+from ..array_archive import ArrayArchive, Expected, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
@@ -56,7 +57,7 @@ def read_instance(path: str | Path) -> Instance:
     """
     data = read_bytes(path, MAX_ARCHIVE)
     with naming(path):
-        return unpacked(data) if data[:2] == b"PK" else of_json(decoded(data))
+        return _of_npz(data) if data[:2] == b"PK" else of_json(decoded(data))
 
 
 def to_json(instance: Instance) -> str:
@@ -107,17 +108,27 @@ def of_json(text: str) -> Instance:
 def parse_json(text: str) -> object:
     """The document that JSON text holds, with or without byte order mark, or InstanceError with the line."""
     try:
-        return cast("object", json.loads(text.removeprefix("\ufeff")))
+        return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_once))
     except (ValueError, RecursionError) as error:
         raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """An object of a JSON document. Each key must be there once: programs differ on which one counts."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        ((name, _),) = Counter(name for name, _ in pairs).most_common(1)
+        raise ValueError(f"the key {shortened(name)!r} is there twice")
+    return found
 
 
 def read_document(
     path: Path, form: str, version: int, schema: str, package: str, *, remedy: str
 ) -> dict[str, Any]:
-    """The JSON document in a file of at most MAX_BYTES, of a format and version, that obeys a schema.
+    """Return the JSON document in a file of at most MAX_BYTES, of a format and version, that obeys a schema.
 
-    Raises InputError when the file cannot be read, InstanceError, with file and place, when it breaks a rule.
+    Raises InputError when the file cannot be read. Raises InstanceError, with file and place, when it breaks
+    a rule, or holds a text or a number that no JSON file in UTF-8 can hold.
     """
     try:
         text = read_bytes(path, MAX_BYTES).decode()
@@ -125,8 +136,22 @@ def read_document(
         raise InstanceError(f"is not JSON; {remedy}", file=path) from error
     with naming(path):
         document = parse_json(text)
+        _check_writable(document)
         check_version(document, form, version)
         return check_schema(document, schema, package)
+
+
+def _check_writable(document: object) -> None:
+    """Nothing if the document can be written as JSON in UTF-8 again; otherwise raises InstanceError.
+
+    Python reads infinite numbers and halves of surrogate pairs, which no other program has to.
+    """
+    try:
+        json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
+    except UnicodeEncodeError as error:
+        raise InstanceError("has a text with half of a surrogate pair; write it again") from error
+    except ValueError as error:
+        raise InstanceError("has a number that is not finite; write it again") from error
 
 
 def of_document(document: object) -> Instance:
@@ -255,7 +280,7 @@ def check_version(document: object, form: str, version: int) -> None:
     if not isinstance(document, dict) or document.get("format") != form:
         raise InstanceError(f'is not a file of this kind: "format" must be "{form}"')
     found = document.get("version")
-    if found != version:
+    if found != version or isinstance(found, bool):
         raise InstanceError(
             f"has version {str(found)[:20]}, but this program reads version {version}; write it again"
         )
@@ -280,9 +305,20 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     return arrays | {key: getattr(instance, key) for key in names}
 
 
-def unpacked(data: bytes, prefix: str = "") -> Instance:
-    """The instance in an .npz whose arrays' names a prefix leads, or InstanceError with the array's name."""
-    return of_arrays(unpack_arrays(data, _ARCHIVE, prefix, optional=_CROSSINGS))
+def _of_npz(data: bytes) -> Instance:
+    """The instance in an .npz that holds nothing else, or InstanceError with the array's name."""
+    archive = ArrayArchive(data)
+    instance = of_archive(archive)
+    archive.finish()
+    return instance
+
+
+def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
+    """Return the instance whose arrays an archive holds, their names preceded by a prefix.
+
+    Raises InstanceError with the array's name.
+    """
+    return of_arrays(archive.arrays(_ARCHIVE, prefix, optional=_CROSSINGS))
 
 
 def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
@@ -303,7 +339,7 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
 def head_of(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
     """The parsed JSON text in the array `head`. Raises InstanceError."""
     try:
-        head = json.loads(arrays["head"].tobytes())
-    except (ValueError, RecursionError) as error:
+        head = parse_json(arrays["head"].tobytes().decode())
+    except (UnicodeDecodeError, InstanceError) as error:
         raise InstanceError("its array 'head' is not JSON text") from error
     return cast("dict[str, Any]", head)

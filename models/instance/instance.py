@@ -53,6 +53,8 @@ def whole_numbers(values: Any, name: str) -> Ints:
     Raises InstanceError for fractions and for numbers beyond int32, which a plain cast would change silently.
     """
     given = np.asarray(values)
+    if given.dtype.kind == "f":
+        given = given.astype(np.float64)  # the limits are beyond the numbers of half precision
     if (
         given.dtype.kind not in "iuf"
         or not ((given >= -(2**31)) & (given < 2**31)).all()
@@ -198,7 +200,9 @@ class Instance(Pictured):
                 f"origin is {self.origin}; it must be two numbers between {-_FARTHEST:g} and {_FARTHEST:g}"
             )
         if not isinstance(self.source, str) or _NOT_TEXT.search(self.source):
-            raise InstanceError("source holds a line break or what is no text; give one line of text")
+            raise InstanceError(
+                "source holds a line break, a control character or no text; give one line of printable text"
+            )
 
     def _check_strokes(self) -> None:
         if self.mask.ndim != 2 or not self.mask.any():

@@ -16,12 +16,13 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
 from .deadline import Deadline
 from .groups import KILLED, ending, kill, start
-from .messages import Call, Raised, Stop, WorkerError, send
+from .messages import Stop, Task, WorkerError, reason, send
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
@@ -66,6 +67,7 @@ class Child:
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._lock = threading.Lock()
+        self._closed = False
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -73,7 +75,7 @@ class Child:
 
     def __exit__(self, *_: object) -> None:
         """End the process."""
-        self.end()
+        self.close()
 
     def call(
         self,
@@ -92,22 +94,26 @@ class Child:
         the reason, when the process dies or a value cannot be sent.
         """
         watch = _Watch(deadline or Deadline(), self._ask_to_stop)
-        name = f"{work.__module__}.{getattr(work, '__qualname__', work)}"
         if watch.deadline.passed():
-            raise KilledError(f"no time was left to start {name}")
+            raise KilledError("no time was left to start the work")
         try:
             process = self._running(watch)
-            message = Call(_pickled(work, arguments, name), name, log)
+            task = Task(_pickled(work, arguments), log)  # now, since deadlines among the arguments run
             assert process.stdin is not None
             with suppress(BrokenPipeError):  # the child died; its exit code tells why
-                send(message, process.stdin)
+                send(task, process.stdin)
             answer = self._next(watch)
+        except _UnsentError:
+            raise
         except BaseException:
             self.end()
             raise
-        if isinstance(answer, Raised):
-            raise answer.again()
-        return Returned(answer, watch.interrupted)
+        return Returned(_result(answer), watch.interrupted)
+
+    def close(self) -> None:
+        """Kill the process, and start none again."""
+        self._closed = True
+        self.end()
 
     def end(self) -> None:
         """Kill the process and all that it started."""
@@ -124,6 +130,8 @@ class Child:
     def _running(self, watch: _Watch) -> subprocess.Popen[bytes]:
         """Return the process, started if needed and ready for a call."""
         with self._lock:
+            if self._closed:
+                raise WorkerError("the work was ended before its time")
             process = self._process
             fresh = process is None
             if process is None:
@@ -161,11 +169,11 @@ class Child:
 
     def _how_it_ended(self) -> str:
         process = self._process
-        code = None if process is None else process.wait()
-        if code is None:
-            return "the child process was ended before its work was done"
-        hint = "; the system may do so when memory is short, try fewer jobs or threads" * (code == KILLED)
-        return f"the child process {ending(code)} before its work was done{hint}"
+        if process is None:
+            return "the work was ended before its time"
+        code = process.wait()
+        remedy = ", probably for lack of memory; try fewer jobs or threads" if code == KILLED else ""
+        return f"a process ended before its work was done: it {ending(code)}{remedy}"
 
     def _ask_to_stop(self) -> None:
         process = self._process
@@ -174,11 +182,26 @@ class Child:
                 send(Stop(), process.stdin)
 
 
-def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...], name: str) -> bytes:
+class _UnsentError(WorkerError):
+    """A task that pickle does not take; the child is as it was."""
+
+
+def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     try:
-        return pickle.dumps((work, arguments))
+        return pickle.dumps(partial(work, *arguments))
     except Exception as error:
-        raise WorkerError(f"the arguments of {name} cannot be sent: {error}") from error
+        raise _UnsentError(f"a task cannot be sent to a process: {reason(error)}") from error
+
+
+def _result(answer: bytes) -> Any:
+    """Return the result in an answer. Raises the error in it."""
+    try:
+        done, found = pickle.loads(answer)  # noqa: S301 - from a process of our own
+    except Exception as error:
+        raise WorkerError(f"the result of a task cannot be read: {reason(error)}") from error
+    if not done:
+        raise found
+    return found
 
 
 class _Ended(NamedTuple):

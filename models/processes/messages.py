@@ -1,4 +1,4 @@
-"""Messages between a process and its children, and the errors that name how a child failed."""
+"""Messages between a process and its children, and the error that names how a child failed."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from ..errors import CrossfieldError
 
 
 class WorkerError(CrossfieldError):
-    """A child process that died, or work that could not be sent to it or back."""
+    """A child process ended early, or a task, result or error cannot be sent to or from it."""
 
 
-class Call(NamedTuple):
-    """A function and its arguments, pickled; the function's name; the file for what it prints, or None."""
+class Task(NamedTuple):
+    """A pickled function with its arguments, and the file for what it prints, or None."""
 
     work: bytes
-    name: str
     log: Path | None
 
 
@@ -25,21 +24,12 @@ class Stop(NamedTuple):
     """A request to end the work at hand with what it has."""
 
 
-class Raised:
-    """An exception that the work raised."""
-
-    def __init__(self, error: Exception, trace: str = "") -> None:
-        """Keep the error and the text of its traceback."""
-        self.error, self.trace = error, trace
-
-    def again(self) -> Exception:
-        """Return the error, with the child's traceback as a note."""
-        if self.trace:
-            self.error.add_note(self.trace)
-        return self.error
-
-
 def send(value: Any, stream: IO[bytes]) -> None:
-    """Pickle a value into a pipe."""
+    """Write a value to a pipe at once."""
     stream.write(pickle.dumps(value))
     stream.flush()
+
+
+def reason(error: Exception) -> str:
+    """Name and message of an error of any kind."""
+    return f"{type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""The program of a child process: it calls functions for its parent until its standard input closes."""
+"""The program of a child process: it does tasks for its parent until its standard input closes."""
 
 from __future__ import annotations
 
@@ -9,31 +9,30 @@ import queue
 import sys
 import threading
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
 
 from . import control
-from .messages import Call, Raised, Stop, WorkerError, send
+from .messages import Stop, Task, WorkerError, reason, send
 
 
 def main() -> None:
-    """Answer each call that arrives on standard input by one message on standard output."""
-    calls: queue.SimpleQueue[Call] = queue.SimpleQueue()
+    """Answer each task that arrives on standard input by one message on standard output."""
+    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what a library prints is no answer
-        threading.Thread(target=_receive, args=(calls,), daemon=True).start()
-        send(None, answers)  # all imports are done: time limits count from here
+        threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
+        send(b"", answers)  # all imports are done: time limits count from here
         while True:
-            call = calls.get()
-            with _output_to(call.log):
-                answer = _answer(call)
-            _hand_over(answer, answers)
+            task = tasks.get()
+            with _output_to(task.log):
+                answer = _answer(task.work)
+            send(answer, answers)
 
 
-def _receive(calls: queue.SimpleQueue[Call]) -> None:
-    """Queue calls and pass on requests to stop; end this process when the parent is gone."""
+def _receive(tasks: queue.SimpleQueue[Task]) -> None:
+    """Queue tasks and pass on requests to stop; end this process when the parent is gone."""
     try:
         # Not sys.stdin: Python aborts at exit while a thread waits there.
         with os.fdopen(os.dup(0), "rb") as stream:
@@ -43,41 +42,48 @@ def _receive(calls: queue.SimpleQueue[Call]) -> None:
                     control.ask_to_stop()
                 else:
                     control.begin()
-                    calls.put(message)
+                    tasks.put(message)
     finally:
         os._exit(1)
 
 
-def _answer(call: Call) -> Any:
+def _answer(task: bytes) -> bytes:
+    """Pickle of whether the task succeeded, and of its result or error."""
     try:
-        work, arguments = pickle.loads(call.work)  # noqa: S301 - from the process that started this one
-    except Exception as error:  # noqa: BLE001 - a module may raise anything while it is imported
-        return Raised(WorkerError(f"the child process cannot load {call.name}: {_words(error)}"))
+        work: Callable[[], object] = pickle.loads(task)  # noqa: S301 - from the process that started this one
+    except Exception as error:  # noqa: BLE001 - imports raise anything
+        message = f"a process cannot import the function of its task or read its data: {reason(error)}"
+        return pickle.dumps((False, _noted(WorkerError(message))))
     try:
-        return work(*arguments)
-    except Exception as error:  # noqa: BLE001 - the parent raises it
-        return Raised(error, traceback.format_exc())
-
-
-def _hand_over(answer: Any, answers: IO[bytes]) -> None:
-    """Send an answer; one that pickle does not take is replaced by an error that says so."""
+        found = work()
+    except Exception as error:  # noqa: BLE001 - it is raised where the task came from
+        return _failure(error)
     try:
-        data = pickle.dumps(answer)
-        if isinstance(answer, Raised):
-            pickle.loads(data)  # noqa: S301 - exceptions with a constructor of their own may not come back
-    except Exception as error:  # noqa: BLE001 - __reduce__ may raise anything
-        if isinstance(answer, Raised):
-            answer = Raised(WorkerError(_words(answer.error)), answer.trace)
-        else:
-            kind = type(answer).__name__
-            answer = Raised(WorkerError(f"the result, a {kind}, cannot be sent back: {_words(error)}"))
-        data = pickle.dumps(answer)
-    answers.write(data)
-    answers.flush()
+        return pickle.dumps((True, found))
+    except Exception as error:  # noqa: BLE001 - pickling calls methods of any class
+        message = f"the result of a task cannot be sent back: {reason(error)}"
+        return pickle.dumps((False, _noted(WorkerError(message))))
 
 
-def _words(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
+def _failure(error: Exception) -> bytes:
+    """Pickle of an error of the work, or of a WorkerError with its name and message where it cannot travel.
+
+    Pickles call the class of an error with its `args`, which do not fit every constructor.
+    """
+    try:
+        sent = pickle.dumps((False, _noted(error)))
+        _, arrived = pickle.loads(sent)  # noqa: S301 - made in the line above
+        if type(arrived) is type(error) and str(arrived) == str(error):
+            return sent
+    except Exception:  # noqa: BLE001, S110 - what pickling such an error raises says nothing about the work
+        pass
+    return pickle.dumps((False, _noted(WorkerError(reason(error)))))
+
+
+def _noted(error: Exception) -> Exception:
+    """The error with the traceback of the one that is being handled as a note."""
+    error.add_note(traceback.format_exc())
+    return error
 
 
 @contextmanager

@@ -31,11 +31,10 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ..array_archive import Arrays, Expected, pack_arrays, unpack_arrays
-from ..errors import InputError, InstanceError, SolverError
+from ..array_archive import Arrays, pack_arrays
+from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField
-from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
-from ..instance.file import arrays_of, check_version, head_of, unpacked
+from ..instance.file import arrays_of, of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..storage import read_bytes, write_bytes
@@ -45,12 +44,6 @@ from .lattice import starts
 from .record import LevelRecord, Proof, Status, relative_gap
 
 _PREFIX: Final = "instance_"
-_FIELD: Final = {
-    "head": Expected(1, MAX_HEAD, "u"),
-    "alpha": Expected(1, MAX_GRID**2),
-    "beta": Expected(1, MAX_GRID**2),
-    "p": Expected(1, 2 * MAX_GRID**2),
-}
 _MOST_16: Final = 2**15 - 1
 _MOST_32: Final = 2**31 - 1
 _SPARE: Final = 1e-10
@@ -104,41 +97,46 @@ def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Cer
 
 
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
-    """The certificate in a file, checked.
+    """Return the certificate in a file, checked.
+
+    The checker reads the file, once. Field, instance, energy, bound and status are those of the arrays that
+    it has checked.
 
     on: the instance that it must be on, when one is given.
     Raises InputError for an unreadable file, another instance and a claim that does not hold, InstanceError
-    for a damaged field or instance.
+    for a field or an instance that breaks its rules.
     """
     path = Path(path)
-    data = read_bytes(path, MAX_ARCHIVE)
     try:
-        arrays = unpack_arrays(data, _FIELD)
-        head = head_of(arrays)
-        check_version(head, check_certificate.FORMAT, check_certificate.VERSION)
-        field = CrossField(unpacked(data, _PREFIX), arrays["alpha"], arrays["beta"], arrays["p"])
-    except InstanceError as error:
-        raise InstanceError(str(error), file=path) from error
-    if on is not None and field.instance.sha256 != on.sha256:
-        raise InputError(
-            f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
-            file=path,
-        )
-    verdict = check(path)
-    return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
-
-
-def check(path: Path) -> Verdict:
-    """What the checker finds of the certificate in a file.
-
-    Raises InputError, which says where, for a claim that does not hold and for what is no certificate.
-    """
-    try:
-        return check_certificate.checked(str(path))
+        arrays = check_certificate.unpacked(read_bytes(path, check_certificate.MOST_BYTES))
+        head = check_certificate.head_of(arrays)
+        with naming(path):
+            field = _field(arrays)
+        if on is not None and field.instance.sha256 != on.sha256:
+            raise InputError(
+                f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
+                file=path,
+            )
+        verdict = check_certificate.check(arrays)
     except check_certificate.RefusedError as error:
         raise InputError(f"is refused as a certificate: {error}", file=path) from error
     except check_certificate.UnreadableError as error:
         raise InputError(f"is no certificate: {error}", file=path) from error
+    return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
+
+
+def _field(arrays: Arrays) -> CrossField:
+    """The field of a certificate, whose arrays stand for it and its instance as they are.
+
+    An instance rounds what it is given. A certificate of other numbers proves nothing of the rounded ones.
+    """
+    parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
+    field = CrossField(of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
+    written = arrays_of(field.instance)
+    for name, array in parts.items():
+        if not np.array_equal(array, written[name]):
+            raise InstanceError(f"array {_PREFIX + name!r} is not as crossfield writes it; prove it again")
+    return field
 
 
 def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:

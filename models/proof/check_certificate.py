@@ -81,11 +81,12 @@ the greater of 1 and U. "Gap" says: no field has an energy below the bound.
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import math
+import re
+import struct
 import sys
-import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -103,9 +104,19 @@ MOST_LEVELS = 64
 MOST_SIDE = 9999
 MOST_PIECES = 200  # of the boxes
 MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
+MOST_LABELS = 1 << 28  # of a level
 MOST_ANGLE = 16.0
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
+
+INSTANCE_PARTS = ("head", "origin", "mask", "stroke_pixels", "theta", "w")
+PARTS = ("head", "alpha", "beta", "p", *(f"instance_{part}" for part in INSTANCE_PARTS))
+LEVEL_PARTS = ("h", "alpha", "beta", "ranges", "allowed", "scale", "wide", "steps_16", "steps_32")
+NAME = re.compile(rb"[a-z0-9_]+\.npy")
+HEAD = re.compile(
+    rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '(\|[bu]1|<i[24]|<f8)', 'fortran_order': False, "
+    rb"'shape': \(((?:[0-9]{1,10},)|(?:[0-9]{1,10}, [0-9]{1,10}))\), \} *\n"
+)  # of an array, as NumPy writes it: 128 bytes
 
 Array = Any
 Field = tuple[Array, Array, Array]
@@ -198,61 +209,147 @@ class Verdict:
 # Reading ---------------------------------------------------------------------------------------------------
 
 
+# The archive is parsed here, and strictly, because programs read different arrays from unusual archives.
+
+
 def read(path: str) -> dict[str, Array]:
-    """The arrays of an .npz. Sizes are looked at before anything is unpacked; no pickles."""
+    """The arrays of the certificate in a file."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            return _members(archive)
-    except UnreadableError:
+        with open(path, "rb") as stream:  # noqa: PTH123 - a path as it was typed is enough here
+            data = stream.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise UnreadableError(f"cannot be read ({type(error).__name__})") from error
+    return unpacked(data)
+
+
+def unpacked(data: bytes) -> dict[str, Array]:
+    """The arrays of an .npz, which holds those of a certificate and nothing else.
+
+    It consists of the members, stored or deflated, the directory and its end record, with no byte before,
+    between or after them, and no comment. The header of each member repeats its directory entry. Each name is
+    there once. Sizes are checked before anything is unpacked; no pickles.
+    """
+    try:
+        arrays = _members(data)
+        _need_names(arrays)
+    except (UnreadableError, RefusedError):
         raise
     except Exception as error:  # a damaged archive can raise anything
         raise UnreadableError(f"is no .npz that can be read ({type(error).__name__})") from error
+    return arrays
 
 
-def _members(archive: zipfile.ZipFile) -> dict[str, Array]:
-    members = archive.infolist()
-    if sum(member.file_size for member in members) > MOST_BYTES:
-        raise UnreadableError("holds more than 2 GiB")
-    return {member.filename[: -len(".npy")]: _array(archive, member) for member in members}
+def _require(holds: Any, otherwise: str) -> None:
+    """Nothing where it holds; else raises UnreadableError."""
+    if not holds:
+        raise UnreadableError(otherwise)
 
 
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
-    with archive.open(member) as stream:
-        head = stream.read(128)
-        start = io.BytesIO(head)
-        if np.lib.format.read_magic(start) != (1, 0):
-            raise UnreadableError(f"{member.filename} has another version")
-        shape, _, kind = np.lib.format.read_array_header_1_0(start)
-        if kind.hasobject or math.prod(shape) * kind.itemsize > member.file_size or kind.kind not in "biuf":
-            raise UnreadableError(f"{member.filename} is not what its header says")
-        return np.load(io.BytesIO(head + stream.read()), allow_pickle=False)
+def _members(data: bytes) -> dict[str, Array]:
+    """All arrays of an archive, by name."""
+    _require(len(data) <= MOST_BYTES, "holds more than 2 GiB")
+    end = len(data) - 22
+    _require(end >= 0, "is no .npz, or cut off")
+    mark, disk, first, here, count, size, start, comment = struct.unpack("<4s4H2LH", data[end:])
+    whole = (mark, disk, first, here, comment, start + size) == (b"PK\5\6", 0, 0, count, 0, end)
+    _require(whole, "is no .npz, or has more or less than its members")
+    arrays: dict[str, Array] = {}
+    at, place, total = start, 0, 0
+    for _ in range(count):
+        mark, _, *facts = struct.unpack_from("<4s6H3L5H2L", data, at)
+        name = data[at + 46 : at + 46 + facts[8]]
+        _require(mark == b"PK\1\2" and NAME.fullmatch(name), f"has a member {name[:40]!r}")
+        key = name[: -len(b".npy")].decode()
+        _require(key not in arrays, f"has {key} twice")
+        total += facts[7]
+        _require(total <= MOST_BYTES, "holds more than 2 GiB")
+        begin = _content(data, place, key, facts)
+        place = begin + facts[6]
+        arrays[key] = _array(key, data[begin:place], facts)
+        at += 46 + len(name)
+    _require((at, place) == (end, start), "has more or less than its members")
+    return arrays
+
+
+def _content(data: bytes, place: int, key: str, facts: list[int]) -> int:
+    """Where the content of a member begins, whose header at a place must repeat the directory entry."""
+    _, flags, method, _, _, _, packed, length, _, extra, comment, disk, _, _, offset = facts
+    local = [*struct.unpack_from("<4s5H3L2H", data, place)]
+    name = key.encode() + b".npy"
+    begin: int = place + 30 + len(name) + local[10]
+    if local[10] == 20:  # NumPy has the sizes once more in 64 bits
+        wide = struct.pack("<2H2Q", 1, 16, length, packed)
+        _require(data[begin - 20 : begin] == wide, f"{key} has two sizes")
+        local[7:9] = [packed, length] if local[7:9] == [0xFFFFFFFF] * 2 else local[7:9]
+        local[10] = 0
+    same = local == [b"PK\3\4", *facts[:8], len(name), 0] and data.startswith(name, place + 30)
+    _require(same and offset == place, f"{key} has a header that differs from its directory entry")
+    plain = not (flags or extra or comment or disk) and (method == 8 or (method == 0 and packed == length))
+    _require(plain and begin + packed <= len(data), f"{key} is packed in another way, or cut off")
+    return begin
+
+
+def _array(name: str, packed: bytes, facts: list[int]) -> Array:
+    """The array that the content of a member holds: of the kinds and the form that certificates have."""
+    deflated, checksum, length = facts[2] == 8, facts[5], facts[7]
+    unpacker = zlib.decompressobj(-15)
+    head = unpacker.decompress(packed, 128) if deflated else packed[:128]
+    said = HEAD.fullmatch(head)
+    if said is None:
+        raise UnreadableError(f"{name} is no array as certificates have it")
+    kind, shape = np.dtype(said[1].decode()), tuple(int(side) for side in said[2].split(b",") if side)
+    size = math.prod(shape) * kind.itemsize
+    _require(128 + size == length, f"{name} is not what its header says")
+    rest = unpacker.decompress(unpacker.unconsumed_tail, size + 1) if deflated else packed[128:]
+    ended = not deflated or (unpacker.eof and not unpacker.unused_data)
+    whole = ended and len(rest) == size and zlib.crc32(rest, zlib.crc32(head)) == checksum
+    _require(whole, f"{name} is damaged")
+    _require(kind.kind != "b" or not rest.strip(b"\0\1"), f"{name} has bits that are neither 0 nor 1")
+    return np.frombuffer(rest, kind).reshape(shape)
+
+
+def _need_names(arrays: dict[str, Array]) -> None:
+    """Nothing where the arrays are those of a certificate with so many levels; else raises an error."""
+    levels = _levels(head_of(arrays))
+    names = set(PARTS) | {f"level_{number}_{part}" for number in range(levels) for part in LEVEL_PARTS}
+    for name in sorted(names - set(arrays)):
+        raise UnreadableError(f"has no array {name}")
+    for name in sorted(set(arrays) - names - {"parents"}):
+        raise UnreadableError(f"has an array {name[:40]} too many for a certificate with {levels} levels")
 
 
 def head_of(arrays: dict[str, Array]) -> dict[str, Any]:
     """The text in the array `head`."""
     head = _text(arrays, "head")
-    if head.get("format") != FORMAT or head.get("version") != VERSION:
+    if head.get("format") != FORMAT or head.get("version") != VERSION or head["version"] is True:
         raise UnreadableError(f"is no {FORMAT} of version {VERSION}")
     return head
 
 
 def _text(arrays: dict[str, Array], name: str) -> dict[str, Any]:
-    found = json.loads(_given(arrays, name, "u", None).tobytes())
+    text = _given(arrays, name, "|u1", None).tobytes().decode()
+    found = json.loads(text, object_pairs_hook=_object)
     if not isinstance(found, dict):
         raise UnreadableError(f"{name} is not a JSON object")
     return found
 
 
-def _given(arrays: dict[str, Array], name: str, kinds: str, *shape: int | None) -> Array:
-    """An array of one of those kinds and, where numbers are given, of that shape; finite."""
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object, each of whose keys is there once: programs differ on which one counts."""
+    found = dict(pairs)
+    _require(len(found) == len(pairs), "has a text with a key that is there twice")
+    return found
+
+
+def _given(arrays: dict[str, Array], name: str, kind: str, *shape: int | None) -> Array:
+    """An array of that kind and, where numbers are given, of that shape; finite."""
     if name not in arrays:
         raise UnreadableError(f"has no array {name}")
     array = arrays[name]
     fits = len(array.shape) == len(shape) and all(
         size is None or size == found for size, found in zip(shape, array.shape)
     )
-    doubles = array.dtype.kind != "f" or array.dtype.itemsize == 8
-    if array.dtype.kind not in kinds or not fits or not doubles:
+    if array.dtype != np.dtype(kind) or not fits:
         raise UnreadableError(f"{name} has another kind or shape than the mask asks for")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise RefusedError(f"{name} holds something that is no number")
@@ -273,6 +370,13 @@ def _number(head: dict[str, Any], name: str, least: float, most: float) -> float
     return float(value)
 
 
+def _levels(head: dict[str, Any]) -> int:
+    """The number of levels that a certificate has."""
+    count = _number(head, "levels", 1, MOST_LEVELS)
+    _need(count == int(count), "levels", "is no whole number")
+    return int(count)
+
+
 # The instance and the field --------------------------------------------------------------------------------
 
 
@@ -280,7 +384,7 @@ def sketch_of(arrays: dict[str, Array]) -> Sketch:
     """The instance that the certificate holds. Stroke directions are moved into the gauge's own range."""
     head = _text(arrays, "instance_head")
     _need("instance_crossings" not in arrays, "instance_crossings", "says what no certificate is about")
-    mask = _given(arrays, "instance_mask", "b", None, None)
+    mask = _given(arrays, "instance_mask", "|b1", None, None)
     rows, columns = np.nonzero(mask)
     n = len(rows)
     _need(n > 0, "instance_mask", "has no pixel")
@@ -304,9 +408,9 @@ def _strokes(
     arrays: dict[str, Array], head: dict[str, Any], number: Array, n: int
 ) -> tuple[Array, Array, Array]:
     """W and theta of each pixel, 0 without a stroke, and the least alpha of each; shapes (n,)."""
-    theta = _given(arrays, "instance_theta", "f", None)
-    w = _given(arrays, "instance_w", "f", len(theta))
-    places = _given(arrays, "instance_stroke_pixels", "iu", len(theta), 2).astype(np.int64)
+    theta = _given(arrays, "instance_theta", "<f8", None)
+    w = _given(arrays, "instance_w", "<f8", len(theta))
+    places = _given(arrays, "instance_stroke_pixels", "<i4", len(theta), 2).astype(np.int64)
     gauge = head.get("gauge")
     _need(gauge in ("strokes", "box"), "gauge", "is unknown")
     _need((theta >= 0) & (theta < np.pi), "instance_theta", "is not in [0, pi)")
@@ -328,8 +432,8 @@ def _strokes(
 def field_of(arrays: dict[str, Array], sketch: Sketch) -> Field:
     """The angles alpha, beta (n,) and jumps p (m,) of the field, which must lie in the windows."""
     n, m = len(sketch.black), len(sketch.first)
-    alpha, beta = (_given(arrays, name, "f", n).astype(np.float64) for name in ("alpha", "beta"))
-    p = _given(arrays, "p", "iu", m).astype(np.int64)
+    alpha, beta = (_given(arrays, name, "<f8", n).astype(np.float64) for name in ("alpha", "beta"))
+    p = _given(arrays, "p", "<i4", m).astype(np.int64)
     inside = (alpha >= sketch.lower - SLIVER) & (alpha <= sketch.lower + HALF + SLIVER)
     _need(inside, "alpha", "is outside the window of the gauge")
     _need(np.abs(beta) <= QUARTER + SLIVER, "beta", "is beyond pi/4")
@@ -371,18 +475,19 @@ def level_of(arrays: dict[str, Array], number: int, sketch: Sketch) -> Level:
     """Level `number` of the certificate."""
     n = len(sketch.black)
     at = f"level_{number}_"
-    h = float(_given(arrays, f"{at}h", "f", 1)[0])
+    h = float(_given(arrays, f"{at}h", "<f8", 1)[0])
     _need(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
-    alpha, beta = (_given(arrays, at + name, "f", n).astype(np.float64) for name in ("alpha", "beta"))
+    alpha, beta = (_given(arrays, at + name, "<f8", n).astype(np.float64) for name in ("alpha", "beta"))
     _need(np.abs(alpha) <= MOST_ANGLE, f"{at}alpha", "is too large")
     _need(np.abs(beta) <= MOST_ANGLE, f"{at}beta", "is too large")
-    ranges = _given(arrays, f"{at}ranges", "iu", n, 4).astype(np.int64)
+    ranges = _given(arrays, f"{at}ranges", "<i4", n, 4).astype(np.int64)
     shapes = ranges[:, 1::2]
     _need(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
     reach = h * (np.abs(ranges[:, ::2]) + shapes)
     _need((reach <= MOST_ANGLE).all(axis=1), f"{at}ranges", "leads too far away")
     counts = shapes.prod(axis=1)
-    packed = _given(arrays, f"{at}allowed", "u", (int(counts.sum()) + 7) // 8)
+    _need(counts.sum() <= MOST_LABELS, f"{at}ranges", "has too many labels in all")
+    packed = _given(arrays, f"{at}allowed", "|u1", (int(counts.sum()) + 7) // 8)
     allowed = _cut(np.unpackbits(packed, count=int(counts.sum())).astype(bool), shapes)
     _need([corners(each, np.logical_and).any() for each in allowed], f"{at}allowed of pixel", "has no cell")
     return Level(h, alpha, beta, ranges, allowed, _messages(arrays, at, sketch, shapes))
@@ -392,12 +497,12 @@ def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
     """The message of each pair to its earlier pixel: whole numbers, given by their steps, times its scale."""
     receivers = shapes[np.minimum(sketch.first, sketch.second)]
     counts = receivers.prod(axis=1)
-    scale = _given(arrays, f"{at}scale", "f", len(counts))
-    wide = _given(arrays, f"{at}wide", "b", len(counts))
+    scale = _given(arrays, f"{at}scale", "<f8", len(counts))
+    wide = _given(arrays, f"{at}wide", "|b1", len(counts))
     steps = np.zeros(int(counts.sum()), np.int64)
     each = np.repeat(wide, counts)
-    for chosen, name in ((~each, f"{at}steps_16"), (each, f"{at}steps_32")):
-        steps[chosen] = _given(arrays, name, "i", int(chosen.sum()))
+    for chosen, name, kind in ((~each, f"{at}steps_16", "<i2"), (each, f"{at}steps_32", "<i4")):
+        steps[chosen] = _given(arrays, name, kind, int(chosen.sum()))
     _need((scale >= 0) & (scale <= 1), f"{at}scale", "is not in [0, 1]")
     total = np.cumsum(steps)
     before = np.repeat((total - steps)[np.cumsum(counts) - counts], counts)
@@ -847,7 +952,7 @@ def _check(arrays: dict[str, Array], over: Over) -> Verdict:
     sketch = sketch_of(arrays)
     field = field_of(arrays, sketch)
     energy, error = energy_of(sketch, *field)
-    count = int(_number(head, "levels", 1, MOST_LEVELS))
+    count = _levels(head)
     slack = slack_of(sketch, count)
     tree, boxes, level = _descend(arrays, sketch, count, energy + error + slack, over)
     bound = max(0.0, min(energy - error, tree.bound() - slack))
@@ -867,7 +972,7 @@ class Tree:
     def __init__(self, arrays: dict[str, Array], count: int) -> None:
         """Each level follows from the one before where no array `parents` says otherwise."""
         chain = np.arange(-1, count - 1)
-        self.parents = _given(arrays, "parents", "i", count) if "parents" in arrays else chain
+        self.parents = _given(arrays, "parents", "<i4", count) if "parents" in arrays else chain
         _need((self.parents >= -1) & (self.parents <= chain), "parents", "is not of a level before")
         _need((self.parents >= 0) == (chain >= 0), "parents", "is missing")
         self.bounds: list[float] = []

@@ -10,13 +10,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, Literal, get_args
 
-from ..errors import InputError, shortened
+from ..errors import InputError, printable, shortened
 
 Silhouette = Literal["none", "outer"]
 KINDS: Final = ("colour", "class", "id", "layer", "cluster")
 """What strokes can be chosen by."""
 _FEW: Final = 4  # labels of each kind that an error lists
 _LONGEST: Final = 40  # characters of each of them there
+_SEEN_FROM: Final = ", seen from "
 _EXAMPLES: Final = "colour=red, class=flow, id=group2, layer=Flow or cluster=3"
 
 
@@ -48,6 +49,14 @@ class Choice:
         """A fresh look-out for the chosen labels, None when the drawing's colours decide."""
         return Chooser(frozenset(self.curvature)) if self.curvature else None
 
+    def source(self, file: str) -> str:
+        """Source of an instance read from a file of that name: one printable line, with the view if any.
+
+        `view_in` reads the view back, so that the file can be seen from the same side again.
+        """
+        seen = "" if self.view is None else f"{_SEEN_FROM}{self.view}"
+        return printable(f"{file}{seen}")
+
     def refuse_labels(self, what: str) -> None:
         """Nothing, or InputError when strokes are chosen in something that has no labels."""
         if self.curvature:
@@ -63,7 +72,15 @@ class Choice:
     def refuse_view(self) -> None:
         """Nothing, or InputError when a view is chosen of something flat."""
         if self.view is not None:
-            raise InputError("is flat: only a .curves file can be seen from elsewhere; leave the view out")
+            raise InputError(
+                f"is flat: only a .curves file can be seen from {shortened(self.view)}; give one, or leave "
+                "the view out"
+            )
+
+
+def view_in(source: str) -> str | None:
+    """View that the source of an instance records, None without one."""
+    return source.rpartition(_SEEN_FROM)[2] if _SEEN_FROM in source else None
 
 
 AS_DRAWN: Final = Choice()

@@ -7,13 +7,12 @@ A Choice says otherwise.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Gauge, Instance
 from ..instance.reading import Reading
 from ..instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
+from ..memory import available_memory
 from ..storage import read_bytes
 from .bitmap import read_picture, read_white
 from .bridges import as_points, closing, curve_ends, opened
@@ -46,7 +46,18 @@ CUT: Final = 0.5 - 1e-9
 A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at
 most: so one half is the greatest threshold that never leaves a gap between 4-neighbours.
 """
-_PICTURE: Final = re.compile(rb"\x89PNG|\xff\xd8\xff|RIFF|II\*\0|MM\0\*|BM|GIF8|P[1-6]\s", re.DOTALL)
+_PICTURES: Final = {
+    ".png": rb"\x89PNG",
+    ".jpg": rb"\xff\xd8\xff",
+    ".webp": rb"RIFF",
+    ".tif": rb"II\*\0|MM\0\*",
+    ".bmp": rb"BM",
+    ".gif": rb"GIF8",
+    ".pnm": rb"P[1-6]\s",
+}
+"""How pictures begin, by the suffix of their files."""
+_PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
+Kind = Literal["svg", "scap", "curves", "picture"]
 _FLATNESS: Final = 0.02  # of a pixel
 
 
@@ -163,7 +174,7 @@ def instance_of(
         theta=line_of(lines.direction[stroke]),
         w=np.minimum(weight[stroke], 1.0),
         gauge=gauge,
-        source=" ".join(source.split()),
+        source=choice.source(source),
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
         reading=found,
@@ -198,19 +209,6 @@ def check_memory(pixels: int, available: int | None) -> None:
         )
 
 
-def available_memory() -> int | None:
-    """Bytes of memory that can be had without swapping, or None where the system does not say."""
-    try:
-        text = Path("/proc/meminfo").read_text("ascii")
-        return 1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0])
-    except (OSError, ValueError, IndexError):
-        pass
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return None
-
-
 def check_size(size: int) -> None:
     """Nothing, or InputError when a grid cannot have so many pixels on its longer side."""
     if not 1 <= size <= MAX_SIZE:
@@ -243,23 +241,39 @@ def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | N
 
     suffix: of the file, for content that does not tell. choice: of curvature lines and of the view.
     """
+    kind = kind_of(data, suffix)
+    if kind == "curves":
+        choice.refuse_labels("is a .curves file, whose strokes have no labels")
+        return read_curves(data, choice.view)
+    choice.refuse_view()
+    if kind != "picture":
+        return (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
+    choice.refuse_crossings()
+    choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
+    return None
+
+
+def kind_of(data: bytes, suffix: str) -> Kind:
+    """Kind of a sketch, by its content first and the suffix of its file second.
+
+    Raises InputError for a compressed file.
+    """
     start = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
     if data[:2] == b"\x1f\x8b":
         raise InputError("is compressed; unpack it first (gunzip) and give the SVG itself")
     drawn = _PICTURE.match(data) is None
     if SPATIAL.match(start) or (suffix == ".curves" and drawn and not start.startswith(b"<")):
-        choice.refuse_labels("is a .curves file, whose strokes have no labels")
-        return read_curves(data, choice.view)
-    choice.refuse_view()
+        return "curves"
     if start.startswith(b"<") or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return read_svg(data, choice.chooser)
+        return "svg"
     if re.match(rb"#\s*[\d.]", start) or (suffix == ".scap" and drawn):
-        return read_scap(data, choice.chooser)
-    if suffix == ".svg" and drawn:
-        return read_svg(data, choice.chooser)
-    choice.refuse_crossings()
-    choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
-    return None
+        return "scap"
+    return "svg" if suffix == ".svg" and drawn else "picture"
+
+
+def suffix_of_picture(data: bytes) -> str:
+    """Suffix of a picture by its content; that of Netpbm for all beginnings that are not known."""
+    return next((suffix for suffix, start in _PICTURES.items() if re.match(start, data)), ".pnm")
 
 
 def _of_curves(curves: Curves) -> _Sketch:

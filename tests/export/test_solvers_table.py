@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import shutil
+import subprocess
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -81,6 +84,17 @@ def test_a_program_that_is_not_here_says_how_to_get_it():
     assert find_spec("no_such_package") is None
     assert absent.missing == "pip install no_such_package"
     assert BUNDLED["highs"].missing == ""
+
+
+def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path, monkeypatch, hidden):
+    for name in ("glpsol", "neighbour"):
+        (tmp_path / name).write_text("#!/bin/sh\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    assert SOLVERS["glpk"].missing == ""
+    hidden("glpsol")
+    assert SOLVERS["glpk"].missing == "apt install glpk-utils"
+    assert subprocess.run([shutil.which("neighbour")], check=False).returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,7 @@ def prepare(task: Preparation) -> Files:
     """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
-    found = _searched(instance, task.recipe) if given is None else _given(given, task.recipe)
+    found = _searched(instance, task.recipe) if given is None else _given(given, instance, task.recipe)
     chosen = _chosen(instance, task, found)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
@@ -126,10 +126,10 @@ def _searched(instance: Instance, recipe: InstanceRecipe) -> _Found:
     return _Found(baseline_field(instance), low, (proven.data, proven.facts) if proven else None)
 
 
-def _given(given: Given, recipe: InstanceRecipe) -> _Found:
-    """What is given, without any search."""
+def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
+    """What is given, without any search; a certificate is checked."""
     low = [given.field("least_2"), given.field("least_1")]
-    return _Found(given.field("baseline"), low, given.certificate if recipe.prove else None)
+    return _Found(given.field("baseline"), low, given.certificate(instance) if recipe.prove else None)
 
 
 def _certificate(found: _Found, task: Preparation, files: Files) -> dict[str, Any]:

@@ -34,10 +34,18 @@ from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
-from ..ledger.ledger import Ledger, Record, RunStatus, add_record, read_ledger, write_ledger
+from ..ledger.ledger import (
+    Ledger,
+    Record,
+    RunStatus,
+    add_record,
+    check_text,
+    read_ledger,
+    write_ledger,
+)
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
-from .submit import check_texts, is_better
+from .submit import is_better
 
 GAP: Final = 1e-7
 """Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
@@ -62,7 +70,8 @@ def solve_library(
     """
     chosen = _chosen(solvers)
     (last,) = _known([up_to or RUNGS[-1]], RUNGS, "rung")
-    check_texts({"by": by, "machine": machine})
+    check_text("by", by)
+    check_text("machine", machine)
     library, found = read_library(folder), []
     with (
         tempfile.TemporaryDirectory(prefix="crossfield-") as temporary,
@@ -160,7 +169,8 @@ class _Solving:
     def run(self, document: dict[str, Any], solver: str) -> tuple[Record, CrossField | None]:
         """The record of a run, and the field that it found when that is better than the best known point.
 
-        Raises UnsupportedBySolverError for a problem that is too large.
+        A solver that fails or is not started leaves a record without a point. Raises UnsupportedBySolverError
+        for a problem that is too large.
         """
         problem = problem_of(self.library, document)
         record = Record(
@@ -193,14 +203,19 @@ class _Solving:
     def _solve(
         self, document: dict[str, Any], problem: Problem, solver: str
     ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
-        """What a solver finds, and the course of its run where its log tells it."""
+        """Solution of a solver, and bounds and objectives over time where its log states them.
+
+        Raises SolverError when no time was left to start the solver.
+        """
         entry, limits = SOLVERS[solver], Limits(self.limit, GAP, 1)
         start = _start(self.library, document, problem) if entry.bundled else None
         with tempfile.TemporaryDirectory(dir=self.folder) as folder:
             found = self.solvers.solve(problem, solver, folder, limits=limits, start=start)
-            for log in Path(folder).glob("*.log"):
-                with suppress(CrossfieldError):
-                    return found, read_log(log).trace
+            log = next(Path(folder).glob("*.log"), None)
+            if log is None and not found.interrupted:
+                raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")
+            with suppress(CrossfieldError):
+                return found, read_log(log).trace if log else ()
         return found, ()
 
 

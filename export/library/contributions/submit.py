@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -34,7 +33,6 @@ from ..ledger.ledger import Record, add_record
 from ..ledger.points import complete_point, field_of
 
 UNKNOWN: Final = "unknown"
-_LONGEST: Final = 200  # characters of a text in the ledger
 _TOLD: Final = 4  # names in a message
 
 
@@ -72,60 +70,38 @@ def submit_point(
 
     entry: name of the entry; by default the one with which the file's name begins, or the only one whose
     columns the file has. solver, version, seconds, by: who found it, as the ledger keeps it. Angles and jumps
-    are taken as they are, integers rounded, and all else computed again. Raises InputError, SolutionError for
-    a point of another entry, one that is not feasible to within 1e-8, and one that a dual bound of the
-    library contradicts.
+    are taken as they are, integers rounded, and all else computed again. Raises InputError for a version,
+    text or time that a ledger cannot hold. Raises SolutionError for a point of another entry, one that is not
+    feasible to within 1e-8, and one that a dual bound of the library contradicts.
     """
     file = Path(file)
-    texts = {"solver": solver or UNKNOWN, "version": version or UNKNOWN, "by": by or UNKNOWN}
-    check_texts(texts)
     library = writable_library(folder)
     with locked(library.folder, f"a submission of {file.name}", progress):
         library = settled(library, progress)
         progress("checking the point")
-        return _submitted(file, library, entry=entry, texts=texts, seconds=seconds, by=by, progress=progress)
-
-
-def check_texts(texts: Mapping[str, str | None]) -> None:
-    """Nothing, when each text that is given fits a ledger. Raises InputError with its option's name."""
-    for name, text in texts.items():
-        if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
-            raise InputError(f"--{name} must be one line of at most {_LONGEST} characters")
-
-
-def is_better(objective: float, known: float) -> bool:
-    """Whether an objective is lower than the best known one by more than rounding."""
-    return known - objective > SAME * max(abs(known), SAME)
-
-
-def _submitted(
-    file: Path,
-    library: Library,
-    *,
-    entry: str | None,
-    texts: dict[str, str],
-    seconds: float | None,
-    by: str | None,
-    progress: Progress,
-) -> Submission:
-    """What happened to a point, by a caller who holds the lock of the library."""
-    sidecar, problem, field, objective = checked_point(file, library, entry)
-    known = sidecar["best"]["objective"]
-    better = is_better(objective, known)
-    if better:
+        sidecar, problem, field, objective = checked_point(file, library, entry)
         record = Record(
             entry=sidecar["name"],
             problem_sha256=problem.sha256,
-            solver=texts["solver"],
-            version=texts["version"],
+            solver=solver or UNKNOWN,
+            version=version or UNKNOWN,
             status="feasible",
             primal=objective,
             seconds=seconds,
             by=by,
         )
-        add_record(library.folder, record, field)
-        rebuilt(library.folder, progress=progress)
-    return Submission(sidecar["name"], known, objective, better)
+        record.check()
+        known = sidecar["best"]["objective"]
+        better = is_better(objective, known)
+        if better:
+            add_record(library.folder, record, field)
+            rebuilt(library.folder, progress=progress)
+        return Submission(sidecar["name"], known, objective, better)
+
+
+def is_better(objective: float, known: float) -> bool:
+    """Whether an objective is lower than the best known one by more than rounding."""
+    return known - objective > SAME * max(abs(known), SAME)
 
 
 def writable_library(folder: str | Path) -> Library:
@@ -174,7 +150,7 @@ def _found_in(file: Path, library: Library, entry: str | None) -> tuple[dict[str
     if solution.unknown:
         raise SolutionError(
             f"{solution.unknown} of its names are not in {name}; it is a point of another entry, "
-            "give --entry NAME",
+            "name that entry",
             file=file,
         )
     return sidecar, problem, solution
@@ -192,9 +168,9 @@ def _by_columns(file: Path, raw: RawSolution, library: Library) -> str:
     if len(fitting) == 1:
         return str(fitting[0])
     if not fitting:
-        raise SolutionError("fits no entry of the library; give --entry NAME if it should", file=file)
+        raise SolutionError("fits no entry of the library; name the entry if it should", file=file)
     told = ", ".join(fitting[:_TOLD]) + (", ..." if len(fitting) > _TOLD else "")
-    raise SolutionError(f"fits {len(fitting)} entries of the library ({told}); give --entry NAME", file=file)
+    raise SolutionError(f"fits {len(fitting)} entries of the library ({told}); name the entry", file=file)
 
 
 def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Library) -> bool:

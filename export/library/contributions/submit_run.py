@@ -8,14 +8,12 @@ log, so that `verify` can read that again.
 from __future__ import annotations
 
 import hashlib
-import math
 import re
-from dataclasses import dataclass
-from datetime import date
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final
 
-from ....models.errors import InputError, SolutionError, UnsupportedByFormatError
+from ....models.errors import InputError, SolutionError, UnsupportedByFormatError, naming
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.input_limits import MAX_LOG
@@ -34,7 +32,6 @@ from ..ledger.standing import MAKERS, best_of_each
 from .submit import (
     UNKNOWN,
     by_name,
-    check_texts,
     checked_point,
     is_better,
     settled,
@@ -62,28 +59,6 @@ class Told:
     machine: str | None = None
     by: str | None = None
     date: str | None = None
-
-    def check(self) -> None:
-        """Nothing, when a ledger can hold it. Raises InputError with the name of the option at fault."""
-        texts = ("solver", "version", "machine", "by")
-        check_texts({name: getattr(self, name) for name in texts})
-        for name in ("bound", "seconds", "limit"):
-            value = getattr(self, name)
-            if value is not None and (not math.isfinite(value) or (name != "bound" and value < 0)):
-                raise InputError(f"--{name} must be a finite number{'' if name == 'bound' else ' from 0'}")
-        if self.threads is not None and self.threads < 0:
-            raise InputError("--threads must be a whole number from 0")
-        if self.status is not None and self.status not in get_args(RunStatus):
-            raise InputError(f"--status must be one of {', '.join(get_args(RunStatus))}")
-        if self.date is not None and not _is_date(self.date):
-            raise InputError(f"--date must be a day as YYYY-MM-DD, not {self.date[:20]!r}")
-
-
-def _is_date(text: str) -> bool:
-    try:
-        return date.fromisoformat(text).isoformat() == text
-    except ValueError:
-        return False
 
 
 @dataclass(frozen=True)
@@ -127,7 +102,6 @@ def submit_run(
     `optimal` without a bound.
     """
     told = told or Told()
-    told.check()
     library = writable_library(folder)
     with locked(library.folder, "a submission of a run", progress):
         library = settled(library, progress)
@@ -153,7 +127,7 @@ def _checked(
     if point is not None:
         sidecar, problem, field, objective = checked_point(Path(point), library, name)
     elif name is None:
-        raise InputError("say of which entry it is: --entry NAME")
+        raise InputError("the files do not show which entry the run is of; name the entry")
     else:
         sidecar = library.entry(name)
         problem = problem_of(library, sidecar)
@@ -163,11 +137,28 @@ def _checked(
     best = known if objective is None else min(known, objective)
     bound, evidence = _bound(told, said, best, sidecar["name"])
     if bound is None and objective is None:
-        raise InputError("give a bound with --bound, a log that tells one, or a solution file")
+        raise InputError("there is nothing to keep; give a bound, a log that states one, or a solution file")
     content = None if log is None else read_bytes(Path(log), MAX_LOG)
     record = _record(sidecar["name"], problem, told, said, content, found=(objective, bound, evidence))
+    _check_record(record, told, log)
     better = objective is not None and is_better(objective, known)
     return record, field if better else None, content, sidecar
+
+
+def _check_record(record: Record, told: Told, log: str | Path | None) -> None:
+    """Raise InputError unless a ledger can hold the record, naming the log where that is at fault."""
+    stated = replace(
+        record,
+        version=told.version or UNKNOWN,
+        seconds=told.seconds,
+        threads=told.threads,
+        time_limit=told.limit,
+        trace=(),
+    )
+    stated.check()
+    if log is not None:
+        with naming(log):
+            record.check()
 
 
 def _entry_of(file: Path, said: RunLog, library: Library) -> str | None:
@@ -218,7 +209,7 @@ def _bound(told: Told, said: RunLog | None, best: float, entry: str) -> tuple[fl
     if told.bound is not None and read is not None and abs(told.bound - read) <= slack(read):
         bound, evidence = read, "log"
     elif said is not None and read is not None and said.ended is not None and bound > read:
-        raise SolutionError(f"the bound {bound!r} is not that of the log, {read!r}; leave --bound out")
+        raise SolutionError(f"the bound {bound!r} is not that of the log, {read!r}; leave the bound out")
     if contradicts(bound, best):
         raise SolutionError(
             f"the bound {bound!r} lies above {best!r}, the objective of a feasible point of {entry}; "
@@ -269,17 +260,19 @@ def _solver(told: Told, said: RunLog) -> str:
         return stated or UNKNOWN
     solver = SOLVERS[said.solver]
     if stated is not None and MAKERS.get(stated) != solver.maker:
-        raise InputError(f"--solver says {stated}, and the log is of {solver.title}")
+        raise InputError(f"the solver is given as {stated}, and the log is of {solver.title}; leave it out")
     return stated or solver.title
 
 
 def _status(told: Told, said: RunLog, objective: float | None, bound: float | None) -> RunStatus:
     """What a run came to. Raises InputError for a claim that the log denies or that has no bound."""
     if told.status == "optimal" and said.ended == "limit":
-        raise InputError("--status says optimal, and the log says that the search was stopped")
+        raise InputError(
+            "the status is given as optimal, but the log states that the search was stopped; leave it out"
+        )
     claimed = told.status or ("optimal" if said.ended == "optimal" else None)
     if claimed == "optimal" and bound is None:
-        raise InputError("an optimum is proven by a bound; give it with --bound, or a log that tells it")
+        raise InputError("an optimum is proven by a bound; give the bound, or a log that states it")
     if claimed is not None:
         return claimed
     return "no point" if objective is None and said.objective is None else "limit"

@@ -43,6 +43,9 @@ LONGEST_LINE = 1 << 20
 MOST_BYTES = 1 << 30  # of a file, unpacked: a small .gz that holds more is a trap
 MOST_BYTES_OF_JSON = 1 << 27
 LONGEST_NUMBER = 100
+MOST_WEIGHT = 1e6  # of a term of the energy
+MOST_ANGLE = 1e6
+LEAST_WEIGHT = 5e-324  # of a stroke, which must be above 0
 GREATEST_EXPONENT = 400
 
 BOUNDS = {
@@ -583,8 +586,8 @@ def read_instance(path: str) -> Instance:
         size += len(line)
         _require(size <= MOST_BYTES_OF_JSON, "is unreasonably long for an instance")
     try:
-        document = json.loads("".join(text), parse_constant=_no_constant)
-        known = document["format"] == "crossfield-instance" and document["version"] == 1
+        document = json.loads("".join(text), parse_constant=_no_constant, object_pairs_hook=_once)
+        known = (document["format"], _real(document["version"], 0, 9)) == ("crossfield-instance", 1)
         _require(known, "is JSON, but no instance of crossfield, version 1")
         return _instance(document)
     except (ValueError, RecursionError, KeyError, TypeError, IndexError, OverflowError, ArithmeticError):
@@ -593,6 +596,21 @@ def read_instance(path: str) -> Instance:
 
 def _no_constant(text: str) -> NoReturn:
     raise ValueError(text)
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """A JSON object, each of whose keys is there once: programs differ on which one counts."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError("a key is there twice")
+    return found
+
+
+def _real(value: object, least: float, most: float) -> float:
+    """A number of a document, which must be in a range."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise ValueError(value)
+    return float(value)
 
 
 def _instance(document: dict[str, object]) -> Instance:
@@ -616,13 +634,18 @@ def _instance(document: dict[str, object]) -> Instance:
         for way, other in (("u", (r - 1, c)), ("r", (r, c + 1)))
         if other in at
     ]
-    weights = [Decimal(float(str(document.get(*item)))) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))]
+    weights = [
+        Decimal(_real(document.get(*item), 0, MOST_WEIGHT)) for item in (("w_strokes", 1.0), ("w_beta", 1e-6))
+    ]
     return Instance(pixels, pairs, (weights[0], weights[1]))
 
 
 def _held(strokes: Any) -> dict[tuple[int, int], Stroke]:
     """Direction and weight of each stroke by row and column, each place once."""
-    held = {(int(r), int(c)): (float(theta), Decimal(float(w))) for r, c, theta, w in strokes}
+    held = {
+        (r, c): (_real(theta, -MOST_ANGLE, MOST_ANGLE), Decimal(_real(w, LEAST_WEIGHT, 1)))
+        for r, c, theta, w in strokes
+    }
     if len(held) < len(strokes):
         raise ValueError("strokes")
     return held

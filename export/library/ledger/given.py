@@ -8,6 +8,8 @@ the processor. What is about another instance than the one that is built does no
 from __future__ import annotations
 
 import io
+import math
+import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +17,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
+from ....models.instance.instance import Instance
+from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, write_bytes
 from ..documents.archive import opened
 from ..documents.documents import about_file, are_whole, read_about, read_library
@@ -22,6 +26,7 @@ from ..plan.recipe import digest
 from .points import Known, Provenance, field_from
 
 ROLES: Final = ("baseline", "least_1", "least_2")
+_SAME: Final = 1e-9  # processors round energies differently
 _DATE: Final = (1980, 1, 1, 0, 0, 0)  # of every member of an archive, so that its bytes follow from its files
 
 
@@ -43,11 +48,27 @@ class Given:
         facts = self.about["fields"][role]
         return Known(field_from(self.files[facts["file"]]), Provenance.of(facts))
 
-    @property
-    def certificate(self) -> tuple[bytes, dict[str, Any]] | None:
-        """The bytes of the certificate, and what it says, where there is one."""
+    def certificate(self, instance: Instance) -> tuple[bytes, dict[str, Any]] | None:
+        """Return the bytes of the certificate, and what it says, where there is one.
+
+        Raises InputError where the checker refuses it, it is of another instance, or it says something else
+        than the document does.
+        """
         facts = dict(self.about.get("certificate", {}))
-        return (self.files[facts.pop("file")], facts) if facts else None
+        if not facts:
+            return None
+        data = self.files[name := facts.pop("file")]
+        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+            path = Path(folder) / name
+            path.write_bytes(data)
+            found = read_certificate(path, on=instance)
+        same = (facts["status"], facts["bound"]) == (found.status, found.bound)
+        if not same or not math.isclose(facts["energy"], found.energy, rel_tol=_SAME, abs_tol=_SAME):
+            raise InputError(
+                f"{about_file(self.about['name'])} states another status, bound or energy than {name}; "
+                "make the points again with `crossfield library points`"
+            )
+        return data, facts
 
 
 Points = Callable[[str], Given | None]
@@ -61,9 +82,16 @@ def nothing(_instance: str) -> None:
 def read_points(path: str | Path) -> Points:
     """The points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
     with opened(path) as folder:
-        abouts = map(read_about, sorted(folder.glob("*.about.json")))
-        known = {str(about["name"]): _given(folder, about) for about in abouts}
+        known = dict(_named(folder, each) for each in sorted(folder.glob("*.about.json")))
     return known.get
+
+
+def _named(folder: Path, path: Path) -> tuple[str, Given]:
+    """The name of the instance that a document is about, which the file is named after, and what is known."""
+    about = read_about(path)
+    if path.name != about_file(about["name"]):
+        raise InputError(f"is about {about['name']}; its name must be {about_file(about['name'])}", file=path)
+    return about["name"], _given(folder, about)
 
 
 def points_of(folder: Path) -> Points:
@@ -103,6 +131,13 @@ def _given(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Gi
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
         raise InputError(
             f"{about_file(about['name'])} lists {lost[0]}, which is missing or another file; "
+            "make the points again with `crossfield library points`",
+            file=folder,
+        )
+    named = [*about["fields"].values(), *([about["certificate"]] if "certificate" in about else [])]
+    if unlisted := {each["file"] for each in named} - {each["name"] for each in listed}:
+        raise InputError(
+            f"{about_file(about['name'])} names {min(unlisted)} and does not list it; "
             "make the points again with `crossfield library points`",
             file=folder,
         )

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from datetime import date
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
-from ....models.errors import InstanceError
+from ....models.errors import InputError, InstanceError, shortened
 from ....models.field.field import CrossField
 from ....models.field.file import read_field, write_field
-from ....models.instance.file import read_document
+from ....models.instance.file import read_document, schema_error
 from ....models.storage import read_bytes, sha256_of, write_bytes
 from .. import documents
 
@@ -28,6 +31,8 @@ RunStatus = Literal["optimal", "feasible", "limit", "no point"]
 Evidence = Literal["log", "word"]
 """What a submitted bound rests on: the log beside the ledger, or the word of whoever sent it."""
 _LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
+_LONGEST: Final = 200  # characters of a text
+_VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,37 @@ class Record:
     def rank(self) -> tuple[Any, ...]:
         """Place in the ledger: by entry and solver, then by everything else."""
         return (self.entry, self.solver, self.version, json.dumps(asdict(self)))
+
+    def check(self) -> None:
+        """Raise InputError, naming the value at fault, unless a ledger can hold the record."""
+        for name in ("solver", "by", "machine"):
+            check_text(name, getattr(self, name))
+        if not _VERSION.fullmatch(self.version):
+            raise InputError(
+                f"version is {shortened(self.version)!r}; give at most 60 letters, digits, blanks and "
+                ". , _ + - ( ), beginning with a letter or a digit"
+            )
+        if self.status not in get_args(RunStatus):
+            raise InputError(
+                f"status is {shortened(self.status)!r}; choose one of {', '.join(get_args(RunStatus))}"
+            )
+        if self.date is not None and not _is_date(self.date):
+            raise InputError(f"date is {shortened(self.date)!r}; give a day as YYYY-MM-DD")
+        self._check_numbers()
+        error = schema_error(_as_json(self), "library-ledger", documents.__name__)
+        if error is not None:
+            place = error.json_path.removeprefix("$.records[0].")
+            raise InputError(f"{place}: {shortened(error.message)}; a ledger cannot hold this record")
+
+    def _check_numbers(self) -> None:
+        for name in ("primal", "bound"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise InputError(f"{name} is {value}; give a finite number")
+        measured = {"seconds": self.seconds, "threads": self.threads, "time limit": self.time_limit}
+        for name, value in measured.items():
+            if value is not None and not 0 <= value < math.inf:
+                raise InputError(f"{name} is {value}; give a finite number that is not negative")
 
 
 @dataclass(frozen=True)
@@ -116,6 +152,25 @@ class Ledger:
         return {"format": FORMAT, "version": VERSION, "records": list(map(_document, self.records))}
 
 
+def check_text(name: str, text: str | None) -> None:
+    """Raise InputError, naming the value, unless a ledger can hold the text."""
+    if text is not None and (not text.isprintable() or not 0 < len(text) <= _LONGEST):
+        raise InputError(f"{name} must be one line of at most {_LONGEST} printable characters")
+
+
+def _is_date(text: str) -> bool:
+    try:
+        return date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False
+
+
+def _as_json(record: Record) -> dict[str, Any]:
+    """A ledger of one record as a reader of its file sees it: with lists in place of tuples."""
+    document: dict[str, Any] = json.loads(json.dumps(Ledger(Path(), (record,)).document()))
+    return document
+
+
 def _document(record: Record) -> dict[str, Any]:
     return {key: value for key, value in asdict(record).items() if key not in _LATER or value}
 
@@ -157,8 +212,10 @@ def add_record(
 
     log: the content of the file that the record names. The caller holds the lock of the library. Files are
     written first, so that the ledger never names what is not there. Records of the same entry that named the
-    field's file before lose their field, which is not there any more. Raises OutputError.
+    field's file before lose their field, which is not there any more. Raises InputError, before anything is
+    written, for a record that a ledger cannot hold; OutputError.
     """
+    record.check()
     ledger = read_ledger(folder)
     records = list(ledger.records)
     if log is not None:

@@ -53,7 +53,7 @@ def _of_sample(recipe: InstanceRecipe) -> Instance:
 def _of_file(recipe: InstanceRecipe) -> Instance:
     sketch = recipe.sketch
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        mask = Path(folder) / f"mask{Path(sketch.mask_name).suffix}"
+        mask = Path(folder) / f"mask{sketch.mask_suffix}"
         mask.write_bytes(sketch.mask)
         return instance_of(
             sketch.drawing,

@@ -50,6 +50,8 @@ from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
 from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES
+from ....models.sketch.published import published
+from ....models.sketch.read import suffix_of_picture
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
@@ -96,7 +98,8 @@ class Sketch:
     """Where instances come from: a sample, a file with its mask, or random strokes of some seeds.
 
     name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
-    file's own name, or the shape of a random mask.
+    file's own name, or the shape of a random mask. drawing, mask: as they are published, with the suffixes of
+    their files.
     """
 
     name: str
@@ -107,8 +110,9 @@ class Sketch:
     sizes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     seeds: tuple[int | None, ...] = (None,)
     drawing: bytes = b""
+    suffix: str = ""
     mask: bytes = b""
-    mask_name: str = ""
+    mask_suffix: str = ""
     origin: Origin = NOTHING_STATED
     added: str = ""
 
@@ -126,10 +130,10 @@ class Sketch:
         }
 
     def _copy(self) -> str:
-        return f"cf_{self.name}.sketch{Path(self.what).suffix.lower()}"
+        return f"cf_{self.name}.sketch{self.suffix}"
 
     def _mask(self) -> str:
-        return f"cf_{self.name}.mask{Path(self.mask_name).suffix.lower()}"
+        return f"cf_{self.name}.mask{self.mask_suffix}"
 
     def document(self) -> dict[str, Any]:
         """The sketch as a table of a specification, its files as they lie in a library."""
@@ -199,7 +203,7 @@ def spec_of(document: dict[str, Any], path: Path) -> Spec:
 
 def _check_form(document: dict[str, Any]) -> None:
     for key, value in (("format", FORMAT), ("version", VERSION)):
-        if document.get(key) != value:
+        if document.get(key) != value or isinstance(document[key], bool):
             raise InputError(
                 f"{key}: must be {value!r}; this is no specification of a library, or another version"
             )
@@ -380,9 +384,20 @@ def _random(table: dict[str, Any], _place: str, _folder: Path) -> dict[str, Any]
 def _file(table: dict[str, Any], place: str, folder: Path) -> dict[str, Any]:
     what, mask = table["file"], table.get("mask", "")
     source = table.get("file_name", Path(what).name)
-    drawing = _content(folder / what, f"{place}file")
+    drawn = _content(folder / what, f"{place}file")
+    try:
+        drawing, suffix = published(drawn, Path(source).suffix.lower())
+    except InputError as error:
+        raise InputError(f"{place}file: {what}: {error}") from error
     masked = _content(folder / mask, f"{place}mask") if mask else b""
-    return {"what": source, "title": source, "drawing": drawing, "mask": masked, "mask_name": mask}
+    return {
+        "what": source,
+        "title": source,
+        "drawing": drawing,
+        "suffix": suffix,
+        "mask": masked,
+        "mask_suffix": suffix_of_picture(masked) if masked else "",
+    }
 
 
 _SOURCES: Final[dict[Kind, Callable[[dict[str, Any], str, Path], dict[str, Any]]]] = {

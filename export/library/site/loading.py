@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.formulations.problem import Problem
@@ -85,7 +85,17 @@ def _settings(entry: dict[str, Any]) -> list[str]:
 def _jump(entry: dict[str, Any]) -> Way | None:
     linear = entry["class"] in ("LP", "MILP")
     name = _first(entry, *(("mps", "lp", "nl") if linear else ("nl",)))
-    return Way("JuMP, in Julia", f'using JuMP\nmodel = read_from_file("{name}")') if name else None
+    if not name:
+        return None
+    nl = name.removesuffix(".gz").endswith(".nl")
+    options, note = ("; use_nlp_block = false", _NO_NAMES) if nl else ("", "")
+    return Way("JuMP, in Julia", f'using JuMP\nmodel = read_from_file("{name}"{options})', note)
+
+
+_NO_NAMES: Final = (
+    "JuMP reads no names with .nl files: line i of the .col file names variable i. Without the option it"
+    " builds a legacy nonlinear block"
+)
 
 
 def _gams(entry: dict[str, Any]) -> Way | None:

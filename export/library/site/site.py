@@ -162,10 +162,16 @@ def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) ->
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
-    """Link every file of the library into a folder, or copy where links cannot be.
+    """Make hard links to every file of the library in a folder, or copies where there are no such links.
 
-    Raises InputError when one differs from its checksum.
+    Raises InputError for a symbolic link, and for a file that differs from its checksum.
     """
+    for name in (*sums, SUMS):
+        if (folder / name).is_symlink():
+            raise InputError(
+                "is a symbolic link, and a site publishes plain files alone; put the file in its place",
+                file=folder / name,
+            )
     for name, expected in sums.items():
         if not (folder / name).is_file() or sha256_of(folder / name) != expected:
             raise InputError(
@@ -173,7 +179,7 @@ def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
             )
     for name in (*sums, SUMS):
         try:
-            os.link(folder / name, target / name, follow_symlinks=True)
+            os.link(folder / name, target / name)
         except OSError:
             write_bytes(target / name, read_bytes(folder / name))
 

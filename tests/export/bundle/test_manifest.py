@@ -337,6 +337,19 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
     with pytest.raises(OutputError, match="cannot be made"):
         write_problem(problem, tmp_path / "file", ["lp"])
     assert format_of("a.b.mps.gz").name == "mps"
+    with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):
+        format_of("MODEL.PS.GZ")
+
+
+@pytest.mark.parametrize("name", ["A.LP", "A.Nl.GZ", "A.MOD.Gz"])
+def test_suffixes_in_upper_case_are_those_in_lower_case(tmp_path, name):
+    """Same bytes, and companions with the same stem."""
+    problem = make_problem("milp-mccormick", make_instance("hole"))
+    upper = write(problem, tmp_path / name).files
+    lower = write(problem, tmp_path / f"a{name[1:].lower()}").files
+    assert name in upper
+    assert [each.lower() for each in upper] == [each.lower() for each in lower]
+    assert list(upper.values()) == list(lower.values())
 
 
 def test_an_option_that_no_formulation_has_is_refused(tmp_path):

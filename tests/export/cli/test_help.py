@@ -7,12 +7,13 @@ import pytest
 import typer
 from crossfield.export.cli import options
 from crossfield.export.cli.app import app, invoke
-from crossfield.export.cli.help_texts import NAMES, filled
+from crossfield.export.cli.help_texts import NAMES, Command, filled
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solutions.readers.registry import READERS
 from crossfield.models.formulations.declaration import FACETS
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
+from typer.testing import CliRunner
 
 NAMED = {
     "run": ["samples", "size", "methods of a run"],
@@ -68,6 +69,21 @@ def test_the_help_names_what_the_tables_have_within_80_columns(text):
         for table in NAMED.get(command, ()):
             missing = [name for name in NAMES[table]() if not re.search(rf"\b{name}\b", words(shown))]
             assert missing == [], (command, table)
+
+
+def test_brackets_in_a_help_are_shown(text):
+    """Rich takes `[word]` for markup unless it is escaped."""
+    assert "the table [release] of its specification" in words(text("library release"))
+    toy = typer.Typer()
+
+    @toy.command(cls=Command)
+    def toy_command(option: typing.Annotated[str, typer.Option(help="A [bold] word.")] = "x") -> None:
+        """Show [red] and {size} twice."""
+
+    for _ in range(2):
+        shown = words(CliRunner().invoke(toy, ["--help"]).output)
+        assert f"Show [red] and {DEFAULT_SIZE} twice." in shown
+        assert "A [bold] word." in shown
 
 
 def test_every_table_in_a_help_is_named_there():

@@ -9,7 +9,6 @@ import pytest
 from crossfield.export.bundle.manifest import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.solving.local import solver_for
 from crossfield.export.verify.verify import Verdict, compared, verify
 
@@ -89,11 +88,9 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 
 
 @pytest.mark.slow
-@pytest.mark.oracles
+@pytest.mark.needs("scip")
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
-    if not PROGRAMS["scip"].present:
-        pytest.skip(f"SCIP is not installed: {PROGRAMS['scip'].install}")
     write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
     found = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
     assert found.bad == []

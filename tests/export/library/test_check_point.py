@@ -485,6 +485,28 @@ def test_bad_models_are_one_line(what, tmp_path, capsys):
     assert "m.mps: " in refused(capsys, tmp_path / "m.mps", tmp_path / "p")
 
 
+@for_each(
+    "old, new",
+    [
+        ('"version": 1', '"version": true'),
+        ('"w_beta": 0.5', '"w_beta": 1e400'),
+        ('"w_beta": 0.5', '"w_beta": "1e400"'),
+        ('"w_beta": 0.5', '"w_beta": -0.5'),
+        ('"w_beta": 0.5', '"w_beta": 0.5, "w_beta": 0.25'),
+        ("0.0, 0.25", "1e400, 0.25"),
+        ("0.0, 0.25", "0.0, 1e400"),
+        ("0.0, 0.25", "0.0, 0"),
+        ("0.0, 0.25", "true, 0.25"),
+    ],
+)
+def test_instances_that_crossfield_would_refuse_are_refused(old, new, tmp_path, capsys):
+    good = json.dumps(PAIR)
+    assert good.count(old) == 1
+    (tmp_path / "m.json").write_text(good.replace(old, new))
+    (tmp_path / "p").write_text(BY_HAND)
+    assert "is no instance of crossfield, or damaged" in refused(capsys, tmp_path / "m.json", tmp_path / "p")
+
+
 @for_each("what", BAD_POINTS)
 def test_bad_points_are_one_line(what, tmp_path, capsys):
     (tmp_path / "m.mps").write_text(linear())

@@ -10,10 +10,12 @@ import crossfield as cf
 import pytest
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
+from crossfield.export.library.ledger.given import read_points
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.spec import default_spec, read_spec
+from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from forging import seal
+from forging import change, seal
 
 pytestmark = [pytest.mark.usefixtures("short_searches"), pytest.mark.slow]
 
@@ -118,6 +120,38 @@ def test_a_forged_certificate_is_found(lib):
     half = len(good) // 2
     (lib / CERTIFICATE).write_bytes(good[:half] + bytes([good[half] ^ 1]) + good[half + 1 :])
     assert CERTIFICATE in found(lib)
+
+
+@pytest.mark.parametrize("key, value", [("bound", 99.0), ("status", "gap"), ("energy", 99.0)])
+def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, value):
+    instance = cf.read_instance(lib / f"{STEM}.instance.json")
+    assert read_points(lib)(STEM).certificate(instance)[1]["status"] == "optimal"
+    change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
+    with pytest.raises(InputError, match=f"{STEM}.about.json states another status, bound or energy"):
+        read_points(lib)(STEM).certificate(instance)
+
+
+def test_points_with_a_certificate_of_another_instance_are_refused(lib):
+    shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
+    seal(lib)
+    with pytest.raises(InputError, match="is a certificate of another instance"):
+        read_points(lib)(STEM).certificate(cf.read_instance(lib / f"{STEM}.instance.json"))
+
+
+@pytest.mark.parametrize(
+    "change_it, words",
+    [
+        (lambda path: change(path, title="half \ud800"), "half of a surrogate pair"),
+        (lambda path: change(path, fields__least_2__seconds=float("inf")), "a number that is not finite"),
+        (lambda path: change(path, name="cf_other"), "is about cf_other; its name must be cf_other.about"),
+        (lambda path: change(path, certificate__file=f"{STEM}.another.npz"), "and does not list it"),
+        (lambda path: change(path, version=True), "has version True"),
+    ],
+)
+def test_points_with_a_damaged_document_are_refused(lib, change_it, words):
+    change_it(lib / f"{STEM}.about.json")
+    with pytest.raises(CrossfieldError, match=words):
+        read_points(lib)
 
 
 def test_a_forged_or_missing_checker_is_found(lib):

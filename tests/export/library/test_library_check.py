@@ -18,7 +18,7 @@ from crossfield.export.formats.registry import write
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.contributions.submit import submit_point
-from crossfield.export.library.documents import archive, check_point
+from crossfield.export.library.documents import archive, check_point, tar_stream
 from crossfield.export.library.documents.archive import opened
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.plan.spec import read_spec
@@ -62,6 +62,20 @@ def special(kind, target="/etc/passwd"):
     entry = tarfile.TarInfo("lib/special")
     entry.type, entry.linkname = kind, target
     return entry
+
+
+def typed(kind):
+    """A .tar of one member of that kind, which states five bytes."""
+    entry = tarfile.TarInfo("lib/special")
+    entry.type, entry.size = kind, 5
+    return entry.tobuf() + b"12345".ljust(512, b"\0") + bytes(1024)
+
+
+def extended(records, kind=tarfile.XHDTYPE):
+    """A .tar of one file after an extended header."""
+    entry = tarfile.TarInfo("lib/header")
+    entry.type, entry.size = kind, len(records)
+    return entry.tobuf() + records.ljust(-(-len(records) // 512) * 512, b"\0") + tar_of(INSIDE.items())
 
 
 def linked():
@@ -126,6 +140,34 @@ TRAPS = {
     "gz of text": lambda: gzip.compress(b"hello" * 1000),
     "text": lambda: b"hello" * 1000,
     "empty": lambda: b"",
+    **{
+        f"{kind} {names}": lambda pack=pack, names=names: pack([(name, b"x") for name in names])
+        for kind, pack in (("tar", tar_of), ("zip", zip_of))
+        for names in (
+            ["lib/A", "lib/a"],
+            ["lib/a", "LIB/b"],
+            ["lib/a", "lib/a/b"],
+            ["lib/a/b", "lib/a"],
+            ["lib/\N{LATIN SMALL LETTER E WITH ACUTE}", "lib/e\N{COMBINING ACUTE ACCENT}"],
+            ["lib/" + "a" * 256],
+            ["a/" * 16 + "a"],
+        )
+    },
+    "tar without an end": lambda: tar_of(INSIDE.items())[:1024],
+    "tar that goes on": lambda: tar_of(INSIDE.items()) + tar_of([("lib/more", b"x")]),
+    "tar of a folder with content": lambda: typed(tarfile.DIRTYPE),
+    "tar of a sparse file": lambda: typed(tarfile.GNUTYPE_SPARSE),
+    "tar with another checksum": lambda: tar_of(INSIDE.items()).replace(
+        b"lib/README.md", b"lib/README.mD", 1
+    ),
+    "tar that names all members": lambda: extended(b"12 path=a/b\n", tarfile.XGLTYPE),
+    "tar with half a record": lambda: extended(b"99 path=a/b\n"),
+    "tar with a sparse record": lambda: extended(b"23 GNU.sparse.name=abc\n"),
+    "tar with a name that is no text": lambda: tar_of([("lib/aa", b"")]).replace(b"aa", b"\xff"),
+    "zip with a comment": lambda: zip_of(INSIDE.items())[:-2] + b"\x03\x00abc",
+    "two zips": lambda: zip_of(INSIDE.items()) + zip_of([("lib/more", b"x")]),
+    "zip with other names in its headers": lambda: zip_of(INSIDE.items()).replace(b"README", b"readme", 1),
+    "zip with a NUL in a name": lambda: zip_of([("lib/a.b", b"")]).replace(b"a.b", b"a\0b"),
 }
 
 
@@ -165,6 +207,72 @@ def test_an_archive_that_grows_without_reason_is_refused(kind, tmp_path, tempora
     with pytest.raises(InputError, match="unreasonably much"), opened(tmp_path / "archive"):
         pytest.fail("it was opened")
     assert not list(temporary.iterdir())
+
+
+class Counting(io.BytesIO):
+    """A stream that counts the bytes that were read of it."""
+
+    def __init__(self, data):
+        super().__init__(data)
+        self.given = 0
+
+    def read(self, size=-1):
+        data = super().read(size)
+        self.given += len(data)
+        return data
+
+
+ENORMOUS = {
+    "a long name": lambda: tar_of([("a/" * 524_288 + "b", b"")]),
+    "digits": lambda: extended(b"1" * 60_000),
+    "a large header": lambda: extended(b"1" * (1 << 24)),
+    "many records": lambda: extended(b"6 a=b\n" * 1000),
+    "a long link": lambda: header_of(1 << 20, tarfile.GNUTYPE_LONGLINK) + bytes(1 << 20),
+    "a global header": lambda: extended(b"1" * 60_000, tarfile.XGLTYPE),
+}
+
+
+@for_each("kind", ENORMOUS)
+def test_headers_are_refused_before_more_than_their_limit_is_read(kind, tmp_path):
+    """The limit is of bytes that are read, so that it depends on no clock."""
+    stream = Counting(ENORMOUS[kind]())
+    with pytest.raises(InputError, match="unreasonably much in a header"):
+        list(tar_stream.members(stream))
+    assert stream.given <= 512 + tar_stream.MOST_EXTENDED
+    (tmp_path / "archive").write_bytes(gzip.compress(stream.getvalue(), 1))
+    with pytest.raises(InputError, match="unreasonably much in a header"), opened(tmp_path / "archive"):
+        pytest.fail("it was opened")
+
+
+def test_an_archive_is_not_read_beyond_too_many_members(tmp_path, monkeypatch):
+    """What follows them is no .tar, which would be another refusal."""
+    monkeypatch.setattr(archive, "MOST_FILES", 200)
+    data = tar_of((f"lib/{number}", b"") for number in range(201))[: 201 * 512]
+    (tmp_path / "archive").write_bytes(gzip.compress(data + b"no header" * 512))
+    with pytest.raises(InputError, match="unreasonably much"), opened(tmp_path / "archive"):
+        pytest.fail("it was opened")
+
+
+@for_each("form", [tarfile.USTAR_FORMAT, tarfile.GNU_FORMAT, tarfile.PAX_FORMAT])
+def test_the_forms_of_tar_that_programs_write_are_read(form, tmp_path):
+    names = [
+        "lib/" + "n" * 90,
+        "lib/" + "f" * 80 + "/" + "n" * 80,
+        "lib/\N{LATIN SMALL LETTER O WITH STROKE}",
+    ]
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=form) as tar:
+        folder = tarfile.TarInfo("lib")
+        folder.type = tarfile.DIRTYPE
+        tar.addfile(folder)
+        for name in names:
+            entry = tarfile.TarInfo(name)
+            entry.size, entry.mtime = 2000, 1.5 if form == tarfile.PAX_FORMAT else 1
+            tar.addfile(entry, io.BytesIO(name[-1].encode().ljust(2000)))
+    (tmp_path / "archive").write_bytes(buffer.getvalue())
+    with opened(tmp_path / "archive") as folder:
+        held = everything_below(folder)
+    assert held == {name.removeprefix("lib/"): name[-1].encode().ljust(2000) for name in names}
 
 
 def test_nothing_at_the_path_is_an_error(tmp_path):
@@ -721,6 +829,9 @@ def test_a_point_that_cannot_be_is_one_line_and_changes_nothing(
         ({"entry": f"{STEM}_milp"}, "another instance, formulation or option"),
         ({"entry": ENTRY, "by": "two\nlines"}, "one line"),
         ({"entry": ENTRY, "solver": "x" * 300}, "at most 200"),
+        ({"entry": ENTRY, "seconds": float("inf")}, "--seconds must be a finite number from 0"),
+        ({"entry": ENTRY, "seconds": float("nan")}, "--seconds must be a finite number from 0"),
+        ({"entry": ENTRY, "seconds": -1.0}, "--seconds must be a finite number from 0"),
     ],
 )
 def test_wrong_options_are_refused_before_anything_is_written(options, words, solved, built, tmp_path):

@@ -180,15 +180,15 @@ def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(built, 
 
 def test_a_build_that_is_refused_leaves_nothing(tmp_path):
     """A drawing without strokes is only found out when its instance is made."""
-    (tmp_path / "bare.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>')
+    (tmp_path / "bare.scap").write_text("#9 9\n")
     spec = write_spec(
-        tmp_path, more='[[sketches]]\nname = "bare"\nfile = "bare.svg"\nsizes = { tiny = [4] }\n'
+        tmp_path, more='[[sketches]]\nname = "bare"\nfile = "bare.scap"\nsizes = { tiny = [4] }\n'
     )
-    with pytest.raises(InputError, match="draws no stroke"):
+    with pytest.raises(InputError, match="holds no stroke"):
         build(spec, tmp_path / "new")
     assert not (tmp_path / "new").exists()
     (tmp_path / "old").mkdir()
-    with pytest.raises(InputError, match="draws no stroke"):
+    with pytest.raises(InputError, match="holds no stroke"):
         build(spec, tmp_path / "old")
     assert list((tmp_path / "old").iterdir()) == []
 

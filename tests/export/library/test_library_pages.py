@@ -187,8 +187,17 @@ def test_the_lines_for_pyomo_make_the_problem_with_its_options_and_jumps(library
     assert ran("\n".join(script), site / "files", "print(*found)") == " ".join(map(str, wanted))
 
 
+def test_jump_reads_nl_files_without_a_legacy_block_and_is_said_to_lose_names(library, site):
+    names = [entry["name"] for entry in library.entries]
+    lines = {name: ways_of(site, name)["JuMP"] for name in names}
+    nl = [name for name in names if ".nl" in lines[name]]
+    assert 0 < len(nl) < len(names)
+    assert [name for name in names if "; use_nlp_block = false)" in lines[name]] == nl
+    assert [name for name in names if "JuMP reads no names with .nl files" in text_of(site, name)] == nl
+
+
+@pytest.mark.needs("gurobi")
 def test_the_lines_for_gurobi_read_what_gurobi_can_hold(library, site):
-    pytest.importorskip("gurobipy")
     for name in (ENTRY, f"{INSTANCE}_bilin", f"{INSTANCE}_exact"):
         lines = ways_of(site, name)["Gurobi"]
         columns = columns_of(library, library.entry(name))

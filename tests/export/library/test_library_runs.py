@@ -11,9 +11,11 @@ from itertools import combinations
 import highspy
 import pytest
 from crossfield.export.cli.app import invoke
+from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.contributions.solve import drop_refuted, solve_library
+from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.contributions.submit_run import Told, submit_run
 from crossfield.export.library.documents.documents import read_library, read_sidecar
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
@@ -170,23 +172,77 @@ def test_what_cannot_be_is_refused_in_one_line_and_nothing_changes(built, lib, t
         ({"log": tmp_path / "larger.log", "entry": MILP}, Told(), "is a log of a model of .* columns"),
         ({"log": tmp_path / "none.log", "entry": MILP}, Told(), "no log of a known solver"),
         ({"log": tmp_path / "none.log", "entry": MILP}, Told(bound=0.0), "no log of a known solver"),
-        ({"log": built / f"{MILP}.log"}, Told("Gurobi"), "--solver says Gurobi, and the log is of HiGHS"),
+        ({"log": built / f"{MILP}.log"}, Told("Gurobi"), "is given as Gurobi, and the log is of HiGHS"),
         ({"log": tmp_path / "stopped.log", "entry": MILP}, Told(status="optimal"), "search was stopped"),
         ({"point": built / f"{MILP}.sol", "entry": MILP}, Told(status="optimal"), "is proven by a bound"),
         ({"entry": MILP}, Told("SCIP"), "give a bound"),
-        ({}, Told(bound=0.0), "--entry NAME"),
+        ({}, Told(bound=0.0), "name the entry"),
         ({"entry": "cf_none_milp"}, Told(bound=0.0), "has no entry"),
-        ({"entry": MILP}, Told(bound=float("nan")), "--bound must be a finite number"),
-        ({"entry": MILP}, Told(bound=0.0, seconds=-1.0), "--seconds must be"),
-        ({"entry": MILP}, Told(bound=0.0, threads=-1), "--threads must be"),
-        ({"entry": MILP}, Told(bound=0.0, machine="a\nb"), "--machine must be one line"),
-        ({"entry": MILP}, Told(bound=0.0, date="22.11.2026"), "--date must be a day"),
-        ({"entry": MILP}, Told(bound=0.0, status="solved"), "--status must be one of optimal"),
+        ({"entry": MILP}, Told(bound=float("nan")), "bound is nan; give a finite number"),
+        ({"entry": MILP}, Told(bound=0.0, seconds=-1.0), "seconds is -1.0; give a finite number"),
+        ({"entry": MILP}, Told(bound=0.0, threads=-1), "threads is -1; give a finite number"),
+        ({"entry": MILP}, Told(bound=0.0, machine="a\nb"), "machine must be one line"),
+        ({"entry": MILP}, Told(bound=0.0, date="22.11.2026"), "date is '22.11.2026'; give a day"),
+        ({"entry": MILP}, Told(bound=0.0, status="solved"), "status is 'solved'; choose one of optimal"),
+        ({"entry": MILP}, Told(bound=0.0, limit=float("inf")), "time limit is inf; give a finite number"),
+        ({"entry": MILP}, Told(bound=0.0, by="\u202ereversed"), "by must be one line"),
+        ({"entry": MILP}, Told(bound=0.0, version="<script>"), "version is '<script>'; give at most 60"),
     ):
         with pytest.raises(CrossfieldError, match=words) as refused:
             submit_run(lib, told=told, **given)
         assert "\n" not in str(refused.value)
         assert isinstance(refused.value, InputError | SolutionError)
+    assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
+
+
+GUROBI = """Gurobi Optimizer version 13.0.3 build v13.0.3rc0 (linux64)
+TimeLimit  60
+Explored 1 nodes (0 simplex iterations) in 0.05 seconds (0.01 work units)
+Optimal solution found (tolerance 1.00e-04)
+Best objective 9.000000000000e+99, best bound 1.000000000000e-03, gap 0.0000%
+"""
+BARON = """ BARON version 26.5. Built: LNX-64
+  Lower bound is                      0.001
+    Wall clock time:                     -1.00
+"""
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (GUROBI.replace("in 0.05 seconds", "in -5 seconds"), "seconds is -5.0; give a finite number"),
+        (GUROBI.replace("TimeLimit  60", "TimeLimit  -8"), "time limit is -8.0; give a finite number"),
+        (GUROBI.replace("13.0.3 build", "13\x1b[31mX build"), "version is '13.*X'; give at most 60 letters"),
+        (GUROBI.replace("13.0.3 build", f"{5000 * '1'} build"), "version is '1+ ... 1+'; give at most 60"),
+        (GUROBI.replace("13.0.3 build", "13\u202e build"), "version is"),
+        (GUROBI.replace("13.0.3 build", "<script> build"), "version is '<script>'; give at most 60 letters"),
+        (BARON, "seconds is -1.0; give a finite number"),
+    ],
+)
+def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib, tmp_path, text, words):
+    (tmp_path / "a.log").write_text(text)
+    before = {path.name: path.read_bytes() for path in lib.iterdir()}
+    with pytest.raises(InputError, match=rf"a\.log: {words}") as refused:
+        submit_run(lib, log=tmp_path / "a.log", entry=MILP)
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).isprintable()
+    assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
+    assert submit_run(lib, entry=MILP, told=Told("scip", bound=0.0)).kept
+
+
+def test_what_is_stated_of_a_log_takes_the_place_of_what_it_says(lib, tmp_path):
+    (tmp_path / "a.log").write_text(GUROBI.replace("TimeLimit  60", "TimeLimit  -8"))
+    submit_run(lib, log=tmp_path / "a.log", entry=MILP, told=Told(limit=8.0))
+    assert entry_of(lib)["runs"][0]["limit"] == 8.0
+    with pytest.raises(InputError, match=r"^version is '\?'; give"):
+        submit_run(lib, log=tmp_path / "a.log", entry=MILP, told=Told(version="?", limit=8.0))
+
+
+@pytest.mark.parametrize("seconds", [float("inf"), float("nan"), -1.0])
+def test_a_point_with_a_time_that_cannot_be_is_refused_before_anything_is_written(built, lib, seconds):
+    before = {path.name: path.read_bytes() for path in lib.iterdir()}
+    with pytest.raises(InputError, match=f"^seconds is {seconds}; give a finite number"):
+        submit_point(built / f"{OTHER}.sol", lib, entry=OTHER, seconds=seconds)
     assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
 
 
@@ -320,10 +376,23 @@ def test_every_installed_program_solves_what_it_takes(lib):
     assert solve_library(lib, solvers=names, time_limit=60.0) == []
 
 
-def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch):
-    monkeypatch.setitem(SOLVERS, "glpk", replace(SOLVERS["glpk"], package="no_such_package"))
-    with pytest.raises(CrossfieldError, match="glpk is not installed; pip install no_such_package"):
+def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others_run(lib, capfd):
+    """Writing a model takes longer than a nanosecond, which the command line does not accept as a limit."""
+    solve_command(lib, solver=["highs"], time_limit=1e-9)
+    said = capfd.readouterr().out
+    assert said == f"{lib / 'ledger.json'}: 4 new records, 4 of them of runs that found no point\n"
+    records = read_ledger(lib).records
+    assert {each.entry for each in records} == {MILP, OTHER, QP, QP.replace("s1", "s2")}
+    assert {(each.status, each.seconds, each.trace) for each in records} == {("no point", None, ())}
+
+
+def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch, hidden):
+    hidden("glpsol")
+    with pytest.raises(CrossfieldError, match=r"^glpk is not installed; apt install glpk-utils$"):
         solve_library(lib, solvers=["glpk"])
+    monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package="no_such_package"))
+    with pytest.raises(CrossfieldError, match=r"^highs is not installed; pip install no_such_package$"):
+        solve_library(lib, solvers=["highs"])
     with pytest.raises(InputError, match="there is no solver 'none'"):
         solve_library(lib, solvers=["none"])
     assert read_library(lib).entry(MILP)["runs"] == []

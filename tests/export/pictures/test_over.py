@@ -12,6 +12,9 @@ from crossfield.export.pictures.drawing import INK, read_drawing
 from crossfield.export.solving.run import run
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
+from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.sketch.curves import bounding_box
+from crossfield.models.sketch.pen_strokes import read_curves
 from crossfield.models.sketch.read import read_sketch
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.power_field import power_field
@@ -141,6 +144,22 @@ def test_pen_strokes_may_lie_beyond_their_page(tmp_path):
     root, layers = layers_of(draw(field, tmp_path / "over.svg", over=path))
     assert numbers(root.get("viewBox")).tolist() == [0, -20, 80, 50]
     assert lines_in(layers["drawing"])[0].tolist() == [[0, -20], [60, -20], [60, 20]]
+
+
+def test_a_drawing_in_space_lies_below_its_field_as_the_field_saw_it(tmp_path):
+    rows = ("0 0 0\n2 0 0\n2 1 0\n0 1 0\n0 0 0", "0 0.5 0\n2 0.5 0", "1 0 0\n1 1 0", "1 0.5 0\n1 0.5 1")
+    path = tmp_path / "a.curves"
+    path.write_text("".join(f"v {len(row.splitlines())}\n{row}\n" for row in rows))
+    instance = read_sketch(path, size=12, view="60, 25")
+    assert instance.source == "a.curves, seen from 60, 25"
+    assert read_sketch(path, size=12).source == "a.curves"
+    seen = read_curves(path.read_bytes(), "60,25")
+    assert read_drawing(path, on=instance).box == bounding_box(seen.points)
+    assert read_drawing(path, on=read_sketch(path, size=12)).box != bounding_box(seen.points)
+    write_instance(instance, tmp_path / "a.json")
+    assert read_drawing(path, on=read_instance(tmp_path / "a.json")).page == seen.canvas
+    with pytest.raises(InputError, match=r"b.svg: is flat: only a .curves file can be seen from 60, 25"):
+        read_drawing(svg(tmp_path / "b.svg"), on=instance)
 
 
 def test_another_drawing_and_another_kind_are_refused(tmp_path):

@@ -5,7 +5,6 @@ import gzip
 import inspect
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -28,9 +27,6 @@ from crossfield.models.errors import InstanceError, SolutionError
 from crossfield.models.formulations.problem import formulate
 
 MILP = "milp-mccormick"
-needs_glpk = pytest.mark.skipif(
-    shutil.which("glpsol") is None, reason="glpsol is not installed: apt install glpk-utils"
-)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +104,7 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
     assert (facts["status"], facts["contradictions"]) == ("optimal-global", [])
 
 
-@needs_glpk
+@pytest.mark.needs("glpk")
 def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp_path):
     relaxed, whole = tmp_path / "relaxed.sol", tmp_path / "whole.sol"
     stem = f"skew.{MILP}"
@@ -125,7 +121,7 @@ def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp
     assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], abs=1e-9)
 
 
-@needs_glpk
+@pytest.mark.needs("glpk")
 def test_the_columns_of_a_model_have_glpks_order_also_with_pixels_apart(tmp_path):
     """`parts` has a pixel without neighbours: its alpha, if it has no stroke, is no column of GLPK's."""
     for number, shape in enumerate(("parts", "hole", "pixel")):

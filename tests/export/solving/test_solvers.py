@@ -9,12 +9,11 @@ import textwrap
 import time
 import warnings
 from functools import cache
-from pathlib import Path
 
 import crossfield as cf
 import numpy as np
 import pytest
-from children import complaints
+from children import command_lines, complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.nl import Layout
@@ -25,6 +24,7 @@ from crossfield.export.solving.run import plan
 from crossfield.models.errors import (
     InputError,
     MissingSolverError,
+    SolutionError,
     SolverError,
     UnsupportedBySolverError,
 )
@@ -276,13 +276,13 @@ def test_the_preferred_solver_fits_the_class(small):
     for name in ("minlp-parity", "minlp-cubic", "miqcp-bilinear"):
         with pytest.raises(UnsupportedBySolverError, match="crossfield list"):
             solver_for(formulated(small, name))
-    with pytest.raises(InputError, match="choose one of highs, ipopt, bonmin"):
+    with pytest.raises(InputError, match="choose one of gurobi, cplex, .*highs"):
         solver_for(formulated(small, "qp-fixed"), "HiGHS")
 
 
 def test_a_missing_package_is_a_named_error(small, monkeypatch):
     monkeypatch.setitem(sys.modules, "casadi", None)
-    with pytest.raises(MissingSolverError, match="ipopt needs the Python package casadi"):
+    with pytest.raises(MissingSolverError, match="Ipopt is not installed; pip install casadi"):
         solver_for(formulated(small, "qp-fixed"))
     assert solver_for(formulated(small, "milp-mccormick")).name == "highs"
 
@@ -341,8 +341,11 @@ def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
 def test_without_a_start_and_time_there_is_no_point(tmp_path):
     instance = cf.sample("mouse", 30)
     (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
-    with pytest.raises(SolverError, match="highs left no answer within its time; give it more, or a start"):
-        cf.solve(cf.formulate(instance, "milp-mccormick"), "highs", tmp_path, limits=cf.Limits(1e-6))
+    problem = cf.formulate(instance, "milp-mccormick")
+    found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(1e-6))
+    assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
+    with pytest.raises(SolutionError, match="left no answer within its time; give it more, or a start"):
+        _ = found.field
     assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
 
 
@@ -482,7 +485,7 @@ def test_threads_may_change_from_solve_to_solve(tmp_path, small):
     ],
 )
 def test_impossible_limits_are_refused(given):
-    with pytest.raises(InputError, match="cannot be"):
+    with pytest.raises(InputError, match=r"out of range|cannot be"):
         cf.Limits(**given)
 
 
@@ -512,7 +515,7 @@ def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, mon
     (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
     monkeypatch.setenv("PYTHONPATH", str(broken))
     with pytest.raises(
-        SolverError, match=r"ipopt left no answer \(exit code 1\): ImportError: libgfortran is gone"
+        SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"
     ):
         cf.solve(problem, "ipopt", tmp_path)
     assert not answer.exists()
@@ -595,12 +598,4 @@ def test_when_asked_to_end_it_ends_with_its_child(tmp_path, solver):
         tmp_path, f"*.{solver}.log", CTRL_C[solver], AT_WORK[solver], number=signal.SIGTERM
     )
     assert (code, out, err) == (128 + signal.SIGTERM, "", "")
-    mine = [path for path in Path("/proc").glob("[0-9]*/cmdline") if str(tmp_path) in _command_line(path)]
-    assert mine == []
-
-
-def _command_line(path):
-    try:
-        return path.read_text()
-    except OSError:
-        return ""
+    assert [line for line in command_lines().values() if str(tmp_path).encode() in line] == []

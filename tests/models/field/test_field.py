@@ -135,6 +135,14 @@ def test_cross_error_takes_the_better_assignment():
     )
 
 
+def test_cross_error_names_the_shape_that_it_needs():
+    field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0, 0], [0, 0, 0], [0, 0])
+    with pytest.raises(InstanceError, match=r"^u has shape \(3, 2\), but \w+ has 3 pixels; give an angle"):
+        field.cross_error(field.u, field.v)
+    with pytest.raises(InstanceError, match=r"^v has shape \(\), but"):
+        field.cross_error([0, 0, 0], 1.0)
+
+
 @pytest.mark.parametrize("index", [0.25, -0.25])
 def test_quarter_singularity_of_four_pixels(index):
     # The middle of the quad is the origin; the crosses turn by index * 360 degrees on the way round.

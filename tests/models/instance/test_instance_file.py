@@ -212,6 +212,12 @@ def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
     refused(read_instance, path, "another length than its header says")
 
 
+def test_a_key_that_is_there_twice_is_named(instance, tmp_path):
+    path = tmp_path / "broken.json"
+    path.write_text(to_json(instance).replace('"mask"', '"gauge": "box",\n  "mask"', 1))
+    refused(read_instance, path, "is not valid JSON: the key 'gauge' is there twice")
+
+
 @for_each(
     "name,array,message",
     [

@@ -51,7 +51,7 @@ def test_work_that_does_not_stop_is_killed(child, tmp_path):
 
 def test_without_time_nothing_is_started(child):
     before = descendants(os.getpid())
-    with pytest.raises(KilledError, match=r"no time was left to start builtins\.abs"):
+    with pytest.raises(KilledError, match="no time was left"):
         child.call(abs, -3, deadline=Deadline.after(-1.0))
     assert descendants(os.getpid()) == before
 
@@ -76,7 +76,7 @@ def test_a_child_works_in_its_folder(tmp_path):
 def test_failures_are_named(child):
     with pytest.raises(WorkerError, match="ended with code 3"):
         child.call(os._exit, 3)
-    with pytest.raises(WorkerError, match=r"arguments of builtins\.abs cannot be sent"):
+    with pytest.raises(WorkerError, match="a task cannot be sent"):
         child.call(abs, lambda: 0)
     with pytest.raises(WorkerError, match="cannot be sent back"):
         child.call(open, os.devnull)
@@ -94,7 +94,7 @@ def test_a_child_that_was_killed_is_replaced(child, dead_before_it_is_asked):
     process.kill()
     if dead_before_it_is_asked:
         process.wait()
-    with pytest.raises(WorkerError, match=r"SIGKILL.*memory is short"):
+    with pytest.raises(WorkerError, match=r"SIGKILL.*lack of memory"):
         child.call(time.sleep, 600)
     assert child.call(abs, -3).value == 3
 

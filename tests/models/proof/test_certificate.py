@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from archives import forged, members_of, npy, of_numpy, packed
+from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError, InstanceError, SolverError
 from crossfield.models.field.field import CrossField
@@ -283,7 +285,97 @@ def test_unreadable_and_unsafe_files(tmp_path, written):
     path.write_bytes(pack_arrays(arrays)[:-30])
     for bad in (path, pickled, tmp_path / "long.npz", tmp_path / "absent.npz"):
         assert check_certificate.main([str(bad)]) == 2
-    with pytest.raises(InstanceError, match=r"it\.npz: is a damaged"):
+    with pytest.raises(InputError, match=r"it\.npz: is no certificate: is no \.npz, or has more or less"):
+        read_certificate(path)
+
+
+def test_what_numpy_writes_is_a_certificate_too(written, tmp_path):
+    path, _ = written(1)
+    other = tmp_path / "other.npz"
+    for save in (np.savez, np.savez_compressed):
+        other.write_bytes(of_numpy(path.read_bytes(), save))
+        assert read_certificate(other).bound == read_certificate(path).bound
+
+
+def test_every_forged_archive_is_refused_by_both_readers(written, tmp_path, capsys, subtests):
+    path, _ = written(1)
+    other = tmp_path / "other.npz"
+    for what, forge in forged("alpha").items():
+        with subtests.test(what):
+            other.write_bytes(forge(path.read_bytes()))
+            assert check_certificate.main([str(other)]) == 2
+            assert capsys.readouterr().out.startswith("unreadable: ")
+            with pytest.raises(InputError, match=r"other\.npz: is no certificate: "):
+                read_certificate(other)
+
+
+@pytest.mark.parametrize("second", ["head.NPY", "HEAD.npy", "head.bin", "head.npy"])
+def test_a_second_head_cannot_claim_twice_the_energy(second, written, tmp_path, capsys):
+    """One reader opens `head.npy`; another may take the last member, or cut the endings of names."""
+    path, arrays = written(1)
+    twice = 2 * read_certificate(path).energy
+    claims = members_of(pack_arrays(with_head(arrays, energy=twice, bound=twice, status="optimal")))
+    honest = members_of(path.read_bytes())["head.npy"]
+    spare = "x" * len(second)
+    data = packed([*claims.items(), (spare, honest)]).replace(spare.encode(), second.encode())
+    other = tmp_path / "other.npz"
+    other.write_bytes(data)
+    assert check_certificate.main([str(other)]) == 2
+    assert invoke(["prove", "--check", str(other)]) == 1
+    assert "is no certificate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("second", ["instance_head.NPY", "instance_head.bin"])
+def test_a_proof_for_another_instance_is_refused(second, written, tmp_path):
+    """The instance shown would be the other one, and the instance checked the one that was proven."""
+    path, arrays = written(1)
+    shown = json.loads(arrays["instance_head"].tobytes()) | {"w_beta": 0.5}
+    instance = replace(proven(1).field.instance, w_beta=0.5)
+    members = members_of(path.read_bytes())
+    text = np.frombuffer(json.dumps(shown).encode(), np.uint8)
+    other = tmp_path / "other.npz"
+    other.write_bytes(packed([*(members | {"instance_head.npy": npy(text)}).items(),
+                              (second, members["instance_head.npy"])]))  # fmt: skip
+    with pytest.raises(InputError, match="is no certificate"):
+        read_certificate(other, on=instance)
+    with pytest.raises(InputError, match="is a certificate of another instance"):
+        read_certificate(path, on=instance)
+
+
+def test_an_instance_that_would_be_rounded_has_no_certificate(written, tmp_path):
+    """The certificate would be of directions that the instance no longer has once it is read."""
+    _, arrays = written(1)
+    path = tmp_path / "it.npz"
+    for name, change in (
+        ("instance_theta", lambda theta: theta + 3e-14),
+        ("instance_origin", lambda origin: origin + 1 / 3),
+    ):
+        path.write_bytes(pack_arrays(arrays | {name: change(arrays[name])}))
+        with pytest.raises(InstanceError, match=f"it.npz: array '{name}' is not as crossfield writes it"):
+            read_certificate(path)
+
+
+def test_arrays_that_a_certificate_has_are_of_one_kind_each(written):
+    _, arrays = written(1)
+    for name, kind in (("p", np.uint64), ("level_0_ranges", np.uint32), ("alpha", np.float32)):
+        assert f"{name} has another kind" in refusal(arrays | {name: arrays[name].astype(kind)})
+
+
+def test_the_text_of_a_certificate_has_each_key_once(written):
+    _, arrays = written(1)
+    text = arrays["head"].tobytes().replace(b"{", b'{"bound": 1.0, ', 1)
+    assert "a key that is there twice" in refusal(arrays | {"head": np.frombuffer(text, np.uint8)})
+    assert "levels is no whole number" in refusal(with_head(arrays, levels=1.5))
+    assert "of version 1" in refusal(with_head(arrays, version=True))
+
+
+def test_more_levels_than_claimed_are_refused(written, tmp_path):
+    _, arrays = written(1)
+    path = tmp_path / "it.npz"
+    path.write_bytes(pack_arrays(with_head(arrays, levels=1, status="gap", bound=0.0)))
+    with pytest.raises(
+        InputError, match=r"has an array level_1_\w+ too many for a certificate with 1 levels"
+    ):
         read_certificate(path)
 
 

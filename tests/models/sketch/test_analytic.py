@@ -36,7 +36,11 @@ def principal_directions(surface, s, t, h=1e-4):
     second = np.stack(
         [[(a * normal).sum(-1) for a in row] for row in ((p_ss, p_st), (p_st, p_tt))]
     ).transpose(2, 0, 1)
-    curvature, vector = np.linalg.eig(np.linalg.solve(first, second))
+    # The shape operator is not symmetric, but similar to a symmetric matrix: with first = L L', it is
+    # L'^-1 (L^-1 second L'^-1) L'.
+    inverse = np.linalg.inv(np.linalg.cholesky(first))
+    curvature, vector = np.linalg.eigh(inverse @ second @ inverse.swapaxes(1, 2))
+    vector = inverse.swapaxes(1, 2) @ vector
     space = vector[:, 0, :, None] * p_s[:, None] + vector[:, 1, :, None] * p_t[:, None]
     return np.arctan2(space[..., 1], space[..., 0]), curvature
 

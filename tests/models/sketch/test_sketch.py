@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import struct
 import zlib
 
@@ -10,6 +11,7 @@ import places
 import pytest
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.instance.angles import line_difference, line_of
+from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.sketch.bitmap import read_picture
 from crossfield.models.sketch.cover import Frame, block_means, cover_by_segments, fit_frame
 from crossfield.models.sketch.curves import bounding_box, flatten
@@ -794,6 +796,19 @@ def test_name_source_and_gauge_of_a_file(tmp_path):
     assert read_sketch(path).sha256 == read_sketch(path).sha256
     with pytest.raises(CrossfieldError, match="the name 'Other' is not allowed"):
         read_sketch(path, name="Other")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="has no such file names")
+@for_each(
+    "name, source",
+    [("a\x1b[31mb.svg", r"a\x1b[31mb.svg"), ("a\n b.svg", "a b.svg"), ("a\u202eb.svg", r"a\u202eb.svg")],
+)
+def test_a_file_name_that_no_terminal_should_print_is_escaped_in_the_source(tmp_path, name, source):
+    path = tmp_path / name
+    path.write_bytes(svg(LINE))
+    instance = read_sketch(path, size=6)
+    assert instance.source == source
+    assert read_instance(write_instance(instance, tmp_path / "a.json")).sha256 == instance.sha256
 
 
 def test_the_content_decides_what_a_file_is(tmp_path):

@@ -1,0 +1,60 @@
+"""Memory that is free for this process, where the system states it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+
+def available_memory(root: Path = Path("/")) -> int | None:
+    """Bytes that can be had without swapping, or None where the system does not state them, as on Windows.
+
+    On Linux, the least of what the machine and each control group of the process have left: a container is
+    limited by its group. Elsewhere, all memory of the machine. root: where `proc` and `sys` lie.
+    """
+    try:
+        text = (root / "proc/meminfo").read_text("ascii")
+        machine = 1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0])
+    except (OSError, ValueError, IndexError):
+        return _all_memory()
+    return min([machine, *_left_in_groups(root)])
+
+
+def _all_memory() -> int | None:
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _left_in_groups(root: Path) -> Iterator[int]:
+    """What each control group with a limit has left, of version 2 and of version 1, from the inside out."""
+    try:
+        lines = (root / "proc/self/cgroup").read_text("utf-8").splitlines()
+    except (OSError, ValueError):
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if not controllers:
+            names = ("memory.max", "memory.current", "inactive_file")
+            yield from _left(root / "sys/fs/cgroup", path, *names)
+        elif "memory" in controllers.split(","):
+            names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+            yield from _left(root / "sys/fs/cgroup/memory", path, *names)
+
+
+def _left(top: Path, path: str, limit: str, used: str, cache: str) -> Iterator[int]:
+    """What the group at a path below `top` and its parents have left; files that it caches count as free."""
+    inner = top / path.lstrip("/")
+    for folder in (inner, *inner.parents):
+        if folder.is_relative_to(top):
+            try:
+                most, now = (int((folder / name).read_text("ascii")) for name in (limit, used))
+                cached = re.findall(
+                    rf"^{cache} (\d+)$", (folder / "memory.stat").read_text("ascii"), re.MULTILINE
+                )
+            except (OSError, ValueError):  # "max" for no limit, or no such group in this container
+                continue
+            yield max(0, most - now + int(cached[0] if cached else 0))

@@ -1,0 +1,89 @@
+"""Sketches as a library publishes them: their content, and the suffix of their file."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ..errors import InputError
+from ..input_limits import MAX_DATA
+from ..instance.grid import Floats
+from .curves import Curves, bounding_box, lines_as_cubics
+from .read import kind_of, suffix_of_picture
+from .svg import read_svg
+
+_LINE: Final = 400  # widths of a line on the longer side of the drawing
+_RED: Final = ' stroke="#c8102e"'
+
+
+def published(data: bytes, suffix: str) -> tuple[bytes, str]:
+    """Content under which a sketch is published, and the suffix that its file then has.
+
+    data: content of the file; suffix: of its name, for content that does not show its kind. An SVG drawing is
+    drawn again from the strokes that were read, so that no script, link, style or text of the file is
+    published. Other kinds run nothing and stay as they are. The suffix follows from the content. What is
+    published once stays as it is when it is published again. Raises InputError for a drawing that cannot be
+    read or that is too large.
+    """
+    kind = kind_of(data, suffix)
+    if kind == "svg":
+        return redrawn(read_svg(data)), ".svg"
+    return data, suffix_of_picture(data) if kind == "picture" else f".{kind}"
+
+
+def redrawn(curves: Curves) -> bytes:
+    """SVG of these curves alone. Reading it gives the same numbers, but for control points of straight lines.
+
+    Red strokes are red and all others are black, in lines of one width. Raises InputError for more than
+    MAX_DATA characters.
+    """
+    left, top, right, bottom = bounding_box(curves.points)
+    box = curves.canvas or (left, top, right - left, bottom - top)
+    page = f' viewBox="{_numbers(np.array(box))}"' if curves.canvas else ""
+    root = (
+        f'<svg xmlns="http://www.w3.org/2000/svg"{page} fill="none" stroke="#000" '
+        f'stroke-width="{max(box[2:]) / _LINE:.3g}" stroke-linecap="round" stroke-linejoin="round">'
+    )
+    lines = [
+        root,
+        *(f'<path{_RED if red else ""} d="{"".join(data)}"/>' for red, data in _paths(curves)),
+        "</svg>\n",
+    ]
+    if sum(map(len, lines)) > MAX_DATA:
+        raise InputError(f"has paths of more than {MAX_DATA} characters; simplify the drawing")
+    return "\n".join(lines).encode()
+
+
+def _paths(curves: Curves) -> list[tuple[bool, list[str]]]:
+    """Path data by path: of runs in order that have one colour and one letter and do not touch.
+
+    A reader lists lines of a path before its cubics, and joins runs of a path that touch.
+    """
+    starts = np.flatnonzero(np.diff(curves.curve, prepend=-1)).tolist()
+    found: list[tuple[bool, list[str]]] = []
+    before: tuple[bool, bool] | None = None
+    end: list[float] = []
+    for first, after in pairwise([*starts, len(curves.points)]):
+        run, red = curves.points[first:after], bool(curves.red[first])
+        straight = _is_straight(run)
+        if (red, straight) != before or run[0, 0].tolist() == end:
+            found.append((red, []))
+        found[-1][1].append(_data(run, straight=straight))
+        before, end = (red, straight), run[-1, 3].tolist()
+    return found
+
+
+def _is_straight(run: Floats) -> bool:
+    return np.allclose(run, lines_as_cubics(run[:, 0], run[:, 3]), rtol=1e-9, atol=0)
+
+
+def _data(run: Floats, *, straight: bool) -> str:
+    moves = run[:, 3:] if straight else run[:, 1:]
+    return f"M{_numbers(run[0, 0])}{'L' if straight else 'C'}{_numbers(moves)}"
+
+
+def _numbers(values: Floats) -> str:
+    """Numbers with all digits, so that the same ones are read back."""
+    return " ".join(repr(value).removesuffix(".0") for value in values.ravel().tolist()).replace(" -", "-")
