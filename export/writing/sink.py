@@ -17,6 +17,7 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -44,17 +45,28 @@ _TAIL: Final = b"\x03\0"
 
 def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
     """Size and SHA-256 of the file now at `path`, compressed when it ends in .gz. Raises OutputError."""
+    with saving(path, chunks) as facts:
+        return facts
+
+
+@contextmanager
+def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
+    """Size and SHA-256 of a file that takes its name at the end of the context, as `save` writes it.
+
+    The bytes are written, beside, when the context begins. An error inside it leaves no file.
+    """
     digest, size = hashlib.sha256(), 0
 
     def hash_all(share: list[bytes]) -> None:
         for chunk in share:
             digest.update(chunk)
 
-    with replacing(path) as stream, _Beside(hash_all, stream.writelines) as beside:
-        for share, length in gathered(gzipped(chunks) if path.suffix == ".gz" else chunks, SHARE):
-            beside(share, wait=length < SHARE)
-            size += length
-    return {"bytes": size, "sha256": digest.hexdigest()}
+    with replacing(path) as stream:
+        with _Beside(hash_all, stream.writelines) as beside:
+            for share, length in gathered(gzipped(chunks) if path.suffix == ".gz" else chunks, SHARE):
+                beside(share, wait=length < SHARE)
+                size += length
+        yield {"bytes": size, "sha256": digest.hexdigest()}
 
 
 class _Beside:
