@@ -246,6 +246,7 @@ class _Sets:
     def begin(self, problem: Problem) -> Callable[[], Manifest]:
         """A function that waits for the files of a problem, which the threads now write: their manifest."""
         stem = f"{self.instance.name}.{problem.name}"
+        problem.complete()  # the threads share it
         files = {name: self._submit(problem, stem, name) for name in self.formats}
 
         def manifest() -> Manifest:

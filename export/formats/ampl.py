@@ -16,10 +16,14 @@ itself is not free; no test runs it.
 
 Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
 ends with comments that print an answer under our names, as a solution file that is read back.
+
+Counted while the .dat is written, because columns and rows are sums over sets: pixels, strokes, crossings,
+jumps other than 0, and elements with narrowed bounds. The .mod holds no data.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -28,13 +32,14 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from ...models.formulations.problem import Block, PlacedFamily, Problem
-from ...models.formulations.symbols import IndexSet, Variable, pixel_of
+from ...models.formulations.symbols import IndexSet, Variable, elements, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
+from ..writing.counting import Expected, check
 from ..writing.names import name_length
-from ..writing.records import Decimals, Pieces, Words, number, render, table, words
+from ..writing.records import Counted, Decimals, Pieces, Words, number, render, table, words
 from .indexed import Indexed, check_indexed, described, narrowed
 
 SECOND: Final = "r - north[h], c + east[h]"
@@ -87,36 +92,42 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 
 def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     """The bytes of the .dat file, block by block. header: lines of comment, without the comment sign."""
-    instance = problem.instance
+    instance, counts = problem.instance, Counter[str]()
     for line in header:
         yield f"# {line}\n".encode()
     yield b"data;\nset I :=\n"
     rows, columns = _place(instance, "pixels")
-    yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
+    yield from render(
+        [Counted(counts, "pixels"), b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows)
+    )
     yield b";\nparam: S_c: theta w :=\n"
-    yield from _listed(instance, "strokes", [words(instance.target), b" ", words(instance.w)])
+    strokes: Pieces = [Counted(counts, "strokes", words(instance.w))]
+    yield from _listed(instance, "strokes", [words(instance.target), b" ", *strokes])
     if len(instance.crossings):
         yield b";\nparam: S_x: theta_x w_x :=\n"
-        yield from _listed(
-            instance, "crossings", [words(instance.cross_target), b" ", words(instance.w_cross)]
-        )
+        crossings: Pieces = [Counted(counts, "crossings", words(instance.w_cross))]
+        yield from _listed(instance, "crossings", [words(instance.cross_target), b" ", *crossings])
     weights = f"param w_strokes := {number(instance.w_strokes)};\nparam w_beta := {number(instance.w_beta)};"
     yield b";\n" + weights.encode() + b"\n"
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"
-        yield from _listed(instance, "pairs", [words(problem.jumps[at].astype(np.float64))], at)
+        jumps = Counted(counts, "jumps", words(problem.jumps[at].astype(np.float64)))
+        yield from _listed(instance, "pairs", [jumps], at)
         yield b";\n"
-    yield from _windows(problem)
+    yield from _windows(problem, counts)
     yield b"end;\n"
+    narrow = {f"bounds of {over}": elements(instance, over) for over in narrowed(problem)}
+    check(counts, Expected(problem).data() | narrow)
 
 
-def _windows(problem: Problem) -> Iterator[bytes]:
+def _windows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
     """The windows, and the ranges of jumps that are variables, where they are narrower than the gauge's."""
     for over, names in narrowed(problem).items():
         yield f"param: {' '.join(names)} :=\n".encode()
         values = (words(problem.data[name].astype(np.float64)) for name in names)
-        yield from _listed(problem.instance, over, [part for each in values for part in (b" ", each)][1:])
+        parts = [part for each in values for part in (b" ", each)][1:]
+        yield from _listed(problem.instance, over, [Counted(counts, f"bounds of {over}"), *parts])
         yield b";\n"
 
 

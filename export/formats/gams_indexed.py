@@ -13,10 +13,14 @@ label and no pair. Names are not told apart by case (G4), so the set is S_c and 
 functions of GAMS, but a declared symbol of that name wins, so that variables keep the names of the paper
 (tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
 the scalar layout (gams_scalar.py).
+
+Counted while writing, because columns and rows are sums over sets: pixels in the runs, strokes and crossings
+with a direction, reliabilities other than 0, jumps other than 0, and narrowed bounds.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -24,13 +28,14 @@ import numpy as np
 import sympy as sp
 
 from ...models.formulations.problem import Block, PlacedFamily, Problem
-from ...models.formulations.symbols import IndexSet, Variable
+from ...models.formulations.symbols import IndexSet, Variable, elements
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
+from ..writing.counting import Expected, check
 from ..writing.names import element_names
-from ..writing.records import Bytes, Piece, Words, number, render, words
+from ..writing.records import Bytes, Counted, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
 from .indexed import Indexed, check_indexed, described, narrowed
 
@@ -50,19 +55,19 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
 
     Raises UnsupportedByFormatError for a weight that solvers would drop, and for columns fixed.
     """
-    problem, instance = form.problem, form.problem.instance
+    problem, instance, counts = form.problem, form.problem.instance, Counter[str]()
     check_indexed(problem, "gms in indexed layout", "the scalar layout")
     blocks = {
-        "pixels": _pixels(instance),
-        "theta": _data(keys(instance, "strokes"), instance.target),
-        "w": _data(keys(instance, "strokes"), instance.w),
-        "theta_x": _data(keys(instance, "crossings"), instance.cross_target),
-        "w_x": _data(keys(instance, "crossings"), instance.w_cross),
-        "jumps": _jumps(problem),
+        "pixels": _pixels(instance, counts),
+        "theta": _data(keys(instance, "strokes"), instance.target, counts, "strokes"),
+        "w": _data(keys(instance, "strokes"), instance.w, counts, "reliabilities of strokes"),
+        "theta_x": _data(keys(instance, "crossings"), instance.cross_target, counts, "crossings"),
+        "w_x": _data(keys(instance, "crossings"), instance.w_cross, counts, "reliabilities of crossings"),
+        "jumps": _jumps(problem, counts),
         "start": () if start is None else _start(problem, start),
         "results": _results(problem),
         **{
-            name: _data(keys(instance, over), problem.data[name].astype(np.float64))
+            name: _data(keys(instance, over), problem.data[name].astype(np.float64), counts, name)
             for over, names in narrowed(problem).items()
             for name in names
         },
@@ -72,6 +77,10 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     yield from stream(
         "models/gams_indexed.gms.j2", blocks, header=header, stamp=problem.stamp, start=objective, **context
     )
+    listed = Expected(problem).data()
+    bounds = {name: elements(instance, over) for over, names in narrowed(problem).items() for name in names}
+    reliable = {f"reliabilities of {what} other than 0": listed[what] for what in ("strokes", "crossings")}
+    check(counts, listed | bounds | reliable)
 
 
 def _data_context(problem: Problem) -> dict[str, Any]:
@@ -118,7 +127,7 @@ def _label_width(instance: Instance) -> int:
     return int(keys(instance, "pixels").shape[1]) // 2
 
 
-def _pixels(instance: Instance) -> Iterator[bytes]:
+def _pixels(instance: Instance, counts: Counter[str]) -> Iterator[bytes]:
     """The mask, one run of pixels a line: `00.(02*07)`."""
     grid, pixels, width = instance.grid, keys(instance, "pixels"), _label_width(instance)
     breaks = np.nonzero((np.diff(grid.rows) != 0) | (np.diff(grid.columns) != 1))[0]
@@ -128,24 +137,31 @@ def _pixels(instance: Instance) -> Iterator[bytes]:
         for part in (pixels[first, :width], pixels[first, width + 1 :], pixels[last, width + 1 :])
     )
     yield from render([row, b".(", begin, b"*", end, b")\n"], len(first))
+    counts["pixels"] += int((last - first + 1).sum())
 
 
-def _data(elements: Bytes, values: Floats) -> Iterator[bytes]:
-    """One value a line: `00.02 0.3`."""
-    return render([Words(elements, None), b" ", words(values), b"\n"], len(elements))
+def _data(listed: Bytes, values: Floats, counts: Counter[str], what: str) -> Iterator[bytes]:
+    """One value per line: `00.02 0.3`. Lines, and those whose value is not 0, are counted."""
+    key = Counted(counts, what, Words(listed, None))
+    value = Counted(counts, f"{what} other than 0", words(values))
+    return render([key, b" ", value, b"\n"], len(listed))
 
 
-def _jumps(problem: Problem) -> Iterator[bytes]:
+def _jumps(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
     if problem.jumps is not None:
         at = np.nonzero(problem.jumps)[0]
-        yield from _data(keys(problem.instance, "pairs")[at], problem.jumps[at].astype(np.float64))
+        yield from _data(
+            keys(problem.instance, "pairs")[at], problem.jumps[at].astype(np.float64), counts, "jumps"
+        )
 
 
 def _start(problem: Problem, start: Floats) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
             yield f"Parameter start_{block.name}({DOMAINS[block.over]}) /\n".encode()
-            yield from _data(keys(problem.instance, block.over), start[block.columns])
+            level = words(start[block.columns])
+            key = Words(keys(problem.instance, block.over), None)
+            yield from render([key, b" ", level, b"\n"], block.count)
             over = SETS[block.over]
             yield f"/;\n{block.name}.l({over}) = start_{block.name}({over});\n".encode()
 

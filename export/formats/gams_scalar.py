@@ -20,10 +20,14 @@ a minus would stand. Without a solution they are the start, so look at the statu
 column in no term, which is not in GAMS's model (G11).
 
 G-numbers: docs/format-rules.md.
+
+Counted while writing: declared columns, columns with bounds, declared rows, rows with an expression, and the
+places of columns in the expressions of objective and rows.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -35,9 +39,11 @@ from ...models.formulations.problem import Block, PlacedFamily, Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
+from ..writing.counting import Expected, check
 from ..writing.expressions import Language, is_data, wrapped
 from ..writing.names import Names
 from ..writing.records import (
+    Counted,
     Piece,
     Tagged,
     Texts,
@@ -73,13 +79,13 @@ WIDTH: Final = 160
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the GAMS file, block by block. header: lines of comment. start: a point (columns,)."""
-    problem, names = form.problem, form.names
+    problem, names, counts = form.problem, form.names, Counter[str]()
     blocks = {
-        "variables": _variables(form),
-        "equations": _equations(problem, names),
-        "objective": _objective(problem, names),
-        "rows": _rows(problem, names),
-        "bounds": _bounds(problem, names),
+        "variables": _variables(form, counts),
+        "equations": _equations(problem, names, counts),
+        "objective": _objective(problem, names, counts),
+        "rows": _rows(problem, names, counts),
+        "bounds": _bounds(problem, names, counts),
         "start": () if start is None else _start(problem, names, start),
         "results": _results(problem, names),
     }
@@ -91,6 +97,18 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         stamp=problem.stamp,
         model_type=MODEL_TYPES[problem.problem_class],
         start=objective,
+    )
+    expected = Expected(problem, degree=0)
+    check(
+        counts,
+        {
+            "columns": expected.columns,
+            "columns with bounds": expected.columns,
+            "rows": expected.rows,
+            "rows with an expression": expected.rows,
+            "columns in the objective": expected.declared,
+            "columns in rows": expected.declared_rows,
+        },
     )
 
 
@@ -108,13 +126,16 @@ def bracketed(values: Floats) -> Texts:
 class Scalar(Language):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
-    def __init__(self, family: PlacedFamily, names: Names) -> None:
+    def __init__(self, family: PlacedFamily, names: Names, counts: Counter[str]) -> None:
+        """counts: of the places where columns stand."""
         self._family = family
         self._names = names
+        self._counts = counts
+        self._where = "columns in rows" if family.family.is_row else "columns in the objective"
 
     def symbol(self, symbol: sp.Symbol) -> Piece:
         """A column's name at each element."""
-        return self._names.at(self._family, symbol)
+        return Counted(self._counts, self._where, self._names.at(self._family, symbol))
 
     def is_data(self, expression: sp.Expr) -> bool:
         """Whether it holds no column."""
@@ -140,8 +161,13 @@ def _number_words(values: Floats | float, *, signed: bool) -> Piece:
     return words(given, with_sign if signed else bracketed)
 
 
-def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]:
-    """A statement that declares names, given as lists with their lengths, as one wrapped list."""
+def declared(
+    keyword: bytes, lists: list[tuple[Tagged, int]], counts: Counter[str], what: str
+) -> Iterator[bytes]:
+    """A statement that declares names as one wrapped list.
+
+    lists: the names, with their numbers. counts: adds them up under `what`.
+    """
     per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
     total = sum(count for _, count in lists)
     yield keyword + b"\n  "
@@ -149,45 +175,51 @@ def declared(keyword: bytes, lists: list[tuple[Tagged, int]]) -> Iterator[bytes]
     for name, count in lists:
         place = np.arange(start + 1, start + count + 1)
         separator = np.where(place == total, 2, place % per_line == 0)
-        yield from render([name, Words(table([b", ", b",\n  ", b";\n"]), separator)], count)
+        yield from render(
+            [Counted(counts, what, name), Words(table([b", ", b",\n  ", b";\n"]), separator)], count
+        )
         start += count
 
 
 KEYWORDS: Final = {"continuous": b"Variables", "binary": b"Binary Variables", "integer": b"Integer Variables"}
 
 
-def _variables(form: Canonical) -> Iterator[bytes]:
+def _variables(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
     for block in form.problem.blocks.values():
         if block.count:
-            yield from declared(KEYWORDS[form.kind(block)], [(form.names.of(block), block.count)])
+            lists = [(form.names.of(block), block.count)]
+            yield from declared(KEYWORDS[form.kind(block)], lists, counts, "columns")
 
 
-def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
+def _equations(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     if problem.rows:
-        yield from declared(b"Equations", [(names.row(family), family.count) for family in problem.rows])
+        lists = [(names.row(family), family.count) for family in problem.rows]
+        yield from declared(b"Equations", lists, counts, "rows")
 
 
-def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
+def _objective(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     """The terms of the objective, one line an element (more when it is long)."""
     for family in problem.objective:
-        terms = Scalar(family, names).summands(family.family.expression)
+        terms = Scalar(family, names, counts).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)
 
 
-def _rows(problem: Problem, names: Names) -> Iterator[bytes]:
+def _rows(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     for family in problem.rows:
-        language, relation = Scalar(family, names), family.family.expression
+        language, relation = Scalar(family, names, counts), family.family.expression
         left, right = language.expression(relation.lhs), language.expression(relation.rhs)
-        parts = [names.row(family), b".. ", *left, SENSES[family.family.sense], *right, b";\n"]
+        head: list[Piece] = [Counted(counts, "rows with an expression", names.row(family)), b".. "]
+        parts = [*head, *left, SENSES[family.family.sense], *right, b";\n"]
         yield from render(parts, family.count)
 
 
-def _bounds(problem: Problem, names: Names) -> Iterator[bytes]:
+def _bounds(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     for block in problem.blocks.values():
         fixed = block.lower == block.upper
         for chosen, suffixes in ((fixed, ("fx",)), (~fixed, ("lo", "up"))):
             at = np.nonzero(chosen)[0]
-            yield from render(_bound_parts(block, names, at, suffixes), len(at))
+            parts = [Counted(counts, "columns with bounds"), *_bound_parts(block, names, at, suffixes)]
+            yield from render(parts, len(at))
 
 
 def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[str, ...]) -> list[Piece]:

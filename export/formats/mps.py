@@ -12,50 +12,70 @@
     ENDATA
 
 The objective's constant is the cost of a column ONE fixed to 1. M-numbers: docs/format-rules.md.
+
+Counted while writing, without ONE: columns with their costs, columns with their bounds, costs and
+coefficients of rows other than 0, products of the objective and of rows (one half of each), and rows.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
 from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
 from ...models.formulations.symbols import SLOTS, pixel_of
-from ...models.instance.grid import Bools, Grid, Ints
+from ...models.instance.grid import Bools, Floats, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
+from ..writing.counting import Expected, check
 from ..writing.names import Names, problem_name
-from ..writing.records import OnlyWhere, Piece, Pieces, Tagged, number, render, scalar_when_constant, words
+from ..writing.records import (
+    Counted,
+    OnlyWhere,
+    Piece,
+    Pieces,
+    Tagged,
+    number,
+    render,
+    scalar_when_constant,
+    words,
+)
 
 _KIND = {">=": b"G", "<=": b"L", "==": b"E"}
+_ENTRIES = "coefficients of rows"
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     """The bytes of the MPS file, block by block. header: lines of comment, without the comment sign."""
-    problem, names = form.problem, form.names
+    problem, names, counts = form.problem, form.names, Counter[str]()
     for line in header:
         yield f"* {line}\n".encode()
     yield f"NAME {problem_name(problem)} FREE\nROWS\n N obj\n".encode()
     if not problem.rows:
         yield b" E c_ONE\n"
     for family in problem.rows:
-        yield from render([b" " + _KIND[family.family.sense] + b" ", names.row(family), b"\n"], family.count)
+        name = Counted(counts, "rows", names.row(family))
+        yield from render([b" " + _KIND[family.family.sense] + b" ", name, b"\n"], family.count)
     yield b"COLUMNS\n"
-    yield from _columns(form)
+    yield from _columns(form, counts)
     yield b"RHS\n"
     yield from _right_sides(problem, names)
     yield b"BOUNDS\n"
     for block in problem.blocks.values():
-        yield from _bounds(block, names)
+        yield from _bounds(block, names, counts)
     if form.has_one:
         yield b" FX BND1 ONE 1\n"
-    yield from _objective_matrix(form)
+    products = form.products()
+    yield from _objective_matrix(names, products, counts)
     for family in problem.rows:
-        yield from _row_matrices(family, names)
+        yield from _row_matrices(family, names, counts)
     yield b"ENDATA\n"
+    expected = Expected(problem)
+    check(counts, expected.as_coefficients(products[1]) | {"columns with bounds": expected.columns})
 
 
-def _columns(form: Canonical) -> Iterator[bytes]:
+def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
     """Matrix entries column by column; a record is a column: its cost first, then by row."""
     problem, names = form.problem, form.names
     rows = {family.family.tag: names.row(family) for family in problem.rows}
@@ -68,9 +88,10 @@ def _columns(form: Canonical) -> Iterator[bytes]:
             entries = [
                 entry
                 for family in problem.rows
-                for entry in _entries(family, block, name, rows[family.family.tag])
+                for entry in _entries(family, block, name, rows[family.family.tag], counts)
             ]
-            yield from render([b" ", name, b" obj ", cost, b"\n", *entries], block.count)
+            head: Pieces = [b" ", Counted(counts, "columns", name), b" obj "]
+            yield from render([*head, Counted(counts, "linear costs", cost), b"\n", *entries], block.count)
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
@@ -80,17 +101,19 @@ def _columns(form: Canonical) -> Iterator[bytes]:
             yield b" ONE c_ONE 1\n"
 
 
-def _entries(family: PlacedFamily, block: Block, name: Tagged, rows: Tagged) -> Iterator[Piece | OnlyWhere]:
+def _entries(
+    family: PlacedFamily, block: Block, name: Tagged, rows: Tagged, counts: Counter[str]
+) -> Iterator[Piece | OnlyWhere]:
     """The lines of a column of a block for the rows of a family, in the order of rows."""
     chosen = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
     lines = [line for term in chosen for line in _incident(family, term)]
     for _, row, term in sorted(lines, key=lambda line: line[0]):
         value = words(coefficient(term))
         if row is None:
-            line: Pieces = [b" ", name, b" ", rows, b" ", value, b"\n"]
+            line: Pieces = [b" ", name, b" ", rows, b" ", Counted(counts, _ENTRIES, value), b"\n"]
             yield from line
         else:
-            at_row = value if isinstance(value, bytes) else value.at(row)
+            at_row = Counted(counts, _ENTRIES, value if isinstance(value, bytes) else value.at(row))
             yield OnlyWhere(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
 
 
@@ -147,7 +170,7 @@ def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
         yield from render([b" RHS1 ", names.row(family).at(at), b" ", value, b"\n"], len(at))
 
 
-def _bounds(block: Block, names: Names) -> Iterator[bytes]:
+def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     """Bounds kind by kind; within a kind one record a column, two lines where both ends are named."""
     low, high = np.isfinite(block.lower), np.isfinite(block.upper)
     fixed = block.lower == block.upper
@@ -161,7 +184,7 @@ def _bounds(block: Block, names: Names) -> Iterator[bytes]:
     for chosen, first, second in kinds:
         at = np.nonzero(chosen)[0]
         name = names.of(block) if len(at) == block.count else names.of(block).at(at)
-        parts: list[Piece] = []
+        parts: list[Piece] = [Counted(counts, "columns with bounds")]
         for kind in filter(None, (first, second)):
             value = {b"FX": block.lower, b"LO": block.lower, b"UP": block.upper}.get(kind)
             parts += [b" " + kind + b" BND1 ", name]
@@ -171,19 +194,19 @@ def _bounds(block: Block, names: Names) -> Iterator[bytes]:
         yield from render(parts, len(at))
 
 
-def _objective_matrix(form: Canonical) -> Iterator[bytes]:
-    index, factor = form.products()
+def _objective_matrix(names: Names, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
+    index, factor = products
     if not len(factor):
         return
-    hessian, names = np.where(index[:, 0] == index[:, 1], 2 * factor, factor), form.names
+    hessian = np.where(index[:, 0] == index[:, 1], 2 * factor, factor)
+    value = Counted(counts, "products of the objective", words(hessian))
     yield b"QUADOBJ\n"
     yield from render(
-        [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", words(hessian), b"\n"],
-        len(index),
+        [b" ", names.all.at(index[:, 0]), b" ", names.all.at(index[:, 1]), b" ", value, b"\n"], len(index)
     )
 
 
-def _row_matrices(family: PlacedFamily, names: Names) -> Iterator[bytes]:
+def _row_matrices(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[bytes]:
     products = family.of_degree(2)
     if not products:
         return
@@ -191,5 +214,7 @@ def _row_matrices(family: PlacedFamily, names: Names) -> Iterator[bytes]:
     for term in products:
         first, second = (names.at(family, symbol) for symbol in term.symbols)
         half = words(np.asarray(coefficient(term)) / 2)
-        parts += [b" ", first, b" ", second, b" ", half, b"\n", b" ", second, b" ", first, b" ", half, b"\n"]
+        counted = Counted(counts, "products of rows", half)
+        parts += [b" ", first, b" ", second, b" ", counted, b"\n"]
+        parts += [b" ", second, b" ", first, b" ", half, b"\n"]
     yield from render(parts, family.count)

@@ -17,10 +17,14 @@ Segments: C (rows), O, x (start), r, b, k (cumulative column counts, N4), J, G; 
 (N6). Opcodes: o0 + , o2 * , o5 power, o16 minus, o46 cos, o54 sum of three or more (N14). The objective is
 written as declared, factored, with its constant inside; of a nonlinear row the linear part stands in J and
 the constant in r. Binary: one letter, little-endian int32 and float64.
+
+Counted while writing: columns (b), rows (C, r and J), costs (G) and coefficients of rows (J) other than 0,
+places of columns in the objective's tree (O) and factors of the rows' products (C).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -30,23 +34,47 @@ import sympy as sp
 from ...models.formulations.problem import Monomial, PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
+from ..writing.counting import Expected, check
 from ..writing.expressions import is_data, split
 from ..writing.names import OBJECTIVE, name_length
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
-from ..writing.records import Decimals, Pieces, Raw, check_coefficients, render, scalar_when_constant, words
+from ..writing.records import (
+    Counted,
+    Decimals,
+    Part,
+    Piece,
+    Pieces,
+    Raw,
+    check_coefficients,
+    render,
+    scalar_when_constant,
+    words,
+)
 
 __all__ = ["Layout", "generate"]
 
 ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
+_FACTORS: Final = "factors of products in rows"
 _FUNCTIONS: Final = {sp.cos: COSINE}
 
 
-class Text:
+class Tokens:
+    """What both forms share: `counts` of what one file holds."""
+
+    def __init__(self) -> None:
+        self.counts = Counter[str]()
+
+
+class Text(Tokens):
     """Tokens of the text form, each on its own line."""
 
     letter = b"g"
     arith = 0
     padded = True
+
+    def number(self, value: Floats | float) -> bytes | Part:
+        """A number inside of a record."""
+        return words(value)
 
     def segment(self, name: bytes, *numbers: int | Ints) -> Pieces:
         """The head of a segment: its letter and integers."""
@@ -56,9 +84,9 @@ class Text:
             parts.append(_decimal(value))
         return [*parts, b"\n"]
 
-    def entry(self, index: Ints, value: Floats | float) -> Pieces:
+    def entry(self, index: Ints, number: Piece) -> Pieces:
         """An index and a number."""
-        return [Decimals(index), b" ", words(value), b"\n"]
+        return [Decimals(index), b" ", number, b"\n"]
 
     def integer(self, value: Ints) -> Pieces:
         """An integer of the segment k."""
@@ -85,20 +113,24 @@ class Text:
         return [b"n", words(value), b"\n"]
 
 
-class Binary:
+class Binary(Tokens):
     """Tokens of the binary form: one letter, then little-endian int32 and float64."""
 
     letter = b"b"
     arith = 1
     padded = False
 
+    def number(self, value: Floats | float) -> bytes | Part:
+        """A number inside of a record."""
+        return _float64(value)
+
     def segment(self, name: bytes, *numbers: int | Ints) -> Pieces:
         """The head of a segment: its letter and integers."""
         return [name, *map(_int32, numbers)]
 
-    def entry(self, index: Ints, value: Floats | float) -> Pieces:
+    def entry(self, index: Ints, number: Piece) -> Pieces:
         """An index and a number."""
-        return [_int32(index), _float64(value)]
+        return [_int32(index), number]
 
     def integer(self, value: Ints) -> Pieces:
         """An integer of the segment k."""
@@ -137,20 +169,29 @@ def generate(form: Canonical, *, binary: bool = False, start: Floats | None = No
         body = _sum(
             code, [_monomial(layout, code, term) for term in nonlinear_terms(family)]
         ) or code.constant(0.0)
-        yield from render(
-            [*code.segment(b"C", np.arange(first, first + family.count, dtype=np.int32)), *body],
-            family.count,
-            padded=code.padded,
-        )
+        head = code.segment(b"C", np.arange(first, first + family.count, dtype=np.int32))
+        yield from render([Counted(code.counts, "rows"), *head, *body], family.count, padded=code.padded)
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
         yield from _once(code, code.segment(b"x", problem.columns))
-        parts = code.entry(np.arange(problem.columns, dtype=np.int32), start[layout.order])
+        parts = code.entry(np.arange(problem.columns, dtype=np.int32), code.number(start[layout.order]))
         yield from render(parts, problem.columns, padded=code.padded)
     yield from _limits(layout, code)
     yield from _bounds(layout, code)
     yield from _jacobian(layout, code)
+    expected = Expected(problem, degree=1)
+    check(
+        code.counts,
+        dict.fromkeys(("rows", "rows with limits", "rows with coefficients"), expected.rows)
+        | {
+            "columns": expected.columns,
+            "linear costs": expected.costs(noise=True),
+            "columns in the objective's tree": expected.declared,
+            "coefficients of rows": expected.nonzeros(1),
+            _FACTORS: expected.factors,
+        },
+    )
 
 
 def _header(layout: Layout, code: Encoder) -> bytes:
@@ -192,7 +233,7 @@ def _tree(layout: Layout, code: Encoder, family: PlacedFamily, expression: sp.Ex
     if is_data(family, expression):
         return code.constant(family.data(expression))
     if expression.is_Symbol:
-        return code.variable(layout.places(family, expression))
+        return _counted(code, "columns in the objective's tree", layout.places(family, expression))
     if expression.is_Add or expression.is_Mul:
         return _chain(layout, code, family, expression)
     if expression.is_Pow:
@@ -231,8 +272,13 @@ def _monomial(layout: Layout, code: Encoder, term: Monomial) -> Pieces:
     parts: list[Any] = [*code.operator(MULTIPLY), *code.constant(coefficient(term))]
     *others, last = (layout.places(term.family, symbol) for symbol in term.symbols)
     for factor in others:
-        parts += [*code.operator(MULTIPLY), *code.variable(factor)]
-    return [*parts, *code.variable(last)]
+        parts += [*code.operator(MULTIPLY), *_counted(code, _FACTORS, factor)]
+    return [*parts, *_counted(code, _FACTORS, last)]
+
+
+def _counted(code: Encoder, what: str, column: Ints) -> Pieces:
+    """A variable, counted."""
+    return [Counted(code.counts, what), *code.variable(column)]
 
 
 def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
@@ -241,8 +287,9 @@ def _limits(layout: Layout, code: Encoder) -> Iterator[bytes]:
     yield from _once(code, code.segment(b"r"))
     for family in layout.rows:
         kind = {">=": 2, "<=": 1, "==": 4}[family.family.sense]
+        bound = code.bound(kind, scalar_when_constant(family.limit))
         yield from render(
-            code.bound(kind, scalar_when_constant(family.limit)), family.count, padded=code.padded
+            [Counted(code.counts, "rows with limits"), *bound], family.count, padded=code.padded
         )
 
 
@@ -258,9 +305,8 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
         for part in runs(kind):
             low, high = scalar_when_constant(lower[part]), scalar_when_constant(upper[part])
             values = {0: (low, high), 1: (high,), 2: (low,), 3: ()}[int(kind[part.start])]
-            yield from render(
-                code.bound(int(kind[part.start]), *values), part.stop - part.start, padded=code.padded
-            )
+            bound = [Counted(code.counts, "columns"), *code.bound(int(kind[part.start]), *values)]
+            yield from render(bound, part.stop - part.start, padded=code.padded)
 
 
 def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
@@ -299,15 +345,18 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
         )
     first = 0
     for family, entries in rows:
-        parts = list(code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries)))
+        head = code.segment(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
+        parts = [Counted(code.counts, "rows with coefficients"), *head]
         for symbol, value in entries:
-            parts += code.entry(layout.places(family, symbol), value)
+            number = Counted(code.counts, "coefficients of rows", code.number(value))
+            parts += code.entry(layout.places(family, symbol), number)
         yield from render(parts, family.count, padded=code.padded)
         first += family.count
     place, costs = _gradient(layout)
     if len(place):
         yield from _once(code, code.segment(b"G", 0, len(place)))
-        yield from render(code.entry(place, costs), len(place), padded=code.padded)
+        number = Counted(code.counts, "linear costs", code.number(costs))
+        yield from render(code.entry(place, number), len(place), padded=code.padded)
 
 
 def _once(code: Encoder, parts: Pieces) -> Iterator[bytes]:

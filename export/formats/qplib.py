@@ -24,10 +24,14 @@ those.
 
 Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic
 programming instances, Mathematical Programming Computation 11 (2019).
+
+Counted while writing: names of columns and of rows, costs other than 0 (the usual one for every column that
+is not listed), products of the objective and of rows, and coefficients of rows other than 0.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -36,19 +40,22 @@ import numpy as np
 from ...models.formulations.problem import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
+from ..writing.counting import Expected, check
 from ..writing.curvature import probtype
-from ..writing.records import Decimals, number, render, words
+from ..writing.records import Counted, Decimals, Piece, number, render, words
 
 INFINITY: Final = 1e20
+
+_COSTS: Final = "linear costs"
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
     """The bytes of the .qplib file, block by block. header: lines of comment. start: a point (columns,)."""
-    problem = form.problem
+    problem, counts, products = form.problem, Counter[str](), form.products()
     yield from _head(form, header)
-    yield from _objective(form)
+    yield from _objective(form, products, counts)
     if problem.rows:
-        yield from _rows(form)
+        yield from _rows(form, counts)
     yield _line(number(INFINITY), "infinity")
     if problem.rows:
         yield from _vector(form.row_lower, "left side of a row")
@@ -61,7 +68,8 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     if problem.rows:
         yield from _vector(np.zeros(problem.row_count), "start of a row's dual")
     yield from _vector(np.zeros(problem.columns), "start of a bound's dual")
-    yield from _names(form)
+    yield from _names(form, counts)
+    check(counts, Expected(problem).as_coefficients(products[1]))
 
 
 def _line(value: str, comment: str) -> bytes:
@@ -78,34 +86,39 @@ def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
     yield from map(_line, values, comments)
 
 
-def _vector(values: Floats, comment: str) -> Iterator[bytes]:
-    """A vector: its most frequent value, the number of the others, and these."""
+def _vector(values: Floats, comment: str, counts: Counter[str] | None = None) -> Iterator[bytes]:
+    """A vector: its most frequent value, the number of the others, and these. counts: of linear costs."""
     finite = np.clip(values, -INFINITY, INFINITY)
     distinct, count = np.unique(finite, return_counts=True)
     usual = float(distinct[count.argmax()])
     at = np.nonzero(finite != usual)[0]
     yield _line(number(usual), f"{comment}, where not listed")
     yield _line(str(len(at)), "listed")
-    yield from render([Decimals(at + 1), b" ", words(finite[at]), b"\n"], len(at))
+    value = words(finite[at])
+    listed = value if counts is None else Counted(counts, _COSTS, value)
+    if counts is not None:
+        counts[_COSTS] += (len(values) - len(at)) * (usual != 0)
+    yield from render([Decimals(at + 1), b" ", listed, b"\n"], len(at))
 
 
-def _objective(form: Canonical) -> Iterator[bytes]:
+def _objective(form: Canonical, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
     if form.problem.objective_degree == 2:
-        index, value = form.products()
+        index, value = products
         yield _line(str(len(value)), "quadratic terms of the objective")
-        yield from _products([], index[:, 0], index[:, 1], 2 * value)
-    yield from _vector(form.costs, "linear coefficient of the objective")
+        counted = Counted(counts, "products of the objective", words(2 * value))
+        yield from _products([], index[:, 0], index[:, 1], counted)
+    yield from _vector(form.costs, "linear coefficient of the objective", counts)
     yield _line(number(form.constant), "constant of the objective")
 
 
-def _products(before: list[Any], one: Ints, two: Ints, value: Floats | float) -> Iterator[bytes]:
+def _products(before: list[Any], one: Ints, two: Ints, value: Piece) -> Iterator[bytes]:
     """Entries of lower triangles, the larger index first."""
     larger, smaller = np.maximum(one, two) + 1, np.minimum(one, two) + 1
-    parts = [*before, Decimals(larger), b" ", Decimals(smaller), b" ", words(value), b"\n"]
+    parts = [*before, Decimals(larger), b" ", Decimals(smaller), b" ", value, b"\n"]
     yield from render(parts, len(one))
 
 
-def _rows(form: Canonical) -> Iterator[bytes]:
+def _rows(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
     """Coefficients of the rows: products, when there are any, then linear terms."""
     problem = form.problem
     for degree in (2, 1) if problem.row_degree == 2 else (1,):
@@ -113,32 +126,34 @@ def _rows(form: Canonical) -> Iterator[bytes]:
         yield _line(str(total), f"{'quadratic' if degree == 2 else 'linear'} terms of rows")
         first = 1
         for family in problem.rows:
-            yield from _row_terms(family, degree, first)
+            yield from _row_terms(family, degree, first, counts)
             first += family.count
 
 
-def _row_terms(family: PlacedFamily, degree: int, first: int) -> Iterator[bytes]:
+def _row_terms(family: PlacedFamily, degree: int, first: int, counts: Counter[str]) -> Iterator[bytes]:
     row = Decimals(np.arange(first, first + family.count))
     linear: list[Any] = []
     for term in family.of_degree(degree):
         value = coefficient(term)
         if degree == 2:
             one, two = term.factors
-            yield from _products([row, b" "], one, two, 2 * np.asarray(value))
+            counted = Counted(counts, "products of rows", words(2 * np.asarray(value)))
+            yield from _products([row, b" "], one, two, counted)
         else:
-            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", words(value), b"\n"]
+            counted = Counted(counts, "coefficients of rows", words(value))
+            linear += [row, b" ", Decimals(term.factors[0] + 1), b" ", counted, b"\n"]
     yield from render(linear, family.count)
 
 
-def _names(form: Canonical) -> Iterator[bytes]:
+def _names(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
     problem, names = form.problem, form.names
     yield _line(str(problem.columns), "names of variables")
     for block in problem.blocks.values():
         place = Decimals(np.arange(block.offset + 1, block.offset + block.count + 1))
-        yield from render([place, b" ", names.of(block), b"\n"], block.count)
+        yield from render([place, b" ", Counted(counts, "columns", names.of(block)), b"\n"], block.count)
     yield _line(str(problem.row_count), "names of rows")
     first = 1
     for family in problem.rows:
         place = Decimals(np.arange(first, first + family.count))
-        yield from render([place, b" ", names.row(family), b"\n"], family.count)
+        yield from render([place, b" ", Counted(counts, "rows", names.row(family)), b"\n"], family.count)
         first += family.count

@@ -7,18 +7,19 @@ a relaxation for others, or refused by name before the first byte.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.errors import InputError, UnsupportedByFormatError
+from ...models.errors import ConsistencyError, InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, lifted
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical
-from ..writing.sink import is_packed, save
+from ..writing.sink import is_packed, saving
 
 ANY_DEGREE: Final = 99
 
@@ -214,9 +215,10 @@ def write(
     .nl gets .row and .col beside it, .mod its .dat.
 
     dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point
-    is the starting point where the format has a place for one. Same problem, same bytes. Raises
-    UnsupportedByFormatError before a byte is written, InputError for an unknown suffix or dialect,
-    OutputError.
+    is the starting point where the format has a place for one. Same problem, same bytes. Each writer counts
+    what it writes; no file appears when a count differs from the problem's. Raises UnsupportedByFormatError
+    before a byte is written, InputError for an unknown suffix or dialect, OutputError, and ConsistencyError
+    for such a difference.
     """
     path = Path(path)
     entry = format_of(path)
@@ -229,9 +231,13 @@ def write(
     point = held.point(start) if start is not None and entry.starts else None
     written = Written(entry.name, chosen, held)
     lines = header(held)
-    written.files[path.name] = save(path, entry.generate(form, lines, point, chosen))
-    for beside, content in _companions(path, entry.name, form, lines):
-        written.files[beside.name] = save(beside, content)
+    files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
+    with ExitStack() as stack:  # the files take their names together, at its end
+        for each, content in files:
+            try:
+                written.files[each.name] = stack.enter_context(saving(each, content))
+            except ConsistencyError as error:
+                raise ConsistencyError(str(error), file=each) from error
     return written
 
 

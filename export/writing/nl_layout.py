@@ -6,6 +6,7 @@ continuous and integer, the last into continuous, binary and integer.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,8 +19,9 @@ from numpy.typing import NDArray
 
 from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
 from ...models.instance.grid import Bools, Ints
+from .counting import Expected, check
 from .names import OBJECTIVE, Names
-from .records import render
+from .records import Counted, render
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +107,24 @@ class Layout:
         return places if inside is None else places[inside]
 
     def column_file(self) -> Iterator[bytes]:
-        """The bytes of the .col file: names of columns in file order, one a line."""
-        names = Names(self.problem)
+        """The bytes of the .col file: names of columns in file order, one a line. They are counted."""
+        names, counts = Names(self.problem), Counter[str]()
         for block, run in self.stretches:
             inside = self.order[run] - block.offset
-            yield from render([names.of(block).at(inside), b"\n"], len(inside))
+            name = Counted(counts, "columns", names.of(block).at(inside))
+            yield from render([name, b"\n"], len(inside))
+        check(counts, {"columns": Expected(self.problem).columns})
 
     def row_file(self) -> Iterator[bytes]:
-        """The bytes of the .row file: names of rows in file order, then of the objective, one a line."""
-        names = Names(self.problem)
+        """The bytes of the .row file: names of rows in file order, then of the objective, one a line.
+
+        Rows are counted.
+        """
+        names, counts = Names(self.problem), Counter[str]()
         for family in self.rows:
-            yield from render([names.row(family), b"\n"], family.count)
+            yield from render([Counted(counts, "rows", names.row(family)), b"\n"], family.count)
         yield OBJECTIVE + b"\n"
+        check(counts, {"rows": Expected(self.problem).rows})
 
 
 def runs(values: NDArray[Any]) -> list[slice]:

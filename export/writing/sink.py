@@ -17,6 +17,7 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -48,18 +49,29 @@ def is_packed(path: Path) -> bool:
 
 
 def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
-    """Writes a file, compressed if `is_packed(path)`; returns its size and SHA-256. Raises OutputError."""
+    """Write a file, compressed if `is_packed(path)`; return its size and SHA-256. Raises OutputError."""
+    with saving(path, chunks) as facts:
+        return facts
+
+
+@contextmanager
+def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
+    """Size and SHA-256 of a file that takes its name at the end of the context, as `save` writes it.
+
+    The bytes are written, beside, when the context begins. An error inside it leaves no file.
+    """
     digest, size = hashlib.sha256(), 0
 
     def hash_all(share: list[bytes]) -> None:
         for chunk in share:
             digest.update(chunk)
 
-    with replacing(path) as stream, _Beside(hash_all, stream.writelines) as beside:
-        for share, length in gathered(gzipped(chunks) if is_packed(path) else chunks, SHARE):
-            beside(share, wait=length < SHARE)
-            size += length
-    return {"bytes": size, "sha256": digest.hexdigest()}
+    with replacing(path) as stream:
+        with _Beside(hash_all, stream.writelines) as beside:
+            for share, length in gathered(gzipped(chunks) if is_packed(path) else chunks, SHARE):
+                beside(share, wait=length < SHARE)
+                size += length
+        yield {"bytes": size, "sha256": digest.hexdigest()}
 
 
 class _Beside:

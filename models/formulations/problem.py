@@ -252,6 +252,16 @@ class Problem:
         }
         return table_of(f"Problem {self.summary}", facts)
 
+    def complete(self) -> None:
+        """Compute every array that the problem keeps.
+
+        Call it before several threads share the problem: `cached_property` takes no lock since Python 3.12,
+        so each thread would compute an array of its own.
+        """
+        for name, kept in vars(Problem).items():
+            if isinstance(kept, cached_property):
+                getattr(self, name)
+
     @property
     def summary(self) -> str:
         """Formulation, class, instance, and how many columns and rows."""
@@ -429,9 +439,9 @@ class Problem:
         return merged(index, np.concatenate(coefficients), scale, self.columns)
 
     def _merged_costs(self, terms: list[Monomial]) -> tuple[Ints, Floats]:
-        reached = [(term.family.block(term.symbols[0]), term) for term in terms]
+        reached = [(term.family.block(term.symbols[0]).name, term) for term in terms]
         costs = [
-            _costs([term for other, term in reached if other is block], block)
+            _costs([term for name, term in reached if name == block.name], block)
             for block in self.blocks.values()
         ]
         index, cost = zip(*costs, strict=True)

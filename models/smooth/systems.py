@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -10,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import OpenBLASController, ThreadpoolController
 
 from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
@@ -84,14 +85,67 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """A context, and a decorator, in which BLAS keeps to one thread.
+    """Context, and decorator, in which BLAS keeps to one thread.
 
     The dense blocks of sparse factors are tiny, and so are products of two vectors: threads would cost many
     times the work, most of all where other processes are busy. Sums do not depend on the number of threads
     either.
+
+    Contexts may be nested, and several threads may be inside at once. The number of threads of BLAS is a
+    setting of the whole process: it returns to its old value when the last context ends. A BLAS that
+    threadpoolctl does not control, such as Accelerate on macOS, keeps its threads.
     """
-    with _libraries().limit(limits=1, user_api="blas"):
+    _LIMIT.enter()
+    try:
         yield
+    finally:
+        _LIMIT.leave()
+
+
+class _SharedLimit:
+    """Limit of BLAS to one thread, held as long as anyone is inside."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._held: Any = None
+
+    def enter(self) -> None:
+        """Set the limit, if nobody else is inside."""
+        with self._lock:
+            if not self._inside:
+                with _any_thread_may_set():
+                    self._held = _libraries().limit(limits=1, user_api="blas")
+            self._inside += 1
+
+    def leave(self) -> None:
+        """Restore the old setting, if nobody else is inside."""
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                with _any_thread_may_set():
+                    self._held.restore_original_limits()
+
+
+_LIMIT: Final = _SharedLimit()
+
+
+@contextmanager
+def _any_thread_may_set() -> Iterator[None]:
+    """Context in which threadpoolctl lets this thread set the number of threads of OpenBLAS.
+
+    Since version 3.8 it ignores all threads but the one that set the number first, and the last thread to
+    leave `one_thread` may be another one.
+    """
+    release = getattr(OpenBLASController, "clear_controlling_thread", None)
+    if release is None:
+        yield
+        return
+    release(force=True)
+    try:
+        yield
+    finally:
+        release(force=True)
 
 
 @cache

@@ -1,0 +1,104 @@
+"""Threads that share a problem: all of them write the same bytes, whoever computed its arrays.
+
+`functools.cached_property` has no lock since Python 3.12, so that two threads may each compute a value, and
+the second one replaces the first. On Python 3.11 it has one, and only the test without threads can fail.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import pytest
+from cases import make_instance, make_problem
+from crossfield.export.formats.registry import FORMATS, carried
+from crossfield.export.writing.canonical import Canonical
+from crossfield.models.formulations.problem import PlacedFamily, Problem
+from crossfield.models.instance.grid import Grid
+from crossfield.models.instance.instance import Instance
+from loops import for_each
+
+THREADS = 4
+
+
+@pytest.fixture
+def hasty():
+    """The interpreter changes threads as often as it can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def bytes_of(problem: Problem, suffix: str, dialect: str) -> bytes:
+    entry = FORMATS[suffix]
+    return b"".join(entry.generate(Canonical(carried(problem, entry)), [], None, dialect))
+
+
+def costs_of(problem: Problem) -> tuple[list[list[int]], list[float]]:
+    index, cost = problem.merged_objective(1)
+    return index.tolist(), cost.tolist()
+
+
+def spoiled(problems: int) -> int:
+    """How many problems lose costs when several threads ask for these at once."""
+    instance = make_instance()
+    whole = costs_of(make_problem("milp-mccormick", instance))
+    barrier = threading.Barrier(THREADS)
+
+    def ask(problem: Problem) -> bool:
+        barrier.wait()
+        return costs_of(problem) == whole
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        shared = (make_problem("milp-mccormick", instance) for _ in range(problems))
+        return sum(not all(pool.map(ask, [problem] * THREADS)) for problem in shared)
+
+
+def test_no_cost_is_lost_when_threads_share_a_problem(hasty):
+    assert spoiled(150) == 0
+
+
+@pytest.mark.slow
+def test_no_cost_is_lost_in_thousands_of_problems(hasty):
+    assert spoiled(10_000) == 0
+
+
+def anew(self: cached_property, owner: object, kind: type | None = None):
+    """What `cached_property` gives when what threads share is computed again at every access."""
+    if isinstance(owner, Problem | PlacedFamily | Instance | Grid):
+        return self.func(owner)
+    return kept(self, owner, kind)
+
+
+kept = cached_property.__get__
+
+
+def unchanged(name: str, suffix: str, dialect: str, monkeypatch) -> None:
+    """The worst that threads can do to cached values: every reader gets one of its own."""
+    shape = "pixel" if name == "milp-mccormick" else "row"
+    usual = bytes_of(make_problem(name, make_instance(shape)), suffix, dialect)
+    with monkeypatch.context() as patch:
+        patch.setattr(cached_property, "__get__", anew)
+        assert bytes_of(make_problem(name, make_instance(shape)), suffix, dialect) == usual
+
+
+def test_values_that_are_computed_anew_every_time_change_no_byte(monkeypatch):
+    unchanged("milp-mccormick", "lp", "", monkeypatch)
+
+
+@pytest.mark.slow
+@for_each("suffix, dialect", [(name, dialect) for name in FORMATS for dialect in FORMATS[name].dialects])
+@for_each("name", ["milp-mccormick", "qp-fixed"])
+def test_no_format_depends_on_who_computed_a_value(name, suffix, dialect, monkeypatch):
+    unchanged(name, suffix, dialect, monkeypatch)
+
+
+def test_a_complete_problem_has_computed_all_that_it_keeps():
+    problem = make_problem("milp-mccormick", make_instance())
+    problem.complete()
+    kept = {name for name, value in vars(Problem).items() if isinstance(value, cached_property)}
+    assert kept <= vars(problem).keys()
+    assert all("terms" in vars(family) for family in (*problem.objective, *problem.rows))

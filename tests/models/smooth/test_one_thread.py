@@ -1,0 +1,80 @@
+"""BLAS keeps to one thread while anyone is inside `one_thread`, and has its own number afterwards."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from crossfield.models.smooth import systems
+from crossfield.models.smooth.systems import one_thread
+from threadpoolctl import ThreadpoolController
+
+MANY = 2
+
+
+def numbers() -> set[int]:
+    return {each["num_threads"] for each in ThreadpoolController().select(user_api="blas").info()}
+
+
+@pytest.fixture
+def many():
+    """A BLAS that would take two threads."""
+    blas = ThreadpoolController().select(user_api="blas")
+    if not blas.info():
+        pytest.skip("threadpoolctl controls no BLAS of this machine, for example Accelerate on macOS")
+    with blas.limit(limits=MANY):
+        if numbers() != {MANY}:
+            pytest.skip("the BLAS of this machine takes one thread only")
+        yield
+
+
+def test_overlapping_threads_restore_the_setting(many):
+    """The first one leaves while the second one is inside."""
+    first_in, second_in, first_out = (threading.Event() for _ in range(3))
+    found = []
+
+    def first() -> None:
+        with one_thread():
+            first_in.set()
+            assert second_in.wait(60)
+        first_out.set()
+
+    def second() -> None:
+        assert first_in.wait(60)
+        with one_thread():
+            second_in.set()
+            assert first_out.wait(60)
+            found.append(numbers())
+
+    threads = [threading.Thread(target=work) for work in (first, second)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [{1}]
+    assert numbers() == {MANY}
+
+
+def test_nested_contexts_restore_the_setting(many):
+    @one_thread()
+    def inner() -> set[int]:
+        return numbers()
+
+    with one_thread():
+        assert inner() == {1}
+        assert numbers() == {1}
+    assert numbers() == {MANY}
+
+
+def test_an_error_restores_the_setting(many):
+    with pytest.raises(ZeroDivisionError), one_thread():
+        raise ZeroDivisionError
+    assert numbers() == {MANY}
+
+
+def test_a_blas_that_nothing_controls_is_no_error(monkeypatch):
+    none = ThreadpoolController().select(user_api="nothing")
+    assert none.info() == []
+    monkeypatch.setattr(systems, "_libraries", lambda: none)
+    with one_thread(), one_thread():
+        pass
