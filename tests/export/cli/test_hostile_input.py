@@ -7,6 +7,7 @@ import re
 import struct
 import subprocess
 import sys
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -301,18 +302,16 @@ def test_standard_error_stays_open_for_others_while_a_damaged_tiff_is_read(tmp_p
     Image.new("L", (60, 40)).save(tmp_path / "a.tiff", compression="tiff_deflate")
     data = (tmp_path / "a.tiff").read_bytes()
     (tmp_path / "a.tiff").write_bytes(data[:8] + b"damage" + data[14:])
-    load = Image.Image.load
+    opened = Image.open
 
-    def noisy(image):
+    def noisy(*arguments, **options):
         os.write(2, b"of another thread")
-        return load(image)
+        return opened(*arguments, **options)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(Image.Image, "load", noisy)
-        patch.setattr("PIL.ImageFile.ImageFile.load", noisy)
-        with pytest.raises(InputError, match="is not a whole picture"):
-            cf.read_sketch(tmp_path / "a.tiff")
-    assert set(capfd.readouterr().err.split("of another thread")) <= {""}
+    monkeypatch.setattr(Image, "open", noisy)
+    with pytest.raises(InputError, match="is not a whole picture"):
+        cf.read_sketch(tmp_path / "a.tiff")
+    assert capfd.readouterr().err == "of another thread"
 
 
 def test_compressed_tiffs_read_as_uncompressed_ones_do(tmp_path):
@@ -364,16 +363,22 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
 
 
 def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
-    import warnings
+    """Their filters belong to all threads; this mapping is asked for its items in the middle of the work."""
 
     class Watched(dict):
         def items(self):
             found.append(list(warnings.filters))
             return super().items()
 
-    found, before = [], list(warnings.filters)
+    found = []
     data = pack_arrays({"u": np.zeros(3)})
-    assert unpack_arrays(data, {"u": Expected(1, 10)}, optional=Watched())["u"].tolist() == [0.0, 0.0, 0.0]
+    with warnings.catch_warnings(action="default"):
+        before = list(warnings.filters)
+        assert unpack_arrays(data, {"u": Expected(1, 10)}, optional=Watched())["u"].tolist() == [
+            0.0,
+            0.0,
+            0.0,
+        ]
     assert found == [before]
 
 
