@@ -7,6 +7,7 @@ keep, the exit code is 1. Heavy libraries are imported inside the commands.
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 from functools import partial
@@ -420,6 +421,7 @@ app.add_typer(library, name="library")
 def main() -> NoReturn:
     """Run the command line and leave with its exit code; SIGTERM leaves nothing half done either."""
     degrade()
+    logging.getLogger("PIL").addHandler(logging.NullHandler())  # an error is one line, and that is ours
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(invoke(sys.argv[1:]))
 

@@ -9,11 +9,8 @@ corners drop out (docs/mathematics.md, 1).
 from __future__ import annotations
 
 import io
-import os
-import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -27,6 +24,7 @@ from ..instance.grid import Bools, Floats
 from .bridges import ink_ends
 from .colour import REDDISH, ink_of, redness
 from .cover import Cover, Frame, block_means
+from .tiff import unpacked
 
 Ink = NDArray[np.float32]
 
@@ -43,7 +41,6 @@ _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
 _BAND: Final = 1 << 20  # pixels of a picture that are looked at together
-_SILENCE: Final = threading.Lock()
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
 _COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are told apart
@@ -172,10 +169,11 @@ def _opened(data: bytes) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            with _silenced():
-                image = Image.open(io.BytesIO(data), formats=FORMATS)
-                _check_size(*image.size)
-                image.load()
+            image = Image.open(io.BytesIO(data), formats=FORMATS)
+            _check_size(*image.size)
+            if any(tile[0] == "libtiff" for tile in image.tile):
+                image = Image.open(io.BytesIO(unpacked(data)), formats=["TIFF"])
+            image.load()
             ImageOps.exif_transpose(image, in_place=True)
         except InputError:
             raise
@@ -194,25 +192,6 @@ def _check_size(width: int, height: int) -> None:
             f"declares {width} x {height} pixels; "
             f"at most {MAX_SIDE} a side and {MAX_PIXELS // 10**6} million in all are read, scale it down"
         )
-
-
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Nothing goes to standard error meanwhile, where libtiff and Pillow's log write complaints."""
-    with _SILENCE:
-        try:
-            kept = os.dup(2)
-        except OSError:  # there is none
-            yield
-            return
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 2)
-        try:
-            yield
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            os.close(nowhere)
 
 
 def _short(error: Exception) -> str:

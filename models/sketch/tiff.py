@@ -1,0 +1,42 @@
+"""Compressed TIFF pictures, decoded in a process of their own.
+
+Pillow hands compressed pictures to libtiff, which prints complaints to standard error and cannot be told not
+to. Standard error belongs to the whole process, so another process decodes: this file, as a program.
+"""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+
+
+def unpacked(data: bytes) -> bytes:
+    """The first picture of a compressed TIFF as an upright TIFF without compression.
+
+    Raises ValueError with the decoder's message where it cannot be decoded.
+    """
+    command = [sys.executable, "-P", __file__]
+    done = subprocess.run(command, input=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
+    if done.returncode:
+        raise ValueError(done.stdout.decode("utf-8", "replace") or "the decoder died")
+    return done.stdout
+
+
+def main() -> int:
+    """Print what `unpacked` returns; 1 with the error's message instead where decoding fails."""
+    from PIL import Image, ImageOps
+
+    found = io.BytesIO()
+    try:
+        image = Image.open(io.BytesIO(sys.stdin.buffer.read()), formats=("TIFF",))
+        ImageOps.exif_transpose(image).save(found, "TIFF", compression="raw")
+    except Exception as error:  # noqa: BLE001 - damaged pictures make decoders raise nearly anything
+        sys.stdout.buffer.write((str(error) or type(error).__name__).encode("utf-8", "replace"))
+        return 1
+    sys.stdout.buffer.write(found.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
