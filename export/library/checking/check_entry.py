@@ -7,6 +7,7 @@ that ships with every library, against the .mps and the instance without any rou
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -129,7 +130,9 @@ def _exactly(folder: Path, sidecar: dict[str, Any]) -> Iterator[Finding]:
         try:
             found = check(str(folder / model), str(point))
         except BadInputError as error:
-            yield Finding(point.name, f"the checker refuses it: {str(error).removeprefix(f'{folder}/')}")
+            yield Finding(
+                point.name, f"the checker refuses it: {str(error).removeprefix(f'{folder}{os.sep}')}"
+            )
             continue
         if float(found.worst) > FEASIBLE:
             yield Finding(

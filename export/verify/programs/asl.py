@@ -35,7 +35,7 @@ def at_start(path: Path) -> dict[str, Any]:
     if done.returncode:
         words = (done.stdout + done.stderr).strip()[-200:]
         raise Refused(f"gjh_asl_json ends with code {done.returncode}: {words}")
-    said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text())
+    said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text("utf-8"))
     return said
 
 

@@ -42,7 +42,7 @@ def read(path: Path) -> Meaning:
     if re.search(r"ERROR|too many errors|not valid", said) or not copy.exists():
         raise Refused(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', said)[:1])}")
     model = highs_program.read(copy)
-    names = [line.removeprefix("**").split()[1] for line in listed.read_text().splitlines()[1:]]
+    names = [line.removeprefix("**").split()[1] for line in listed.read_text("utf-8").splitlines()[1:]]
     if len(names) != len(model.rows) + len(model.columns):
         raise NotTold("CBC leaves out of its export what its presolve removes, and its numbers have no names")
     return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])

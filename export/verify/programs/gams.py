@@ -7,6 +7,7 @@ a folder of the child process.
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -22,7 +23,6 @@ from . import casadi as casadi_program
 from .protocol import Refused, TooLarge
 from .reading import Evaluation, Points, told
 
-_BARON_FILES: Final = ("baron", "libbaronnavvy64.so", "optbaron.def", "gmsba_us.run", "gmsba_ux.out")
 _LINEAR_AND_QUADRATIC: Final = ("lp", "mip", "qcp", "miqcp")
 _NONLINEAR: Final = ("nlp", "minlp")
 _OPTIONS: Final = {
@@ -31,7 +31,7 @@ _OPTIONS: Final = {
     "baron": "AbsConFeasTol 1e-9\nAbsIntFeasTol 1e-9\n",
 }
 """Option files of the solvers in GAMS: tight tolerances."""
-_TABLE: Final = "gmscmpun.txt"
+_TABLE: Final = "gmscmpNT.txt" if os.name == "nt" else "gmscmpun.txt"
 
 
 def _package(name: str) -> Path | None:
@@ -56,12 +56,12 @@ def _system(solver: str) -> Path:
     if folder.exists():
         return folder
     shutil.copytree(base, folder, copy_function=_link, ignore=shutil.ignore_patterns(_TABLE, "__pycache__"))
-    for name in _BARON_FILES:
-        _link(baron / name, folder / name)
-    from gamspy_baron import verbatim
+    from gamspy_baron import files, verbatim
 
-    head, mark, tail = (base / _TABLE).read_text().partition("DEFAULTS")
-    (folder / _TABLE).write_text(f"{head}{verbatim}\n\n{mark}{tail}")
+    for name in files:
+        _link(baron / name, folder / name)
+    head, mark, tail = (base / _TABLE).read_text("utf-8").partition("DEFAULTS")
+    (folder / _TABLE).write_text(f"{head}{verbatim}\n\n{mark}{tail}", "utf-8", newline="\n")
     return folder
 
 
@@ -77,7 +77,7 @@ def _run(path: Path, solver: str, *options: str) -> str:
     kinds = _LINEAR_AND_QUADRATIC if solver == "cplex" else _LINEAR_AND_QUADRATIC + _NONLINEAR
     chosen = [f"{kind}={solver}" for kind in kinds]
     for name, lines in _OPTIONS.items():
-        Path(f"{name}.opt").write_text(lines)
+        Path(f"{name}.opt").write_text(lines, "ascii", newline="\n")
     command = [
         str(_system(solver) / "gams"),
         str(path),
@@ -99,7 +99,7 @@ def _run(path: Path, solver: str, *options: str) -> str:
 
 
 def _text(path: Path) -> str:
-    return path.read_text(errors="replace") if path.exists() else ""
+    return path.read_text("utf-8", "replace") if path.exists() else ""
 
 
 def our_name(name: str) -> str:

@@ -44,7 +44,7 @@ def _run(path: Path, *arguments: str) -> str:
 def read(path: Path) -> Meaning:
     """The file as GLPK reads it."""
     _run(path, "--check", "--wglp", "model.glp")
-    lines = [line.split() for line in Path("model.glp").read_text().splitlines()]
+    lines = [line.split() for line in Path("model.glp").read_text("utf-8").splitlines()]
     head = next(line for line in lines if line[0] == "p")
     if head[2] != "min":
         raise Refused("it is not minimised")
@@ -113,7 +113,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
 
 def _ours(names: list[str], path: Path) -> list[str]:
     """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
-    printed = re.search(r"_%0(\d+)d", path.read_text())
+    printed = re.search(r"_%0(\d+)d", path.read_text("utf-8"))
     assert printed
     return [_our_name(name, int(printed[1])) for name in names]
 
@@ -145,9 +145,9 @@ def solve(path: Path, seconds: float, _solver: str, gap: float = 0.0) -> RawSolu
     """Its answer within the time, from the file of -w; columns have the numbers of its dump of the model."""
     limits = ("--tmlim", str(max(1, round(seconds))), "--mipgap", f"{gap:g}")
     said = _run(path, *limits, "--wglp", "model.glp", "-w", "answer.txt")
-    names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text(), re.MULTILINE)
+    names = re.findall(r"^n j \d+ (\S+)$", Path("model.glp").read_text("utf-8"), re.MULTILINE)
     names = _ours(names, path) if path.suffix == ".mod" else names
-    answer = [line.split() for line in Path("answer.txt").read_text().splitlines()]
+    answer = [line.split() for line in Path("answer.txt").read_text("utf-8").splitlines()]
     head = next(line for line in answer if line[0] == "s")
     place = 2 if head[1] == "mip" else 3
     status = _STATUS.get(head[4], Status.LIMIT_WITHOUT_POINT)

@@ -37,10 +37,12 @@ class TooLarge(Exception):  # noqa: N818 - it is an answer
 def started(name: str, *arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """How a run of a program's executable ended, and what it said."""
     command = [shutil.which(PROGRAMS[name].needs) or PROGRAMS[name].needs, *arguments]
-    return subprocess.run(command, check=False, capture_output=True, text=True, errors="replace", cwd=folder)
+    return subprocess.run(
+        command, check=False, capture_output=True, encoding="utf-8", errors="replace", cwd=folder
+    )
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
     """Names of columns and rows of an .nl file, from the .col and .row beside it, the objective left out."""
-    columns, rows = (path.with_suffix(suffix).read_text().split() for suffix in (".col", ".row"))
+    columns, rows = (path.with_suffix(suffix).read_text("utf-8").split() for suffix in (".col", ".row"))
     return columns, [name for name in rows if name != "obj"]
