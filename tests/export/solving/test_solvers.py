@@ -276,7 +276,7 @@ def test_the_preferred_solver_fits_the_class(small):
     for name in ("minlp-parity", "minlp-cubic", "miqcp-bilinear"):
         with pytest.raises(UnsupportedBySolverError, match="crossfield list"):
             solver_for(formulated(small, name))
-    with pytest.raises(InputError, match="choose one of gurobi, cplex, .*highs"):
+    with pytest.raises(InputError, match=r"choose one of gurobi, cplex, .*highs"):
         solver_for(formulated(small, "qp-fixed"), "HiGHS")
 
 
