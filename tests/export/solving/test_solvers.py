@@ -514,9 +514,7 @@ def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, mon
     broken.mkdir()
     (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
     monkeypatch.setenv("PYTHONPATH", str(broken))
-    with pytest.raises(
-        SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"
-    ):
+    with pytest.raises(SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"):
         cf.solve(problem, "ipopt", tmp_path)
     assert not answer.exists()
 
