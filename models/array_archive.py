@@ -74,20 +74,21 @@ def unpack_arrays(
     data: bytes,
     expected: Mapping[str, Expected],
     prefix: str = "",
-    optional: Mapping[str, Expected] = MappingProxyType({}),
+    retired: Mapping[str, str] = MappingProxyType({}),
 ) -> Arrays:
-    """The expected arrays of an .npz, whose names there are led by a prefix, and the optional ones it holds.
+    """Return the expected arrays of an .npz, whose names there begin with a prefix.
 
-    Other members are not looked at.
+    retired: names of arrays that an archive must not hold, each with the message of the error. Other members
+    are not read.
 
     Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled, or
     larger than it may be, and for a damaged archive.
     """
     try:
         with warnings.catch_warnings(action="error"), zipfile.ZipFile(io.BytesIO(data)) as archive:
-            held = set(archive.namelist())
-            found = {name: kind for name, kind in optional.items() if f"{prefix}{name}.npy" in held}
-            expected = {**expected, **found}
+            for name in retired:
+                if f"{prefix}{name}.npy" in archive.namelist():
+                    raise InstanceError(retired[name])
             members = {name: _member(archive, name, prefix) for name in expected}
             if sum(member.file_size for member in members.values()) > MAX_ARCHIVE:
                 raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")

@@ -32,7 +32,6 @@ from .inputs import (
 from .library_command import library
 from .options import (
     BetaNorm,
-    Crossings,
     Curvature,
     Facet,
     Folder,
@@ -119,7 +118,6 @@ def run_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -144,7 +142,7 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
     if not (quiet or as_json):
         say(plan(limits))
@@ -177,7 +175,6 @@ def instance_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -193,7 +190,7 @@ def instance_command(
     require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     if not quiet:
@@ -212,7 +209,6 @@ def export_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -252,7 +248,7 @@ def export_command(
     formats = known(file_format or list(DEFAULTS), FORMATS, "format")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         field = None if start is None else read_field(start, on=loaded)
         proof = None

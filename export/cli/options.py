@@ -89,14 +89,6 @@ View = Annotated[
         " 30,25; by default where the strokes reach farthest.",
     ),
 ]
-Crossings = Annotated[
-    bool,
-    typer.Option(
-        "--crossings",
-        help="Keep both directions where exactly two curves of a vector sketch meet in a pixel; by default it"
-        " has none. There line u follows one, line v the other; no proof knows of the second.",
-    ),
-]
 GaugeName = Annotated[
     Literal["strokes", "box"] | None,
     typer.Option(

@@ -12,7 +12,6 @@ from ...models.processes.deadline import Deadline
 from .inputs import choice_of, formulations_of, known, load, options_of
 from .options import (
     BetaNorm,
-    Crossings,
     Curvature,
     Facet,
     Folder,
@@ -74,7 +73,6 @@ def solve_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -104,7 +102,7 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         request = Request(
             loaded,

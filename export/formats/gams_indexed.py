@@ -2,7 +2,6 @@
 
     r / 00*05 /, c / 00*07 /                 rows and columns, padded: alpha('01','04') is alpha_01_04
     I(r,c) / 00.(02*07) ... /                pixels, one run a line; S_c(r,c) stroke pixels, where w > 0
-    S_x(r,c)                                 those where two strokes meet, w_x > 0, where there are any
     E(r,c,side)                              pairs, upper or right: s('01','04','u') is s_01_04_u
     north(side), east(side)                  to pixel j: alpha_j is alpha(r-north(side),c+east(side))
     c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, from its declaration
@@ -12,7 +11,7 @@ places in an ordered set, hence the padded labels in their natural order; a neig
 label and no pair. Names are not told apart by case (G4), so the set is S_c and not S. `beta` and `gamma` are
 functions of GAMS, but a declared symbol of that name wins, so that variables keep the names of the paper
 (tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
-the scalar layout (gams.py).
+the scalar layout (gams_scalar.py).
 """
 
 from __future__ import annotations
@@ -34,11 +33,10 @@ from ..writing.records import Bytes, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
 from .indexed import Indexed, check_indexed, described, narrowed
 
-SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "crossings": "S_x", "pairs": "E"}
+SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {
     "pixels": "r,c",
     "strokes": "r,c",
-    "crossings": "r,c",
     "pairs": "r,c,side",
 }
 SECOND: Final = "r-north(side),c+east(side)"
@@ -56,8 +54,6 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         "pixels": _pixels(instance),
         "theta": _data(keys(instance, "strokes"), instance.target),
         "w": _data(keys(instance, "strokes"), instance.w),
-        "theta_x": _data(keys(instance, "crossings"), instance.cross_target),
-        "w_x": _data(keys(instance, "crossings"), instance.w_cross),
         "jumps": _jumps(problem),
         "start": () if start is None else _start(problem, start),
         "results": _results(problem),
@@ -84,7 +80,6 @@ def _data_context(problem: Problem) -> dict[str, Any]:
         "last_row": f"{grid.height - 1:0{digits}}",
         "last_column": f"{grid.width - 1:0{digits}}",
         "gauge": instance.gauge,
-        "crossings": len(instance.crossings) > 0,
         "w_strokes": number(instance.w_strokes),
         "w_beta": number(instance.w_beta),
         "pairs": pairs,

@@ -208,12 +208,7 @@ class Problem:
     windows: Windows | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data, and what is fixed fits the instance.
-
-        Where no two strokes meet the formulation is the one without crossings.
-        """
-        if not len(self.instance.crossings):
-            object.__setattr__(self, "formulation", self.formulation.without_crossings)
+        """Check that jumps are there exactly where they are data, and what is fixed fits the instance."""
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -272,8 +267,6 @@ class Problem:
         data: dict[str, Any] = {
             "theta": self.instance.target,
             "w": self.instance.w,
-            "theta_x": self.instance.cross_target,
-            "w_x": self.instance.w_cross,
             "alpha_lo": self.instance.alpha_lower,
             "alpha_up": self.instance.alpha_upper,
             "beta_lo": np.full(self.instance.grid.size, -QUARTER),
