@@ -80,15 +80,12 @@ def kinds_in_short() -> str:
 
 INTRODUCTION = r"""[What the words and symbols mean](mathematics.md), step by step. In short: a cross at pixel
 $i$ has line $u$ at angle $\alpha_i + \beta_i$ and line $v$ at angle $\alpha_i + \pi/2 - \beta_i$. $I$ are the
-pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and weight $w_i$,
-$S_\times$ those of them where a second stroke of direction $\theta^\times_i$ and weight $w^\times_i$ meets
-the first, and $E$ the ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles
-are in radians, counter-clockwise, $y$ up. The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is
-data: under the gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$
-elsewhere; under `box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$
-follow from the windows. $\theta^\times_i$ is taken where line $v$ is, in $[\theta_i, \theta_i + \pi)$ or,
-under `box`, $[\pi/4, 5\pi/4)$; most instances have no such pixel, and then no file has what stands over
-$S_\times$. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
+pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and weight $w_i$, and $E$ the
+ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in radians,
+counter-clockwise, $y$ up. The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data: under the
+gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere; under
+`box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the
+windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
 prints it. Sections and numbers in brackets are those of the paper."""
 
 
@@ -97,8 +94,7 @@ def methods(instance: Instance) -> Iterator[Candidate]:
     with tempfile.TemporaryDirectory() as folder:
         request = Request(instance, Path(folder), cf.Limits(seconds=SECONDS))
         for method in METHODS.values():
-            if method.in_runs:
-                yield from method.find(request)
+            yield from method.find(request)
 
 
 def accuracy() -> None:

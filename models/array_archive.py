@@ -24,7 +24,6 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -106,20 +105,17 @@ class ArrayArchive:
             raise InstanceError(f"is an .npz of more than {MAX_ARCHIVE >> 20} MiB when unpacked")
         self._unread = set(self._members)
 
-    def arrays(
-        self,
-        expected: Mapping[str, Expected],
-        prefix: str = "",
-        optional: Mapping[str, Expected] = MappingProxyType({}),
-    ) -> Arrays:
-        """Return the expected arrays, and those of the optional ones that the archive holds, by name.
+    def holds(self, name: str) -> bool:
+        """Whether the archive holds an array of that name."""
+        return name in self._members
 
-        prefix: what precedes the names in the archive.
+    def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
+        """Return the expected arrays by name. prefix: what precedes the names in the archive.
+
         Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled,
         damaged, or larger than it may be.
         """
-        found = {name: kind for name, kind in optional.items() if prefix + name in self._members}
-        return {name: self._array(prefix, name, kind) for name, kind in {**expected, **found}.items()}
+        return {name: self._array(prefix, name, kind) for name, kind in expected.items()}
 
     def finish(self) -> None:
         """Raise InstanceError if the archive holds an array that was never asked for."""

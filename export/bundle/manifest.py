@@ -362,7 +362,6 @@ def _document(
             "pixels": instance.grid.size,
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),
-            **({"crossings": len(instance.crossings)} if len(instance.crossings) else {}),
         },
         "columns": _columns(problem),
         "rows": [

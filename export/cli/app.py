@@ -33,7 +33,6 @@ from .inputs import (
 from .library_command import library
 from .options import (
     BetaNorm,
-    Crossings,
     Curvature,
     Facet,
     Folder,
@@ -120,7 +119,6 @@ def run_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -136,7 +134,7 @@ def run_command(
 ) -> None:
     """Do everything for one sketch: write all solver files, try methods, keep a field, draw it.
 
-    The methods are {methods of a run}. The bend field is kept, and that of least 2-norm energy beside it.
+    The methods are {methods}. The bend field is kept, and that of least 2-norm energy beside it.
     report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
     """
     from ..solving.limits import Limits
@@ -145,7 +143,7 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
     if not (quiet or as_json):
         say(plan(limits))
@@ -178,7 +176,6 @@ def instance_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -194,7 +191,7 @@ def instance_command(
     require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     if not quiet:
@@ -213,7 +210,6 @@ def export_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -253,7 +249,7 @@ def export_command(
     formats = known(file_format or list(DEFAULTS), FORMATS, "format")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         field = None if start is None else read_field(start, on=loaded)
         proof = None

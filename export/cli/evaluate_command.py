@@ -10,7 +10,6 @@ import typer
 
 from .inputs import choice_of, known, load
 from .options import (
-    Crossings,
     Curvature,
     GaugeName,
     Json,
@@ -54,7 +53,6 @@ def evaluate_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -82,7 +80,7 @@ def evaluate_command(
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         found = evaluate(
             instance,

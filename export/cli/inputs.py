@@ -45,11 +45,9 @@ def load(
     return instance
 
 
-def choice_of(
-    silhouette: Silhouette, curvature: list[str] | None, view: str | None, *, crossings: bool
-) -> Choice:
+def choice_of(silhouette: Silhouette, curvature: list[str] | None, view: str | None) -> Choice:
     """What of a drawing is a curvature line, as the user says it. Raises InputError."""
-    return Choice(silhouette, tuple(curvature or ()), view, crossings)
+    return Choice(silhouette, tuple(curvature or ()), view)
 
 
 def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, choice: Choice) -> Instance:
@@ -67,9 +65,7 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
             raise InputError(
                 f"the sample {what} has its own curvature lines; leave --curvature and --view out"
             )
-        return sample(
-            what, pixels, gauge or "strokes", crossings=choice.crossings, silhouette=choice.silhouette
-        )
+        return sample(what, pixels, gauge or "strokes", silhouette=choice.silhouette)
     if not path.exists():
         raise InputError(
             "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
@@ -80,7 +76,6 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
             size=pixels,
             mask=mask,
             gauge=gauge or "strokes",
-            crossings=choice.crossings,
             silhouette=choice.silhouette,
             curvature=choice.curvature,
             view=choice.view,
@@ -92,7 +87,7 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
     if choice != AS_DRAWN:
         raise InputError(
             "is an instance, which has its own curvature lines; "
-            "leave --silhouette, --curvature, --view and --crossings out",
+            "leave --silhouette, --curvature and --view out",
             file=what,
         )
     instance = read_instance(path)

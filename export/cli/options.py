@@ -90,14 +90,6 @@ View = Annotated[
         " 30,25; by default where the strokes reach farthest.",
     ),
 ]
-Crossings = Annotated[
-    bool,
-    typer.Option(
-        "--crossings",
-        help="Keep both directions where exactly two curves of a vector sketch meet in a pixel; by default it"
-        " has none. There line u follows one, line v the other; no proof knows of the second.",
-    ),
-]
 GaugeName = Annotated[
     Literal["strokes", "box"] | None,
     typer.Option(
@@ -191,7 +183,7 @@ Threads = Annotated[
     typer.Option(
         "--threads",
         callback=_threads,
-        help=f"Cores that HiGHS, search and patches use at once; 1 to {MOST}, or 0: as many as they choose.",
+        help=f"Cores that HiGHS and search use at once; 1 to {MOST}, or 0: as many as they choose.",
     ),
 ]
 Start = Annotated[

@@ -10,7 +10,6 @@ import typer
 
 from .inputs import choice_of, load
 from .options import (
-    Crossings,
     Curvature,
     GaugeName,
     Json,
@@ -59,7 +58,6 @@ def prove_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -105,7 +103,7 @@ def prove_command(
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view, crossings=crossings)
+        choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
         proof = prove(
             loaded,

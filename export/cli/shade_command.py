@@ -13,7 +13,6 @@ from ...models.processes.progress import Progress
 from ...models.sketch.choice import AS_DRAWN, Choice
 from .inputs import SAVED, choice_of, drawing_of, field_or_instance, known, load
 from .options import (
-    Crossings,
     Curvature,
     Folder,
     GaugeName,
@@ -111,7 +110,6 @@ def shade_command(
     silhouette: Outline = "none",
     curvature: Curvature = None,
     view: View = None,
-    crossings: Crossings = False,
     gauge: GaugeName = None,
     w_strokes: StrokeWeight = None,
     w_beta: SkewWeight = None,
@@ -130,7 +128,7 @@ def shade_command(
     from ..surfaces.report import surface_document
 
     hints, lamp = hints_of(hint), light_of(light)
-    choice = choice_of(silhouette, curvature, view, crossings=crossings)
+    choice = choice_of(silhouette, curvature, view)
     with progress(quiet=quiet) as show:
         show("reading")
         field, candidate, below = _saved(what, on), None, over

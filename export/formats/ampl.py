@@ -7,8 +7,7 @@
     minimize energy: sum{(r,c,h) in E} ( ...
     subject to c14{(r,c,h) in E}: s[r,c,h] >= ...
 
-What depends on the sketch stands in the .dat: I, S_c with theta and w, where two strokes meet S_x with those
-of the second one, the weights, and the jumps where they
+What depends on the sketch stands in the .dat: I, S_c with theta and w, the weights, and the jumps where they
 are data. Only what AMPL and GNU MathProg share is used: no `solve`, `param pi` computed, strings in quotes,
 `mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear formulations, and
 evaluates every expression of the others once variables are turned into parameters, as the tests do. AMPL
@@ -17,7 +16,7 @@ itself is not free; no test runs it.
 Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
 ends with comments that print an answer under our names, as a solution file that is read back.
 
-Counted while the .dat is written, because columns and rows are sums over sets: pixels, strokes, crossings,
+Counted while the .dat is written, because columns and rows are sums over sets: pixels, strokes,
 jumps other than 0, and elements with narrowed bounds. The .mod holds no data.
 """
 
@@ -48,13 +47,11 @@ SECOND: Final = "r - north[h], c + east[h]"
 DOMAINS: Final[dict[IndexSet, str]] = {
     "pixels": "{(r,c) in I}",
     "strokes": "{(r,c) in S_c}",
-    "crossings": "{(r,c) in S_x}",
     "pairs": "{(r,c,h) in E}",
 }
 _INDEX: Final[dict[IndexSet, str]] = {
     "pixels": "r,c",
     "strokes": "r,c",
-    "crossings": "r,c",
     "pairs": "r,c,h",
 }
 
@@ -71,9 +68,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     check_indexed(problem, "mod", "nl, lp or mps")
     context = {
         "header": header,
-        "sets": ["I", "S_c"]
-        + ["S_x"] * bool(len(problem.instance.crossings))
-        + ["E"] * bool(len(problem.instance.grid.first)),
+        "sets": ["I", "S_c"] + ["E"] * bool(len(problem.instance.grid.first)),
         "gauge": problem.instance.gauge,
         "second": SECOND,
         "windows": problem.windows is not None,
@@ -103,10 +98,6 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     yield b";\nparam: S_c: theta w :=\n"
     strokes: Pieces = [Counted(counts, "strokes", words(instance.w))]
     yield from _listed(instance, "strokes", [words(instance.target), b" ", *strokes])
-    if len(instance.crossings):
-        yield b";\nparam: S_x: theta_x w_x :=\n"
-        crossings: Pieces = [Counted(counts, "crossings", words(instance.w_cross))]
-        yield from _listed(instance, "crossings", [words(instance.cross_target), b" ", *crossings])
     weights = f"param w_strokes := {number(instance.w_strokes)};\nparam w_beta := {number(instance.w_beta)};"
     yield b";\n" + weights.encode() + b"\n"
     if problem.jumps is not None and len(problem.jumps):

@@ -2,7 +2,6 @@
 
     r / 00*05 /, c / 00*07 /                 rows and columns, padded: alpha('01','04') is alpha_01_04
     I(r,c) / 00.(02*07) ... /                pixels, one run a line; S_c(r,c) stroke pixels, where w > 0
-    S_x(r,c)                                 those where two strokes meet, w_x > 0, where there are any
     E(r,c,side)                              pairs, upper or right: s('01','04','u') is s_01_04_u
     north(side), east(side)                  to pixel j: alpha_j is alpha(r-north(side),c+east(side))
     c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, from its declaration
@@ -14,8 +13,8 @@ functions of GAMS, but a declared symbol of that name wins, so that variables ke
 (tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
 the scalar layout (gams_scalar.py).
 
-Counted while writing, because columns and rows are sums over sets: pixels in the runs, strokes and crossings
-with a direction, reliabilities other than 0, jumps other than 0, and narrowed bounds.
+Counted while writing, because columns and rows are sums over sets: pixels in the runs, strokes with a
+direction, reliabilities other than 0, jumps other than 0, and narrowed bounds.
 """
 
 from __future__ import annotations
@@ -39,11 +38,10 @@ from ..writing.records import Bytes, Counted, Piece, Words, number, render, word
 from .gams_scalar import MODEL_TYPES, SENSES, power
 from .indexed import Indexed, check_indexed, described, narrowed
 
-SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "crossings": "S_x", "pairs": "E"}
+SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
 DOMAINS: Final[dict[IndexSet, str]] = {
     "pixels": "r,c",
     "strokes": "r,c",
-    "crossings": "r,c",
     "pairs": "r,c,side",
 }
 SECOND: Final = "r-north(side),c+east(side)"
@@ -61,8 +59,6 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
         "pixels": _pixels(instance, counts),
         "theta": _data(keys(instance, "strokes"), instance.target, counts, "strokes"),
         "w": _data(keys(instance, "strokes"), instance.w, counts, "reliabilities of strokes"),
-        "theta_x": _data(keys(instance, "crossings"), instance.cross_target, counts, "crossings"),
-        "w_x": _data(keys(instance, "crossings"), instance.w_cross, counts, "reliabilities of crossings"),
         "jumps": _jumps(problem, counts),
         "start": () if start is None else _start(problem, start),
         "results": _results(problem),
@@ -79,8 +75,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     )
     listed = Expected(problem).data()
     bounds = {name: elements(instance, over) for over, names in narrowed(problem).items() for name in names}
-    reliable = {f"reliabilities of {what} other than 0": listed[what] for what in ("strokes", "crossings")}
-    check(counts, listed | bounds | reliable)
+    check(counts, listed | bounds | {"reliabilities of strokes other than 0": listed["strokes"]})
 
 
 def _data_context(problem: Problem) -> dict[str, Any]:
@@ -93,7 +88,6 @@ def _data_context(problem: Problem) -> dict[str, Any]:
         "last_row": f"{grid.height - 1:0{digits}}",
         "last_column": f"{grid.width - 1:0{digits}}",
         "gauge": instance.gauge,
-        "crossings": len(instance.crossings) > 0,
         "w_strokes": number(instance.w_strokes),
         "w_beta": number(instance.w_beta),
         "pairs": pairs,

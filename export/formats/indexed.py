@@ -98,5 +98,5 @@ def check_indexed(problem: Problem, layout: str, instead: str) -> None:
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(f"{layout} has no place for columns fixed one by one; write {instead}")
-    for name in ("w", "w_cross", "w_strokes", "w_beta"):
+    for name in ("w", "w_strokes", "w_beta"):
         check_coefficients(getattr(instance, name), f"{name} of {instance.name}")

@@ -25,7 +25,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
-from ...models.formulations.symbols import SLOTS, pixel_of
+from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Floats, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
@@ -129,9 +129,8 @@ def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | No
         own = None if family.everywhere else _inverse(family.elements, family.block(term.symbols[0]).count)
         return [(0, own, term)]
     assert family.everywhere  # families on a part of the pairs have terms of those pairs alone
-    if kind in {"stroke", "crossing"}:
-        at = pixel_of(instance, family.family.over)
-        return [(0, _inverse(at, instance.grid.size), term)]
+    if kind == "stroke":
+        return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
     left, upper, right, lower = _pairs_round(instance.grid)
     return [(1, upper, term), (2, right, term)] if kind == "first" else [(0, left, term), (3, lower, term)]
 

@@ -212,11 +212,11 @@ def _sketch(axes: Any, picture: Picture) -> None:
 
 
 def _strokes(axes: Any, picture: Picture, colour: str, width: float, fade: float) -> None:
-    """A short segment at each stroke pixel, two where strokes meet, the more opaque the more reliable."""
+    """A short segment at each stroke pixel, the more opaque the more reliable."""
     from matplotlib.colors import to_rgba
 
-    pixels, theta, w = picture.instance.every_stroke
-    row, column = pixels.T
+    theta, w = picture.instance.theta, picture.instance.w
+    row, column = picture.instance.stroke_pixels.T
     centre = np.stack([column, -row], axis=1)
     arm = 0.48 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     colours = np.tile(to_rgba(colour), (len(row), 1))

@@ -134,8 +134,8 @@ class _Sheet:
         ]
 
     def strokes(self, name: str, width: float) -> list[str]:
-        """A short segment at each stroke pixel, two where strokes meet."""
-        pixels, theta, w = self.instance.every_stroke
+        """A short segment at each stroke pixel."""
+        pixels, theta, w = self.instance.stroke_pixels, self.instance.theta, self.instance.w
         arm = 0.44 * np.stack([np.cos(theta), -np.sin(theta)], axis=1)
         centre = pixels[:, ::-1] + 0.5
         ends = np.stack([centre - arm, centre + arm], axis=1)

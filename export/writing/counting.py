@@ -44,7 +44,6 @@ class Expected:
             problem.formulation,
             problem.jumps,
             problem.pinned,
-            problem.free,
             problem.windows,
         )
         self._degree = degree
@@ -131,12 +130,11 @@ class Expected:
         }
 
     def data(self) -> dict[str, int]:
-        """Counts of the data that layouts over sets list: pixels, strokes, crossings, jumps other than 0."""
+        """Counts of the data that layouts over sets list: pixels, strokes, jumps other than 0."""
         instance, jumps = self._problem.instance, self._problem.jumps
         return {
             "pixels": int(np.count_nonzero(instance.mask)),
             "strokes": len(instance.stroke_pixels),
-            "crossings": len(instance.crossings),
             "jumps": 0 if jumps is None else int(np.count_nonzero(jumps)),
         }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -23,8 +23,7 @@ MOST: Final = 0.5
 class HiddenCurve:
     """A curve of an instance to be hidden.
 
-    number: of the curve, as in `curves_of`. stroke: int (k,), the numbers of its strokes among all of the
-    instance (`every_stroke`), so that of a crossing both are counted.
+    number: of the curve, as in `curves_of`. stroke: int (k,), the numbers of its stroke pixels.
     """
 
     number: int
@@ -33,27 +32,10 @@ class HiddenCurve:
 
     @cached_property
     def rest(self) -> Instance:
-        """The instance without the curve's strokes; its mask and its other strokes are the same.
-
-        At a crossing the other stroke stays, as the only one.
-        """
-        whole = self.instance
-        hidden = np.zeros(len(whole.every_stroke[1]), dtype=bool)
-        hidden[self.stroke] = True
-        first, second = hidden[: len(whole.theta)], hidden[len(whole.theta) :]
-        alone = first[whole.crossings] & ~second
-        at, stays = whole.crossings[alone], ~(alone | second)
-        theta, w, kept = whole.theta.copy(), whole.w.copy(), ~first
-        theta[at], w[at], kept[at] = whole.theta_cross[alone], whole.w_cross[alone], True
-        single = replace(
-            whole,
-            theta=theta,
-            w=w,
-            crossings=whole.crossings[stays],
-            theta_cross=whole.theta_cross[stays],
-            w_cross=whole.w_cross[stays],
-        )
-        return single.with_strokes(kept)
+        """The instance without the curve's strokes; its mask and its other strokes are the same."""
+        kept = np.ones(len(self.instance.theta), dtype=bool)
+        kept[self.stroke] = False
+        return self.instance.with_strokes(kept)
 
     def deviation(self, field: CrossField) -> float:
         """The mean angle from the curve to the nearer line of the crosses on it, in [0, pi/2] radians.
@@ -63,17 +45,16 @@ class HiddenCurve:
         """
         if not np.array_equal(field.instance.mask, self.instance.mask):
             raise InstanceError(f"the field is not on the pixels of {self.instance.name}")
-        at, theta = self.instance.stroke_terms.pixel, self.instance.every_stroke[1]
+        at, theta = self.instance.stroke_index, self.instance.theta
         return float(field.deviation(at[self.stroke], theta[self.stroke]).mean())
 
 
 def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurve]:
     """Up to `most` curves that can be hidden, those with most stroke pixels first.
 
-    curve: int (r,), number of the one curve that each stroke belongs to, in the order of `every_stroke`,
-    negative where several run: these are never hidden. Left out are curves of fewer than SHORTEST pixels, of
-    more than MOST of all, and those without which a part of the mask has no stroke that the field could
-    follow.
+    curve: int (s,), number of the one curve that each stroke pixel belongs to, negative where several run:
+    these are never hidden. Left out are curves of fewer than SHORTEST pixels, of more than MOST of all, and
+    those without which a part of the mask has no stroke that the field could follow.
     """
     numbers, count = np.unique(curve[curve >= 0], return_counts=True)
     wanted = (count >= SHORTEST) & (count <= MOST * len(curve))
@@ -111,9 +92,9 @@ def summary(angles: Floats) -> Summary | None:
 
 
 def _parts(instance: Instance) -> Ints:
-    """The number of the 4-connected part of the mask in which each stroke lies, shape (r,)."""
+    """The number of the 4-connected part of the mask in which each stroke lies, shape (s,)."""
     from scipy import ndimage
 
-    row, column = instance.every_stroke[0].T
+    row, column = instance.stroke_pixels.T
     parts: Ints = ndimage.label(instance.mask)[0][row, column]
     return parts

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ..errors import InstanceError
-from ..instance.angles import line_difference
+from ..instance.angles import MOST_ANGLE, line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
 from ..previews import Pictured
@@ -32,7 +32,6 @@ MOST: Final = 0.9
 """Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
-_MOST_ANGLE: Final = 1e6  # radians that leave enough digits modulo pi
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Shape:
     """What a designer sees of a field, whatever its energy and the weights.
 
     mean_deviation, most_deviation: mean and 90 % quantile over the stroke pixels of the angle between the
-    stroke and its line, in [0, pi/2] radians; a crossing counts as two (`CrossField.stroke_deviation`).
+    stroke and its line, in [0, pi/2] radians (`CrossField.stroke_deviation`).
     far_strokes: share of the strokes where it is more than 10 degrees. narrow_pixels: share of all pixels
     whose lines are less than 45 degrees apart; inside the bounds they are pi/2 - 2|beta| apart, so that is
     where |beta| > pi/8.
@@ -172,25 +171,17 @@ class CrossField(Pictured):
         at = self.instance.stroke_index
         return self.alpha[at] + self.beta[at] - self.instance.target
 
-    @property
-    def residual_x(self) -> Floats:
-        """X = alpha - beta + pi/2 - theta_cross of line v at each crossing, shape (x,)."""
-        at = self.instance.crossing_index
-        return self.alpha[at] - self.beta[at] + HALF - self.instance.cross_target
-
     def energy(self, norm: Norm = 2) -> Energy:
         """The energy with squares (2) or absolute values (1) throughout, as three sums and their total.
 
-        2 sum (|A| + |B|) over pairs, w_strokes (sum w |R| over stroke pixels + sum w_cross |X| over
-        crossings), w_beta sum |beta| over pixels, or all of them squared (docs/mathematics.md, 5).
+        2 sum (|A| + |B|) over pairs, w_strokes sum w |R| over stroke pixels, w_beta sum |beta| over pixels,
+        or all of them squared (docs/mathematics.md, 5).
         """
         instance = self.instance
         size = np.abs if norm == 1 else np.square
-        first = np.sum(instance.w * size(self.residual_r))
-        second = np.sum(instance.w_cross * size(self.residual_x))
         return Energy(
             smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
-            strokes=instance.w_strokes * float(first + second),
+            strokes=instance.w_strokes * float(np.sum(instance.w * size(self.residual_r))),
             beta=instance.w_beta * float(np.sum(size(self.beta))),
         )
 
@@ -226,24 +217,8 @@ class CrossField(Pictured):
 
     @property
     def stroke_deviation(self) -> Floats:
-        """Angle between each stroke and its line, in [0, pi/2] radians; shape (s + x,).
-
-        Its line is the nearer one. Where two strokes meet each has a line of its own: of both ways to give
-        them lines the one with the smaller sum of angles. The second strokes of crossings come last.
-        """
-        instance, u, v = self.instance, self.alpha + self.beta, self.alpha + HALF - self.beta
-        first = self.deviation(instance.stroke_index, instance.theta)
-        at, crossing = instance.crossing_index, instance.crossings
-        theta, other = instance.theta[crossing], instance.theta_cross
-        ways = np.stack(
-            [
-                [line_difference(u[at], theta), line_difference(v[at], other)],
-                [line_difference(v[at], theta), line_difference(u[at], other)],
-            ]
-        )
-        straight = ways[0].sum(axis=0) <= ways[1].sum(axis=0)
-        first[crossing], second = np.where(straight, *ways)
-        return np.concatenate([first, second])
+        """Angle between each stroke and the nearer line, in [0, pi/2] radians; shape (s,)."""
+        return self.deviation(self.instance.stroke_index, self.instance.theta)
 
     def deviation(self, pixels: Ints, theta: Floats) -> Floats:
         """Angle between theta and the nearer line at each of some pixels, in [0, pi/2] radians: (k,)."""
@@ -344,8 +319,6 @@ def _losses(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> tup
     shifted = np.clip(moved, instance.alpha_lower[at], instance.alpha_upper[at])
     turned = np.clip(parity_sign(steps) * beta[at], -QUARTER, QUARTER)
     misfit = np.abs(shifted + turned - instance.target)
-    second = (shifted - turned + HALF)[..., instance.crossings]
-    misfit[..., instance.crossings] += np.abs(second - instance.cross_target)
     return np.abs(moved - shifted), misfit
 
 
@@ -365,11 +338,11 @@ def _angles(instance: Instance, given: Any, name: str) -> Floats:
         raise InstanceError(
             f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"
         )
-    wrong = ~(np.abs(angles) <= _MOST_ANGLE)
+    wrong = ~(np.abs(angles) <= MOST_ANGLE)
     if wrong.any():
         raise InstanceError(
             f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
-            f"give radians up to {_MOST_ANGLE:g}"
+            f"give radians up to {MOST_ANGLE:g}"
         )
     return angles
 

@@ -1,7 +1,7 @@
 """The nine formulations, each one function that reads from top to bottom like the paper.
 
 Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
-S_c, the crossings S_x or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the
+S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the
 docs are all readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
 declaration.py; the symbols: symbols.py.
 """
@@ -16,7 +16,6 @@ import sympy as sp
 from .declaration import (
     FORMULATIONS,
     S_C,
-    S_X,
     E,
     Facet,
     Family,
@@ -33,11 +32,9 @@ from .symbols import (
     A,
     B,
     R,
-    X,
     beta,
     beta_i,
     beta_j,
-    chi,
     d,
     gamma,
     p,
@@ -53,7 +50,6 @@ from .symbols import (
     w,
     w_beta,
     w_strokes,
-    w_x,
     z,
 )
 
@@ -192,17 +188,13 @@ def miqp_exact() -> Families:
 
 
 def strokes(norm: int) -> Families:
-    """The stroke term, (5) or (20), and for the 1-norm its rows (22), (23); the same of second strokes."""
+    """The stroke term, (5) or (20), and for the 1-norm its rows (22), (23)."""
     if norm == 2:
         yield term("strokes", S_C, w_strokes * w * R**2, "(5)")
-        yield term("second", S_X, w_strokes * w_x * X**2, "(5), second stroke")
         return
     yield term("strokes", S_C, w_strokes * w * gamma, "(20)")
-    yield term("second", S_X, w_strokes * w_x * chi, "(20), second stroke")
     yield row(22, S_C, gamma >= R)
     yield row(23, S_C, gamma >= -R)
-    yield row("x22", S_X, chi >= X, "(22), second stroke")
-    yield row("x23", S_X, chi >= -X, "(23), second stroke")
 
 
 def skew(norm: int) -> Families:

@@ -26,7 +26,6 @@ NORMS: Final = (1, 2)
 
 I: Final[IndexSet] = "pixels"  # noqa: E741 - the paper's letter
 S_C: Final[IndexSet] = "strokes"
-S_X: Final[IndexSet] = "crossings"
 E: Final[IndexSet] = "pairs"
 
 
@@ -222,15 +221,6 @@ class Formulation:
             for symbol in family.symbols
         }
         return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
-
-    @property
-    def without_crossings(self) -> Formulation:
-        """The same for instances on which no two strokes meet: what lies over S_x is left out."""
-        return replace(
-            self,
-            objective=tuple(family for family in self.objective if family.over != S_X),
-            rows=tuple(family for family in self.rows if family.over != S_X),
-        )
 
     @property
     def equivalent(self) -> str:

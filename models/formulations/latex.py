@@ -7,21 +7,19 @@ from typing import Final
 import sympy as sp
 
 from .declaration import Family, Formulation
-from .symbols import LATEX, SLOTS, VARIABLES, IndexSet, Variable, w, w_beta, w_strokes, w_x
+from .symbols import LATEX, SLOTS, VARIABLES, IndexSet, Variable, w, w_beta, w_strokes
 
 _SUM: Final[dict[IndexSet, str]] = {
     "pixels": r"\sum_{i \in I}",
     "strokes": r"\sum_{i \in S_c}",
-    "crossings": r"\sum_{i \in S_{\times}}",
     "pairs": r"\sum_{(i,j) \in E}",
 }
 _FOR: Final[dict[IndexSet, str]] = {
     "pixels": r"i \in I",
     "strokes": r"i \in S_c",
-    "crossings": r"i \in S_{\times}",
     "pairs": r"(i,j) \in E",
 }
-_WEIGHTS: Final = (w_strokes, w_beta, w, w_x)
+_WEIGHTS: Final = (w_strokes, w_beta, w)
 _SENSE: Final = {">=": r"\ge", "<=": r"\le", "==": "="}
 
 

@@ -1,7 +1,7 @@
 """The symbols of the formulations: which quantity each one means, and where on the grid it lives.
 
 A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
-S_c, those of them where two strokes meet, S_x, or the neighbour pairs E. A *slot* is a symbol in an
+S_c, or the neighbour pairs E. A *slot* is a symbol in an
 expression over such a set; it names a quantity and the way to it: over the pairs, alpha_i is alpha at the
 first pixel, alpha_j at the second. The size of a sketch changes the length of the index arrays, never an
 expression.
@@ -20,8 +20,8 @@ import sympy as sp
 from ..instance.grid import Ints
 from ..instance.instance import HALF, Instance
 
-IndexSet = Literal["pixels", "strokes", "crossings", "pairs"]
-Way = Literal["itself", "first", "second", "stroke", "crossing"]
+IndexSet = Literal["pixels", "strokes", "pairs"]
+Way = Literal["itself", "first", "second", "stroke"]
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -32,7 +32,6 @@ alpha, beta, gamma, psi = (_symbol(name) for name in ("alpha", "beta", "gamma", 
 alpha_i, alpha_j, beta_i, beta_j = (_symbol(name) for name in ("alpha_i", "alpha_j", "beta_i", "beta_j"))
 p, p1, p2, s, t, z, d, u = (_symbol(name) for name in ("p", "p1", "p2", "s", "t", "z", "d", "u"))
 p_min, p_max, theta, w = (_symbol(name) for name in ("p_min", "p_max", "theta", "w"))
-chi, theta_x, w_x = (_symbol(name) for name in ("chi", "theta_x", "w_x"))
 alpha_lo, alpha_up, beta_lo, beta_up = (
     _symbol(name) for name in ("alpha_lo", "alpha_up", "beta_lo", "beta_up")
 )
@@ -47,8 +46,6 @@ B_LIFTED: Final = beta_i - 2 * z - beta_j
 """Change of skew with z standing for p1 beta_i, section 4."""
 R: Final = alpha + beta - theta
 """Deviation of line u from its stroke, (5)."""
-X: Final = alpha - beta + pi / 2 - theta_x
-"""Deviation of line v from the second stroke of a crossing."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +86,6 @@ VARIABLES: Final = {
         Variable("d", "pairs", -_FREE, _FREE, A, "change of direction"),
         Variable("u", "pairs", -_FREE, _FREE, B, "change of skew"),
         Variable("gamma", "strokes", _ZERO, _FREE, sp.Abs(R), "absolute deviation from a stroke"),
-        Variable("chi", "crossings", _ZERO, _FREE, sp.Abs(X), "absolute deviation from a second stroke"),
         Variable("psi", "pixels", _ZERO, _FREE, sp.Abs(beta), "absolute skew"),
     )
 }  # fmt: skip
@@ -109,13 +105,6 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
         theta: ("theta", "itself"),
         w: ("w", "itself"),
     },
-    "crossings": {
-        alpha: ("alpha", "crossing"),
-        beta: ("beta", "crossing"),
-        chi: ("chi", "itself"),
-        theta_x: ("theta_x", "itself"),
-        w_x: ("w_x", "itself"),
-    },
     "pairs": {
         alpha_i: ("alpha", "first"),
         alpha_j: ("alpha", "second"),
@@ -134,7 +123,6 @@ LATEX: Final = {
     alpha: r"\alpha_i",
     beta: r"\beta_i",
     gamma: r"\gamma_i",
-    chi: r"\chi_i",
     psi: r"\psi_i",
     alpha_i: r"\alpha_i",
     alpha_j: r"\alpha_j",
@@ -148,8 +136,6 @@ LATEX: Final = {
     alpha_up: r"\overline{\alpha}_i",
     theta: r"\theta_i",
     w: r"w_i",
-    theta_x: r"\theta^{\times}_i",
-    w_x: r"w^{\times}_i",
     w_strokes: r"w_{\mathrm{strokes}}",
     w_beta: r"w_{\beta}",
 }
@@ -160,7 +146,6 @@ def elements(instance: Instance, over: IndexSet) -> int:
     sizes = {
         "pixels": instance.grid.size,
         "strokes": len(instance.theta),
-        "crossings": len(instance.crossings),
         "pairs": len(instance.grid.first),
     }
     return sizes[over]
@@ -172,8 +157,6 @@ def way(instance: Instance, kind: Way) -> Ints | slice:
         return instance.grid.first
     if kind == "second":
         return instance.grid.second
-    if kind == "crossing":
-        return instance.crossing_index
     return instance.stroke_index if kind == "stroke" else slice(None)
 
 
@@ -183,7 +166,7 @@ def pixel_of(instance: Instance, over: IndexSet) -> Ints:
         return np.arange(instance.grid.size, dtype=np.int32)
     if over == "pairs":
         return instance.grid.first
-    return instance.stroke_index if over == "strokes" else instance.crossing_index
+    return instance.stroke_index
 
 
 def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., Any]:
@@ -209,7 +192,6 @@ __all__ = [
     "B",
     "R",
     "Variable",
-    "X",
     "elements",
     "numeric",
     "pixel_of",

@@ -17,7 +17,7 @@ from ..array_archive import ArrayArchive, Expected, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, write_bytes
-from .grid import Floats, Ints
+from .grid import Floats
 from .instance import Instance
 
 FORMAT: Final = "crossfield-instance"
@@ -33,10 +33,9 @@ _ARCHIVE: Final = {
     "theta": Expected(1, MAX_GRID**2),
     "w": Expected(1, MAX_GRID**2),
 }
-_CROSSINGS: Final = {
-    "crossings": Expected(1, MAX_GRID**2, "iuf"),
-    "theta_cross": Expected(1, MAX_GRID**2),
-    "w_cross": Expected(1, MAX_GRID**2),
+_RETIRED: Final = {
+    "crossings": "holds crossings (two strokes at one pixel) and was made by an earlier version; "
+    "read the sketch again"
 }
 
 
@@ -61,13 +60,9 @@ def read_instance(path: str | Path) -> Instance:
 
 
 def to_json(instance: Instance) -> str:
-    """The instance as JSON text, one stroke pixel [row, column, theta, w] and one mask row a line.
-
-    Where strokes meet, the second ones follow in the same way.
-    """
+    """The instance as JSON text, one stroke pixel [row, column, theta, w] and one mask row a line."""
     rows = ["".join("#" if inside else "." for inside in row) for row in instance.mask]
-    strokes = _lines(instance.stroke_pixels, instance.theta, instance.w)
-    second = _lines(instance.stroke_pixels[instance.crossings], instance.theta_cross, instance.w_cross)
+    strokes = _lines(instance)
     head = (
         {"format": FORMAT, "version": VERSION}
         | {key: getattr(instance, key) for key in _SCALARS}
@@ -75,18 +70,12 @@ def to_json(instance: Instance) -> str:
     )
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
     mask = ",\n".join(f'    "{row}"' for row in rows)
-    return (
-        "{\n"
-        + "\n".join(lines)
-        + f'\n  "mask": [\n{mask}\n  ],\n  "strokes": [\n{strokes}\n  ]'
-        + (f',\n  "crossings": [\n{second}\n  ]' if second else "")
-        + "\n}\n"
-    )
+    return "{\n" + "\n".join(lines) + f'\n  "mask": [\n{mask}\n  ],\n  "strokes": [\n{strokes}\n  ]' + "\n}\n"
 
 
-def _lines(pixels: Ints, theta: Floats, w: Floats) -> str:
+def _lines(instance: Instance) -> str:
     """Strokes as JSON text, one a line."""
-    rows = zip(pixels.tolist(), theta.tolist(), w.tolist(), strict=True)
+    rows = zip(instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
     return ",\n".join(f"    [{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows)
 
 
@@ -157,9 +146,10 @@ def _check_writable(document: object) -> None:
 def of_document(document: object) -> Instance:
     """The instance that a parsed JSON document describes, or InstanceError with the place in it."""
     check_version(document, FORMAT, VERSION)
-    document = check_schema(
-        document, "instance", __package__, rows={"strokes": _are_strokes, "crossings": _are_strokes}
-    )
+    if isinstance(document, dict):
+        for key in _RETIRED.keys() & document.keys():
+            raise InstanceError(_RETIRED[key])
+    document = check_schema(document, "instance", __package__, rows={"strokes": _are_strokes})
     width = len(document["mask"][0])
     for number, row in enumerate(document["mask"]):
         if len(row) != width:
@@ -176,28 +166,11 @@ def of_document(document: object) -> Instance:
             stroke_pixels=np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
             theta=np.array([stroke[2] for stroke in strokes], dtype=float),
             w=np.array([stroke[3] for stroke in strokes], dtype=float),
-            **_crossings(document.get("crossings", []), strokes),
             origin=tuple(document.get("origin", (0.0, 0.0))),
             **{key: document[key] for key in _SCALARS if key in document},
         )
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
-
-
-def _crossings(second: list[Any], strokes: list[Any]) -> dict[str, Any]:
-    """Entries of Instance for the second strokes of a document. Raises InstanceError."""
-    check_counts(len(second), len(strokes))
-    number = {(stroke[0], stroke[1]): place for place, stroke in enumerate(strokes)} if second else {}
-    for row, column, *_ in second:
-        if (row, column) not in number:
-            raise InstanceError(
-                f"the crossing [{row}, {column}] has no first stroke; list that among strokes"
-            )
-    return {
-        "crossings": np.array([number[row, column] for row, column, *_ in second], dtype=np.int32),
-        "theta_cross": np.array([stroke[2] for stroke in second], dtype=float),
-        "w_cross": np.array([stroke[3] for stroke in second], dtype=float),
-    }
 
 
 def check_counts(strokes: int, pixels: int) -> None:
@@ -292,17 +265,13 @@ def _npz(instance: Instance) -> bytes:
 
 
 def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
-    """The instance as named arrays; `head` is JSON text with format, version and scalars.
-
-    Those of crossings are among them where there are any.
-    """
+    """The instance as named arrays; `head` is JSON text with format, version and scalars."""
     head = {"format": FORMAT, "version": VERSION} | {key: getattr(instance, key) for key in _SCALARS}
     arrays = {
         "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
         "origin": np.array(instance.origin),
     }
-    names = _ARRAYS if not len(instance.crossings) else (*_ARRAYS, *_CROSSINGS)
-    return arrays | {key: getattr(instance, key) for key in names}
+    return arrays | {key: getattr(instance, key) for key in _ARRAYS}
 
 
 def _of_npz(data: bytes) -> Instance:
@@ -318,7 +287,10 @@ def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
 
     Raises InstanceError with the array's name.
     """
-    return of_arrays(archive.arrays(_ARCHIVE, prefix, optional=_CROSSINGS))
+    for name, message in _RETIRED.items():
+        if archive.holds(prefix + name):
+            raise InstanceError(message)
+    return of_arrays(archive.arrays(_ARCHIVE, prefix))
 
 
 def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
@@ -330,7 +302,6 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
         scalars = {key: head[key] for key in _SCALARS}
         origin = (float(arrays["origin"][0]), float(arrays["origin"][1]))
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
-        entries |= {key: arrays[key] for key in _CROSSINGS if key in arrays}
         return Instance(origin=origin, **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InstanceError, NoStrokeError
 from ..previews import Pictured
-from .angles import line_difference, wrap
+from .angles import MOST_ANGLE, wrap
 from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
 from .reading import Reading
@@ -35,7 +35,6 @@ _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _FARTHEST = 1e100  # coordinates whose squares are finite numbers
-_MOST_ANGLE = 1e6  # radians that leave enough digits modulo pi
 _SLACK = 1e-9  # floor and ceil of jump bounds, and the ends of ranges, forgive this much rounding
 
 MOST_WEIGHT: Final = 1e6
@@ -72,12 +71,12 @@ def _check_weight(name: str, value: float) -> None:
         )
 
 
-def _check_lines(at: Ints, theta: Floats, w: Floats, names: tuple[str, str], outside: Bools) -> None:
-    """Nothing, when the strokes at those pixels obey the rules; else raises InstanceError with the pixel."""
+def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
+    """Raise InstanceError, with the pixel, unless the strokes at those pixels obey the rules."""
     for label, wrong in (
-        (f"{names[0]} is not a finite number", ~np.isfinite(theta)),
-        (f"{names[0]} is beyond {_MOST_ANGLE:g} radians", ~(np.abs(theta) <= _MOST_ANGLE)),
-        (f"{names[1]} is not in (0, 1]", ~((w > 0) & (w <= 1))),
+        ("theta is not a finite number", ~np.isfinite(theta)),
+        (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(theta) <= MOST_ANGLE)),
+        ("w is not in (0, 1]", ~((w > 0) & (w <= 1))),
         ("is outside the mask", outside),
     ):
         if wrong.any():
@@ -89,14 +88,6 @@ def _directions(angle: Floats) -> Floats:
     """Line directions in [0, pi), rounded."""
     theta = np.round(wrap(angle, 0.0, np.pi), _DECIMALS)
     return np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta)
-
-
-def _second_directions(angle: Floats, theta: Floats) -> Floats:
-    """The same of second strokes; those nearly at right angles to the first ones or to 0 become so."""
-    second = _directions(angle)
-    for right in (np.full_like(theta, HALF), theta + np.where(theta < HALF, HALF, -HALF)):
-        second = np.where(line_difference(second, right) < _FLAT, right, second)
-    return second
 
 
 def _reliabilities(w: Floats) -> Floats:
@@ -115,11 +106,6 @@ class Instance(Pictured):
     rounded to 12 decimals, and as 0 within 1e-8 of the horizontal: a cost that small would be dropped by
     readers of the files.
     w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
-    crossings: int (x,), numbers of the stroke pixels where a second stroke meets the first, ascending, each
-    once; none by default. theta_cross, w_cross: float (x,), direction and reliability of that second stroke,
-    rounded like theta and w; a direction within 1e-8 of a right angle to theta or to the horizontal is at
-    that angle, and a reliability as near to w is w, for the same reason. Line u follows the first stroke and
-    line v the second one; which of the two comes first does not matter.
     w_strokes, w_beta: coefficients of the stroke and the skew term of the energy (1 and 1e-6), at most
     1e6: beyond, an energy that rounding leaves in the one term hides the others. They count per pixel;
     weights that mean the same on every grid: `with_weights`.
@@ -147,17 +133,13 @@ class Instance(Pictured):
     source: str = ""
     pixel_size: float = 1.0
     origin: tuple[float, float] = field(default=(0.0, 0.0))
-    crossings: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
-    theta_cross: Floats = field(default_factory=lambda: np.zeros(0))
-    w_cross: Floats = field(default_factory=lambda: np.zeros(0))
     reading: Reading | None = None
 
     def __post_init__(self) -> None:
         """Take over read-only copies in the documented types, then check every rule."""
         self._freeze("mask", np.asarray(self.mask, dtype=bool))
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
-        self._freeze("crossings", whole_numbers(self.crossings, "crossings"))
-        for name in ("theta", "w", "theta_cross", "w_cross"):
+        for name in ("theta", "w"):
             self._freeze(name, np.asarray(getattr(self, name), dtype=np.float64))
         object.__setattr__(self, "origin", (in_digits(self.origin[0]), in_digits(self.origin[1])))
         for name in ("w_strokes", "w_beta"):
@@ -165,13 +147,8 @@ class Instance(Pictured):
         object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
         self._check_scalars()
         self._check_strokes()
-        self._check_crossings()
         self._freeze("theta", _directions(self.theta))
         self._freeze("w", _reliabilities(self.w))
-        first = np.stack([self.theta, self.w])[:, self.crossings]
-        self._freeze("theta_cross", _second_directions(self.theta_cross, first[0]))
-        w = _reliabilities(self.w_cross)
-        self._freeze("w_cross", np.where(np.abs(w - first[1]) < _FLAT, first[1], w))
 
     def __repr__(self) -> str:
         return f"<Instance {self.summary}>"
@@ -225,29 +202,13 @@ class Instance(Pictured):
                 f"{count} stroke pixels need as many theta and w, "
                 f"but there are {self.theta.size} and {self.w.size}"
             )
-        _check_lines(self.stroke_pixels, self.theta, self.w, ("theta", "w"), ~self._inside())
+        _check_lines(self.stroke_pixels, self.theta, self.w, ~self._inside())
         key = self.stroke_pixels[:, 0].astype(np.int64) * self.mask.shape[1] + self.stroke_pixels[:, 1]
         if (np.diff(key) <= 0).any():
             row, column = self.stroke_pixels[int(np.argmax(np.diff(key) <= 0)) + 1]
             raise InstanceError(
                 f"stroke pixel [{row}, {column}] is out of order or listed twice; list each once, row by row"
             )
-
-    def _check_crossings(self) -> None:
-        count = self.crossings.size
-        if not self.crossings.shape == self.theta_cross.shape == self.w_cross.shape == (count,):
-            raise InstanceError(
-                f"{count} crossings need as many theta_cross and w_cross in a row, "
-                f"but there are {self.theta_cross.size} and {self.w_cross.size}"
-            )
-        if not ((self.crossings >= 0) & (self.crossings < len(self.stroke_pixels))).all():
-            raise InstanceError(
-                f"crossings holds a number that is no stroke pixel; the last is {len(self.stroke_pixels) - 1}"
-            )
-        if (np.diff(self.crossings) <= 0).any():
-            raise InstanceError("crossings are out of order or listed twice; list each once, ascending")
-        at = self.stroke_pixels[self.crossings]
-        _check_lines(at, self.theta_cross, self.w_cross, ("theta_cross", "w_cross"), np.zeros(count, bool))
 
     def _inside(self) -> Bools:
         row, column = self.stroke_pixels.T
@@ -278,32 +239,9 @@ class Instance(Pictured):
         return np.where(beyond, np.maximum(self.theta - np.pi, -QUARTER), self.theta)
 
     @cached_property
-    def crossing_index(self) -> Ints:
-        """Pixel number of each crossing, shape (x,)."""
-        number: Ints = self.stroke_index[self.crossings]
-        return number
-
-    @cached_property
-    def cross_target(self) -> Floats:
-        """Theta_cross where line v is: [theta, theta + pi) for `strokes`, [pi/4, 5 pi/4) for `box`; (x,).
-
-        Line v is at alpha - beta + pi/2, which alpha's window and |beta| <= pi/4 leave that range.
-        """
-        if self.gauge == "strokes":
-            return self.theta_cross + np.pi * (self.theta_cross < self.theta[self.crossings])
-        before = self.theta_cross < QUARTER - _SLACK
-        return np.where(before, self.theta_cross + np.pi, np.maximum(self.theta_cross, QUARTER))
-
-    @cached_property
     def stroke_terms(self) -> StrokeTerms:
-        """The residuals of all strokes, the second ones of crossings after the first ones of all pixels."""
-        count = len(self.theta), len(self.crossings)
-        return StrokeTerms(
-            np.concatenate([self.stroke_index, self.crossing_index]),
-            np.repeat([1.0, -1.0], count),
-            np.concatenate([self.target, self.cross_target - HALF]),
-            self.w_strokes * np.concatenate([self.w, self.w_cross]),
-        )
+        """The residuals of all strokes."""
+        return StrokeTerms(self.stroke_index, self.target, self.w_strokes * self.w)
 
     @cached_property
     def alpha_lower(self) -> Floats:
@@ -364,35 +302,17 @@ class Instance(Pictured):
         """The weight of the skew that means the same on every grid; w_beta on one of 24 pixels."""
         return skew_weight(self.w_beta, max(self.mask.shape))
 
-    @property
-    def every_stroke(self) -> tuple[Ints, Floats, Floats]:
-        """Pixels (r, 2), directions (r,) and reliabilities (r,) of all strokes, the second ones last."""
-        return (
-            np.concatenate([self.stroke_pixels, self.stroke_pixels[self.crossings]]),
-            np.concatenate([self.theta, self.theta_cross]),
-            np.concatenate([self.w, self.w_cross]),
-        )
-
-    def without_crossings(self) -> Instance:
-        """The same instance without the second strokes: no field of it has a higher energy there."""
-        nothing = np.zeros(0)
-        return replace(self, crossings=np.zeros(0, np.int32), theta_cross=nothing, w_cross=nothing)
-
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
-        """The same instance with only those stroke pixels, shape (s,), and their crossings.
+        """The same instance with only those stroke pixels, shape (s,).
 
         mask: another one, by default the same. Raises InstanceError.
         """
-        crossing = kept[self.crossings]
         return replace(
             self,
             mask=self.mask if mask is None else mask,
             stroke_pixels=self.stroke_pixels[kept],
             theta=self.theta[kept],
             w=self.w[kept],
-            crossings=(np.cumsum(kept) - 1)[self.crossings[crossing]],
-            theta_cross=self.theta_cross[crossing],
-            w_cross=self.w_cross[crossing],
         )
 
     def turned(self) -> Instance:
@@ -414,17 +334,12 @@ class Instance(Pictured):
     def _moved(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
         """The instance with its stroke pixels elsewhere and every direction theta at sense theta + turn."""
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
-        crossings = np.argsort(order).astype(np.int32)[self.crossings]
-        ascending = np.argsort(crossings)
         return replace(
             self,
             mask=mask,
             stroke_pixels=pixels[order],
             theta=sense * self.theta[order] + turn,
             w=self.w[order],
-            crossings=crossings[ascending],
-            theta_cross=sense * self.theta_cross[ascending] + turn,
-            w_cross=self.w_cross[ascending],
             reading=None,
         )
 
@@ -433,10 +348,9 @@ class Instance(Pictured):
         """Name, grid, pixels, strokes, parts of the mask, gauge, and weights unless they are defaults."""
         grid = self.grid
         parts = f" in {grid.parts} separate parts" if grid.parts > 1 else ""
-        crossings = f" ({len(self.crossings)} with two)" if len(self.crossings) else ""
         return (
             f"{self.name}: {grid.width} x {grid.height}, {grid.size} pixels{parts}, "
-            f"{len(self.theta)} with strokes{crossings}, gauge {self.gauge}{self._other_weights}"
+            f"{len(self.theta)} with strokes, gauge {self.gauge}{self._other_weights}"
         )
 
     @property
@@ -465,7 +379,4 @@ class Instance(Pictured):
             self.w.astype("<f8"),
         ):
             digest.update(array.tobytes())
-        if len(self.crossings):
-            digest.update(b"crossings\0" + self.crossings.astype("<i4").tobytes())
-            digest.update(np.concatenate([self.theta_cross, self.w_cross]).astype("<f8").tobytes())
         return digest.hexdigest()

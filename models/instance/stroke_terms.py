@@ -1,4 +1,4 @@
-"""The stroke terms of an energy as arrays: at a crossing two of them pull at one pixel, each at its line."""
+"""The stroke terms of an energy as arrays."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ from .grid import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class StrokeTerms:
-    """One residual R = alpha + side beta - goal for each stroke of each pixel, shapes (r,).
+    """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
 
-    pixel: its number. side: 1 where line u follows the stroke, -1 where line v does, whose goal is pi/2 less
-    than its direction. weight: w_strokes times the reliability of the direction.
+    pixel: its number. goal: its direction in the gauge's range. weight: w_strokes times its reliability.
     """
 
     pixel: Ints
-    side: Floats
     goal: Floats
     weight: Floats
 
     def residuals(self, alpha: Floats, beta: Floats) -> Floats:
-        """R of each term in radians, shape (r,), of the angles (n,) of all pixels."""
-        return alpha[self.pixel] + self.side * beta[self.pixel] - self.goal
+        """R of each term in radians, shape (s,), of the angles (n,) of all pixels."""
+        return alpha[self.pixel] + beta[self.pixel] - self.goal
 
     def at_pixels(self, values: Floats, size: int) -> Floats:
         """Sums of the terms' values at each of `size` pixels, shape (size,)."""
@@ -32,4 +30,4 @@ class StrokeTerms:
 
     def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
         """Some of the terms, by their numbers, at pixels that are numbered anew by `number` (n,)."""
-        return StrokeTerms(number[self.pixel[terms]], self.side[terms], self.goal[terms], self.weight[terms])
+        return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])

@@ -383,7 +383,7 @@ def _levels(head: dict[str, Any]) -> int:
 def sketch_of(arrays: dict[str, Array]) -> Sketch:
     """The instance that the certificate holds. Stroke directions are moved into the gauge's own range."""
     head = _text(arrays, "instance_head")
-    _need("instance_crossings" not in arrays, "instance_crossings", "says what no certificate is about")
+    _need("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     mask = _given(arrays, "instance_mask", "|b1", None, None)
     rows, columns = np.nonzero(mask)
     n = len(rows)

@@ -65,11 +65,10 @@ def search(
 def suggested(field: CrossField, left: Callable[[], float], over: Over = never, *, jobs: int) -> CrossField:
     """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
 
-    left: seconds that are left; with few of them, for very small and large grids, and where two strokes meet
-    at a pixel, which lattices do not know, it is the field itself. over: whether the time is over. jobs:
-    threads; any number of them gives the same field.
+    left: seconds that are left; with few of them, and for very small and large grids, it is the field itself.
+    over: whether the time is over. jobs: threads; any number of them gives the same field.
     """
-    if not _FEWEST < field.instance.grid.size <= _MOST or len(field.instance.crossings):
+    if not _FEWEST < field.instance.grid.size <= _MOST:
         return field
     if left() < _LEAST_SECONDS:
         return field

@@ -21,7 +21,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from ..errors import InputError, InstanceError
+from ..errors import InputError
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
@@ -90,15 +90,8 @@ def prove(
     whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
     proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
     and seldom tight.
-    Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs; and
-    InstanceError for an instance in which two strokes meet at a pixel.
+    Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs.
     """
-    if len(instance.crossings):
-        raise InstanceError(
-            f"no proof knows what two strokes at one pixel cost, and {instance.name} has "
-            f"{len(instance.crossings)} such pixels; search, or prove instance.without_crossings(): its "
-            "bound holds too"
-        )
     if (seconds is not None and not seconds > 0) or not gap >= 0 or jobs < 1:
         raise InputError("a proof needs a positive number of seconds and of jobs, and a gap of 0 or more")
     if norm not in (1, 2):

@@ -36,16 +36,13 @@ class Residuals:
 
     @classmethod
     def at(cls, instance: Instance, p: Ints) -> Residuals:
-        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels.
-
-        Second strokes of crossings come after the first ones of all stroke pixels.
-        """
+        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
         n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
         unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
         nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
         a = sparse.hstack([unit[first] - unit[second], nothing])
         b = sparse.hstack([nothing, sparse.diags_array(parity_sign(p)) @ unit[first] - unit[second]])
-        r = sparse.hstack([at, sparse.diags_array(strokes.side) @ at])
+        r = sparse.hstack([at, at])
         skew = sparse.hstack([sparse.csr_array((n, n)), unit])
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),

@@ -30,7 +30,7 @@ def halved(instance: Instance) -> Instance | None:
     """The instance with each 2 x 2 pixels made one, or None when no stroke is left.
 
     A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
-    strokes, by the double angle. It carries one at most: second strokes of crossings count on the fine grid.
+    strokes, by the double angle.
     """
     height, width = instance.mask.shape
     even = np.pad(instance.mask, ((0, height % 2), (0, width % 2)))
@@ -43,7 +43,7 @@ def halved(instance: Instance) -> Instance | None:
     if not len(kept):
         return None
     return replace(
-        instance.without_crossings(),
+        instance,
         mask=mask,
         stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
         theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,

@@ -2,7 +2,7 @@
 
 With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant. H
 holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i,
-there with the other sign for the second stroke of a crossing, and w_beta.
+and w_beta.
 """
 
 from __future__ import annotations
@@ -54,17 +54,13 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     i, j, p = grid.first[pairs], grid.second[pairs], p[pairs]
     degree = 2.0 * (np.bincount(i, minlength=n) + np.bincount(j, minlength=n))
     weight, turn = stroke_weight(instance), np.pi * p
-    both = strokes.at_pixels(strokes.side * strokes.weight, n)
-    beside = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, both[at]])
+    beside = np.concatenate([np.full(len(p), -2.0), 4.0 * (p & 1) - 2.0, weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.w_beta])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
     matrix = symmetric(row, column, beside, diagonal)
-    goal = strokes.weight * strokes.goal
+    goal = strokes.at_pixels(strokes.weight * strokes.goal, n)
     pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
-    return Quadratic(
-        matrix,
-        np.concatenate([pulled + strokes.at_pixels(goal, n), strokes.at_pixels(strokes.side * goal, n)]),
-    )
+    return Quadratic(matrix, np.concatenate([pulled + goal, goal]))
 
 
 class LinearSolver:

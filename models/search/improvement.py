@@ -81,14 +81,13 @@ def _swap_lines(state: FreeField) -> None:
     """Exchange u and v where a stroke pixel's alpha has run against its window of the gauge `strokes`.
 
     There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the
-    other fits better. Not so where two strokes meet, which would exchange their lines.
+    other fits better.
     """
     instance, at = state.instance, state.instance.stroke_index
     if instance.gauge != "strokes":
         return
     off = state.alpha[at] - instance.target
     swapped = np.abs(off) >= QUARTER - 1e-9
-    swapped[instance.crossings] = False
     alpha, beta = state.alpha.copy(), state.beta.copy()
     alpha[at] -= np.where(swapped, HALF * np.sign(off), 0.0)
     beta[at] *= np.where(swapped, -1.0, 1.0)

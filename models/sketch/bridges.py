@@ -124,7 +124,7 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     bridges = _candidates(walls, outside, ends, frame)
     if not len(bridges):
         return walls, bridges
-    number, row, column, _ = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
+    number, row, column = covering_curves(bridges, np.arange(len(bridges), dtype=np.int32), frame, 0.0)
     rooms, mouths = _rooms(walls, outside, row, column)
     if not rooms.any():
         return walls, bridges[:0]

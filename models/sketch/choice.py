@@ -1,4 +1,4 @@
-"""What of a drawing is a curvature line, where more is known than its colours say, and what crossings hold.
+"""What of a drawing is a curvature line, where more is known than its colours say.
 
 Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. What
 stands in a group has the labels of the group too. The strokes that are not chosen cut the field.
@@ -28,14 +28,12 @@ class Choice:
     silhouette: "outer": what runs along the outline of the drawing carries no direction; "none": all
     curvature lines count. curvature: labels such as "class=flow", of which each curvature line has one; none:
     the drawing's colours decide. view: of a .curves file, as in `read_curves`; None: by its principal axes.
-    crossings: whether a pixel in which two curves meet keeps both directions, as in `read_sketch`.
     Raises InputError for what is none of these.
     """
 
     silhouette: Silhouette = "none"
     curvature: tuple[str, ...] = ()
     view: str | None = None
-    crossings: bool = False
 
     def __post_init__(self) -> None:
         """Check what can be checked without a drawing."""
@@ -61,13 +59,6 @@ class Choice:
         """Nothing, or InputError when strokes are chosen in something that has no labels."""
         if self.curvature:
             raise InputError(f"{what}; leave the choice of {self.curvature[0]} out")
-
-    def refuse_crossings(self) -> None:
-        """Nothing, or InputError when crossings are asked of what does not say which its curves are."""
-        if self.crossings:
-            raise InputError(
-                "is a picture, which does not say which curves meet in a pixel; leave crossings out"
-            )
 
     def refuse_view(self) -> None:
         """Nothing, or InputError when a view is chosen of something flat."""

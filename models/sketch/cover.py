@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..input_limits import MAX_PIECES
-from ..instance.angles import line_difference, line_of
 from ..instance.elementary import length as vector_length
 from ..instance.grid import Bools, Floats, Ints
 
@@ -29,8 +28,6 @@ LEAST_R: Final = 0.5
 Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither of them; a single line
 that bends by as much as a right angle inside the pixel still has R = 0.64.
 """
-LEAST_ANGLE: Final = np.pi / 6
-"""Least angle between two curves that cross: below, they may be one line drawn twice."""
 _NUDGE: Final = 1e-9  # of a pixel: what runs exactly along a pixel edge is shared by both sides
 
 
@@ -112,85 +109,26 @@ def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
 
 def covering_curves(
     segments: Floats, curve: Ints, frame: Frame, least: float
-) -> tuple[Indices, Indices, Indices, Floats]:
+) -> tuple[Indices, Indices, Indices]:
     """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
 
-    Last the curve's mean double-angle vector there (k, 2), as in `Cover`.
     curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
     `least` pixel sides and more; where no curve reaches that, the longest one does.
     """
-    own = _by_curve(segments, curve, frame)
-    most = np.zeros(frame.height * frame.width)
-    np.maximum.at(most, own.pixel, own.amount)
-    covers = own.amount >= np.minimum(least, most[own.pixel])
-    return own.curve[covers], *np.divmod(own.pixel[covers], frame.width), own.direction[covers]
-
-
-@dataclass(frozen=True, eq=False)
-class Meetings:
-    """Pixels in which two curves meet, row by row: row, column (k,), directions and weights (k, 2) of both.
-
-    direction: radians in [0, pi), y up; that of the curve with the lower number comes first. weight: as in
-    `Cover`, of each curve by itself.
-    """
-
-    row: Indices
-    column: Indices
-    direction: Floats
-    weight: Floats
-
-    def inside(self, mask: Bools) -> Meetings:
-        """Those at pixels of a mask."""
-        kept = mask[self.row, self.column]
-        return Meetings(self.row[kept], self.column[kept], self.direction[kept], self.weight[kept])
-
-
-def meeting_curves(segments: Floats, curve: Ints, frame: Frame, least: float) -> Meetings:
-    """The pixels in which exactly two curves (m,) run over `least` pixel sides and more, and cross.
-
-    Each has to have a direction there with a weight of `least`, and they have to differ by LEAST_ANGLE.
-    """
-    own = _by_curve(segments, curve, frame)
-    long = np.nonzero(own.amount >= least)[0]
-    order = long[np.argsort(own.pixel[long], kind="stable")]
-    pixel, first, many = np.unique(own.pixel[order], return_index=True, return_counts=True)
-    pair = order[first[many == 2, None] + np.arange(2)]
-    direction = line_of(own.direction[pair])
-    single = np.minimum(1.0, vector_length(*np.moveaxis(own.direction[pair], -1, 0)))
-    weight = np.minimum(1.0, own.amount[pair]) * single
-    good = ((single >= LEAST_R) & (weight >= least)).all(axis=1)
-    good &= line_difference(direction[:, 0], direction[:, 1]) >= LEAST_ANGLE
-    row, column = np.divmod(pixel[many == 2][good], frame.width)
-    return Meetings(row, column, direction[good], weight[good])
-
-
-@dataclass(frozen=True, eq=False)
-class _Own:
-    """What each curve does on each pixel that it meets: curve, pixel (k,), and as in `Cover` the rest."""
-
-    curve: Indices
-    pixel: Indices
-    amount: Floats
-    direction: Floats
-
-
-def _by_curve(segments: Floats, curve: Ints, frame: Frame) -> _Own:
-    """The cover by each curve (m,) of segments (m, 2, 2) alone, in the order of the curves."""
     cut = _cut(segments, frame)
     number, size = curve[cut.segment].astype(np.int64), frame.height * frame.width
-    keys, lengths, unit = [], [], []
+    keys, lengths = [], []
     for nudge in product((-_NUDGE, _NUDGE), repeat=2):
         cell, kept = _cells(cut.middle + nudge, frame)
         keys.append(number[kept] * size + cell)
         lengths.append(cut.covered[kept] / 4)
-        unit.append(cut.unit[kept])
     key, place = np.unique(np.concatenate(keys), return_inverse=True)
-    (x, y), covered = np.concatenate(unit).T, np.concatenate(lengths)
-    amount, cosine, sine = (
-        np.bincount(place, covered * double, len(key)) for double in (1.0, x * x - y * y, -2 * x * y)
-    )
-    direction = np.stack([cosine, sine], axis=1) / np.where(amount > 0, amount, 1.0)[:, None]
-    return _Own(key // size, key % size, amount.astype(np.float64, copy=False), direction)
+    owner, pixel = np.divmod(key, size)
+    amount = np.bincount(place, np.concatenate(lengths), len(key))
+    most = np.zeros(size)
+    np.maximum.at(most, pixel, amount)
+    covers = amount >= np.minimum(least, most[pixel])
+    return owner[covers], *np.divmod(pixel[covers], frame.width)
 
 
 @dataclass(frozen=True, eq=False)

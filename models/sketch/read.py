@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final, Literal
@@ -28,7 +28,7 @@ from ..storage import read_bytes
 from .bitmap import read_picture, read_white
 from .bridges import as_points, closing, curve_ends, opened
 from .choice import AS_DRAWN, Choice, Silhouette
-from .cover import Cover, Frame, Meetings, block_means, cover_by_segments, fit_frame, meeting_curves
+from .cover import Cover, Frame, block_means, cover_by_segments, fit_frame
 from .curves import Curves, bounding_box, flatten
 from .outline import along_outline, boundless, crowded, inside_outline, off_page, parts_with
 from .pen_strokes import SPATIAL, read_curves, read_scap
@@ -67,15 +67,14 @@ class _Sketch:
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
     covers: the cover of a frame by curvature lines and by other strokes. ends: where strokes end,
-    points and ways out (n, 2, 2). meetings: where on a frame curvature lines meet, None for a picture, which
-    does not say. stroke_width: as drawn in a picture, 0 for the lines without width of a vector sketch.
+    points and ways out (n, 2, 2). stroke_width: as drawn in a picture, 0 for the lines without width of a
+    vector sketch.
     """
 
     box: tuple[float, float, float, float]
     page: tuple[float, float, float, float] | None
     covers: Callable[[Frame], tuple[Cover, Cover]]
     ends: Callable[[], Floats]
-    meetings: Callable[[Frame], Meetings] | None = None
     stroke_width: float = 0.0
 
 
@@ -88,7 +87,6 @@ def read_sketch(
     name: str | None = None,
     w_strokes: float = STROKE_WEIGHT,
     w_beta: float = SKEW_WEIGHT,
-    crossings: bool = False,
     silhouette: Silhouette = "none",
     curvature: Iterable[str] = (),
     view: str | None = None,
@@ -104,8 +102,6 @@ def read_sketch(
     gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
     weights of the stroke and the skew term that mean the same on every grid, as in `Instance.with_weights`;
     their defaults are 20 and 1e-6 (docs/weights.md).
-    crossings: of a vector sketch, whether pixels in which exactly two of its curves meet at 30 degrees or
-    more get both directions, as `Instance.crossings`; no proof knows these.
     silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
     (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
     colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
@@ -117,7 +113,7 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
-    choice = Choice(silhouette, tuple(curvature), view, crossings)
+    choice = Choice(silhouette, tuple(curvature), view)
     with_mask = None if mask is None else Path(mask)
     data = bytes_of(path)
     try:
@@ -156,18 +152,14 @@ def instance_of(
     lines, others = sketch.covers(frame)
     solve, found = _solve_mask(lines, others, given, sketch, frame)
     weight = np.where(solve, lines.weight, 0.0)
-    met = sketch.meetings(frame).inside(solve) if choice.crossings and sketch.meetings else None
-    if met is not None:
-        weight[met.row, met.column] = met.weight[:, 0]
     if choice.silhouette == "outer":
         region = solve | (others.amount >= CUT) if given is None else given
         weight[along_outline(region, lines.direction, sketch.stroke_width / frame.pixel)] = 0.0
         solve = _left(solve, weight) if given is None else solve
     stroke = solve & (weight >= LEAST_WEIGHT)
-    met = met and met.inside(stroke)
     if not stroke.any():
         raise NoStrokeError("no stroke lies inside the mask; draw a curvature line there or move the mask")
-    read = Instance(
+    return Instance(
         name=name,
         mask=solve,
         stroke_pixels=np.argwhere(stroke).astype(np.int32),
@@ -179,18 +171,6 @@ def instance_of(
         origin=(frame.x, frame.y),
         reading=found,
     ).with_weights(STROKE_WEIGHT, SKEW_WEIGHT)
-    return read if met is None else _with_both(read, met)
-
-
-def _with_both(instance: Instance, met: Meetings) -> Instance:
-    """The instance with the directions of both curves at these of its stroke pixels."""
-    number = np.full(instance.mask.shape, -1, dtype=np.int32)
-    number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
-    at, theta = number[met.row, met.column], instance.theta.copy()
-    theta[at] = met.direction[:, 0]
-    return replace(
-        instance, theta=theta, crossings=at, theta_cross=met.direction[:, 1], w_cross=met.weight[:, 1]
-    )
 
 
 def name_from(text: str) -> str:
@@ -248,7 +228,6 @@ def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | N
     choice.refuse_view()
     if kind != "picture":
         return (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
-    choice.refuse_crossings()
     choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
     return None
 
@@ -281,12 +260,8 @@ def _of_curves(curves: Curves) -> _Sketch:
         segments, _, line = segments_of(curves, frame)
         return cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame)
 
-    def meetings(frame: Frame) -> Meetings:
-        segments, curve, line = segments_of(curves, frame)
-        return meeting_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
-
     ends = partial(curve_ends, curves.points)
-    return _Sketch(bounding_box(curves.points), curves.canvas, covers, ends, meetings)
+    return _Sketch(bounding_box(curves.points), curves.canvas, covers, ends)
 
 
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:

@@ -78,23 +78,20 @@ def sample(
     *,
     w_strokes: float = STROKE_WEIGHT,
     w_beta: float = SKEW_WEIGHT,
-    crossings: bool = False,
     silhouette: Silhouette = "none",
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
     name: of one in `samples()`; size: 1..4096; gauge: as in Instance; w_strokes, w_beta: as in
-    `Instance.with_weights`; crossings, silhouette: as in `read_sketch`, of a drawn sample. For the exact
-    answer of an analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for
-    a weight that cannot be.
+    `Instance.with_weights`; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an
+    analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight
+    that cannot be.
     """
     check_size(size)
-    choice = Choice(silhouette, crossings=crossings)
+    choice = Choice(silhouette)
     if _known(name).kind == "analytic":
         if choice != AS_DRAWN:
-            raise InputError(
-                f"{name} is computed, not drawn; choose the silhouette none, and leave crossings out"
-            )
+            raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
         found = analytic(name, size, gauge).instance
     else:
         svg = sample_svg(name).encode()

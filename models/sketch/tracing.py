@@ -17,9 +17,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError, naming
-from ..instance.angles import line_difference, line_of
+from ..instance.angles import line_difference
 from ..instance.elementary import arctangent
-from ..instance.grid import Floats, Ints
+from ..instance.grid import Ints
 from ..instance.instance import Instance
 from .choice import AS_DRAWN, Choice
 from .cover import Frame, Indices, covering_curves
@@ -44,10 +44,8 @@ _NONE: Final = -2
 
 
 def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
-    """The number of the one curve of each stroke, int (r,), SEVERAL where more run through its pixel.
+    """The number of the one curve of each stroke pixel, int (s,), SEVERAL where more run through its pixel.
 
-    Strokes are in the order of `every_stroke`: those of all stroke pixels, then the second ones of crossings.
-    There each of two curves has the stroke that its direction is nearer to.
     sketch: the file that the instance was read from, or the name of a sample; None: not at hand. Pictures,
     computed samples and instance files count as not at hand. choice: with which the sketch was read. Raises
     InputError for what cannot be read, and for a sketch that has no curve where the instance has a stroke.
@@ -58,19 +56,19 @@ def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choi
     x, y = instance.origin
     frame = Frame(x, y, instance.pixel_size, instance.grid.height, instance.grid.width)
     segments, curve, line = segments_of(found, frame)
-    owner, row, column, direction = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
+    owner, row, column = covering_curves(segments[line], curve[line], frame, LEAST_WEIGHT)
     number = np.full(frame.shape, -1, dtype=np.int64)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     stroke = number[row, column]
     there = stroke >= 0
-    only, second = _only(owner[there], stroke[there], line_of(direction[there]), instance)
+    only = _only(owner[there], stroke[there], len(instance.theta))
     if (only == _NONE).any():
         raise InputError(
             f"draws nothing at {int((only == _NONE).sum())} stroke pixels of {instance.name}; "
             "give the sketch that the instance was read from",
             file=sketch,
         )
-    return np.concatenate([only, second])
+    return only
 
 
 def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
@@ -78,32 +76,22 @@ def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
     return sketch is not None and _drawn(sketch, choice) is not None
 
 
-def _only(owner: Indices, stroke: Indices, theta: Floats, instance: Instance) -> tuple[Ints, Ints]:
-    """The number of the one curve through each stroke pixel (s,), SEVERAL, or _NONE; of second strokes (x,).
+def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
+    """The number of the one curve through each of `count` stroke pixels (s,), SEVERAL, or _NONE.
 
-    owner, stroke, theta: (k,), a curve, a stroke pixel that it runs through, each pair once, and its
-    direction there.
+    owner, stroke: (k,), a curve and a stroke pixel that it runs through, each pair once.
     """
-    count = len(instance.theta)
     names, curve = np.unique(owner, return_inverse=True)
     through = csr_array((np.ones(len(curve)), (curve, stroke)), shape=(len(names), count))
     single = csr_array(
         (np.ones(len(names)), (_redrawn(through), np.arange(len(names)))), shape=(len(names), len(names))
     )
     merged = (single @ through).tocoo()
-    stands_for = names[single.tocsc().indices]
     curves_there = np.bincount(merged.col, minlength=count)
     only = np.where(curves_there == 0, _NONE, SEVERAL)
     one = curves_there[merged.col] == 1
     only[merged.col[one]] = names[merged.row[one]]
-    second = np.full(len(instance.crossings), SEVERAL)
-    for place, at in enumerate(instance.crossings.tolist()):
-        here = np.nonzero(stroke == at)[0]
-        if len(here) == 2 and curves_there[at] == 2:
-            off = line_difference(theta[here], instance.theta[at])
-            off -= line_difference(theta[here], instance.theta_cross[place])
-            only[at], second[place] = stands_for[curve[here[np.argsort(off, kind="stable")]]]
-    return only.astype(np.int32), second.astype(np.int32)
+    return only.astype(np.int32)
 
 
 def _redrawn(through: csr_array) -> Indices:
@@ -125,19 +113,17 @@ def _redrawn(through: csr_array) -> Indices:
 
 
 def chains(instance: Instance) -> Ints:
-    """The number of the chain that each stroke belongs to, int (r,), numbered from 0.
+    """The number of the chain that each stroke pixel belongs to, int (s,), numbered from 0.
 
-    Two strokes whose pixels are at most REACH apart are linked when their directions differ by at most TURN
-    from each other and by at most ASIDE from the line between them. Of crossings the second strokes are the
-    last ones.
+    Two stroke pixels at most REACH apart are linked when their directions differ by at most TURN from each
+    other and by at most ASIDE from the line between them.
     """
-    pixels, theta, _ = instance.every_stroke
-    count, first_ones = len(theta), len(instance.theta)
-    layers = np.full((2, *np.add(instance.mask.shape, 2 * REACH)), -1, dtype=np.int32)
-    row, column = pixels.T + REACH
-    layers[(np.arange(count) >= first_ones).astype(int), row, column] = np.arange(count)
+    theta, count = instance.theta, len(instance.theta)
+    number = np.full(np.add(instance.mask.shape, 2 * REACH), -1, dtype=np.int32)
+    row, column = instance.stroke_pixels.T + REACH
+    number[row, column] = np.arange(count)
     ends = []
-    for number, down, right in product(layers, range(REACH + 1), range(-REACH, REACH + 1)):
+    for down, right in product(range(REACH + 1), range(-REACH, REACH + 1)):
         other = number[row + down, column + right]
         one = np.nonzero((other >= 0) & (down != 0 or right != 0))[0]
         first, second = theta[one], theta[other[one]]

@@ -193,20 +193,11 @@ def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Pl
 
 
 def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
-    """The line that carries each stroke, as a place in x, its angle there, and its weight; shapes (r,).
-
-    In the order of `Instance.every_stroke`. Where two strokes meet each has a line, those nearer in all.
-    """
-    instance, crossings = field.instance, field.instance.crossings
-    first = instance.stroke_index
-    _, theta, w = instance.every_stroke
-    at = np.concatenate([first, first[crossings]])
+    """The nearer line to each stroke, as a place in x, the stroke's angle near it, and its weight; (s,)."""
+    instance = field.instance
+    at = instance.stroke_index
     lines = np.stack([line[at] for line in _lines(field)])
-    off = wrap(theta - lines, -HALF, np.pi)
-    far = np.abs(off)
-    price = far[:, : len(first)].copy()
-    price[:, crossings] += far[::-1, len(first) :]  # the second stroke has the other line
-    nearer = np.argmin(np.round(price, 9), axis=0)
-    carrying = np.concatenate([nearer, 1 - nearer[crossings]])
+    off = wrap(instance.theta - lines, -HALF, np.pi)
+    carrying = np.argmin(np.round(np.abs(off), 9), axis=0)
     angle = (lines + off)[carrying, np.arange(len(at))]
-    return at + instance.grid.size * carrying, angle, hold * instance.w_strokes * w
+    return at + instance.grid.size * carrying, angle, hold * instance.w_strokes * instance.w

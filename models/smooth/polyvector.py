@@ -35,7 +35,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
-    where s = exp(2 i theta) is to be a root (at a crossing both are), and w_beta |X1|^2 over pixels, which
+    where s = exp(2 i theta) is to be a root, and w_beta |X1|^2 over pixels, which
     asks for right angles where nothing else says. Near a right-angled cross along the stroke that is 16 times
     the energy of docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha =
     beta = 0. Labels are then moved into the windows of the instance (docs/mathematics.md, 10).
@@ -58,7 +58,7 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     """The coefficients X0, X1 (n,) of each pixel."""
     size, strokes = instance.grid.size, instance.stroke_terms
     weight = np.minimum(hold * strokes.weight, _HARDEST)
-    root = np.exp(2j * instance.every_stroke[1])
+    root = np.exp(2j * instance.theta)
 
     def sums(values: _Complex) -> _Complex:
         return strokes.at_pixels(values.real, size) + 1j * strokes.at_pixels(values.imag, size)

@@ -19,13 +19,13 @@ from .systems import factored, one_thread, smoothness, stroke_weight
 def power_field(instance: Instance) -> CrossField:
     """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
 
-    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes, both ones where two
-    meet; alpha = arg(z)/4 and beta = 0.
+    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha =
+    arg(z)/4 and beta = 0.
     Parts without a stroke get alpha = 0. Labels are then moved into the windows of the instance
     (docs/mathematics.md, 10).
     """
     grid = instance.grid
-    strokes, (_, theta, _) = instance.stroke_terms, instance.every_stroke
+    strokes, theta = instance.stroke_terms, instance.theta
     goal = np.stack(
         [strokes.at_pixels(strokes.weight * f(4 * theta), grid.size) for f in (np.cos, np.sin)], axis=-1
     )

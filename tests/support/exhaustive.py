@@ -68,7 +68,7 @@ def least_energy(instance, jumps):
     a[pairs, grid.first], a[pairs, grid.second] = 1, -1
     b[pairs, size + grid.first], b[pairs, size + grid.second] = 1 - 2 * (jumps[0] & 1), -1
     r = np.zeros((len(strokes), 2 * size))
-    r[strokes, terms.pixel], r[strokes, size + terms.pixel] = 1, terms.side
+    r[strokes, terms.pixel], r[strokes, size + terms.pixel] = 1, 1
     root = np.sqrt(terms.weight)
     skew = np.sqrt(instance.w_beta) * np.eye(2 * size)[size:]
     rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])

@@ -534,25 +534,17 @@ Stroke = tuple[float, Decimal]
 
 
 class Pixel:
-    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any.
+    """A pixel inside the mask: its place in names, window of alpha, and stroke (theta, weight), if any."""
 
-    second: the same of a second stroke, which line v follows.
-    """
-
-    def __init__(self, place: str, gauge: str, stroke: Stroke | None, second: Stroke | None) -> None:
+    def __init__(self, place: str, gauge: str, stroke: Stroke | None) -> None:
         self.place = place
         self.stroke: tuple[Decimal, Decimal] | None = None
-        self.second: tuple[Decimal, Decimal] | None = None
         self.low = 0.0
         self.window: tuple[Decimal, Decimal] = (ZERO, PI / 2)
         if stroke is None:
             return
         theta = stroke[0] % math.pi
         theta = theta if 1e-8 <= theta < math.pi else 0.0  # as the program itself has it
-        if second is not None:
-            least = math.pi / 4 - 1e-9 if gauge == "box" else theta
-            other = second[0] % math.pi
-            self.second = (Decimal(other + math.pi if other < least else other), second[1])
         if gauge == "box":
             theta = -math.pi / 4 + (theta + math.pi / 4) % math.pi
         else:
@@ -589,6 +581,10 @@ def read_instance(path: str) -> Instance:
         document = json.loads("".join(text), parse_constant=_no_constant, object_pairs_hook=_once)
         known = (document["format"], _real(document["version"], 0, 9)) == ("crossfield-instance", 1)
         _require(known, "is JSON, but no instance of crossfield, version 1")
+        _require(
+            "crossings" not in document,
+            "holds crossings, which this version does not know; read the sketch again",
+        )
         return _instance(document)
     except (ValueError, RecursionError, KeyError, TypeError, IndexError, OverflowError, ArithmeticError):
         raise BadInputError("is no instance of crossfield, or damaged") from None
@@ -619,15 +615,12 @@ def _instance(document: dict[str, object]) -> Instance:
     if not (isinstance(mask, list) and isinstance(strokes, list)) or gauge not in ("strokes", "box"):
         raise ValueError(gauge)
     width = max(2, len(str(max(len(mask), *(len(row) for row in mask)) - 1)))
-    held, second = _held(strokes), _held(document.get("crossings", []))
+    held = _held(strokes)
     inside = [(r, c) for r, row in enumerate(mask) for c, pixel in enumerate(row) if pixel == "#"]
     at = {place: number for number, place in enumerate(inside)}
-    if any(place not in at for place in held) or any(place not in held for place in second):
+    if any(place not in at for place in held):
         raise ValueError("strokes")
-    pixels = [
-        Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c)), second.get((r, c)))
-        for r, c in inside
-    ]
+    pixels = [Pixel(f"{r:0{width}}_{c:0{width}}", str(gauge), held.get((r, c))) for r, c in inside]
     pairs = [
         (f"{pixels[i].place}_{way}", i, at[other])
         for (r, c), i in at.items()
@@ -699,7 +692,7 @@ class Field:
 
     def energy(self, norm: int, jumps: Iterable[Jump]) -> Decimal:
         """The energy with squares (2) or absolute values (1):
-        2 sum (A, B) + w_strokes sum w R + w_beta sum beta, R of both strokes where two meet.
+        2 sum (A, B) + w_strokes sum w R + w_beta sum beta.
         """
 
         def size(value: Decimal) -> Decimal:
@@ -712,8 +705,6 @@ class Field:
             skew += size(beta)
             if pixel.stroke is not None:
                 strokes += pixel.stroke[1] * size(alpha + beta - pixel.stroke[0])
-            if pixel.second is not None:
-                strokes += pixel.second[1] * size(alpha - beta + PI / 2 - pixel.second[0])
         return TWO * smooth + self.instance.w_strokes * strokes + self.instance.w_beta * skew
 
     def violations(self) -> dict[str, Place]:

@@ -39,18 +39,14 @@ class Model:
     lines: tuple[Line, ...]
 
 
-def model(formulation: str, options: dict[str, Any], *, crossings: bool = False) -> Model:
-    """The mathematics of a formulation with options. Raises FormulationError for an unknown one.
-
-    crossings: whether strokes meet on the instance; else what is about second strokes is left out.
-    """
-    return _model(formulation, tuple(sorted(options.items())), crossings)
+def model(formulation: str, options: dict[str, Any]) -> Model:
+    """The mathematics of a formulation with options. Raises FormulationError for an unknown one."""
+    return _model(formulation, tuple(sorted(options.items())))
 
 
 @cache
-def _model(formulation: str, options: tuple[tuple[str, Any], ...], crossings: bool) -> Model:
-    declared = declare(formulation, **dict(options))
-    source = latex(declared if crossings else declared.without_crossings)
+def _model(formulation: str, options: tuple[tuple[str, Any], ...]) -> Model:
+    source = latex(declare(formulation, **dict(options)))
     return Model(source, tuple(_lines(source.split("\n")[1:-1])))
 
 

@@ -21,12 +21,10 @@ MOST_EIGEN: Final = 600
 
 
 def sizes(instance: Instance) -> dict[str, int]:
-    """Numbers of pixels, stroke pixels, crossings where there are any, and pairs."""
-    crossings = {"crossings": len(instance.crossings)} if len(instance.crossings) else {}
+    """Numbers of pixels, stroke pixels and pairs."""
     return {
         "pixels": instance.grid.size,
         "strokes": len(instance.theta),
-        **crossings,
         "pairs": len(instance.grid.first),
     }
 

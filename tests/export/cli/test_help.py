@@ -9,14 +9,13 @@ from crossfield.export.cli import options
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.cli.help_texts import NAMES, Command, filled
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.solutions.readers.registry import READERS
 from crossfield.models.formulations.declaration import FACETS
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
 from typer.testing import CliRunner
 
 NAMED = {
-    "run": ["samples", "size", "methods of a run"],
+    "run": ["samples", "size", "methods"],
     "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
     "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "short names", "methods", "solvers"],
@@ -89,13 +88,6 @@ def test_brackets_in_a_help_are_shown(text):
 def test_every_table_in_a_help_is_named_there():
     assert set(NAMES) == {table for tables in NAMED.values() for table in tables}
     assert filled("{size}, at most") == f"{DEFAULT_SIZE}, at most"
-
-
-def test_every_reader_is_covered_by_a_program_of_the_help():
-    """Sixteen kinds of files, of eleven programs."""
-    programs = tuple(NAMES["answers"]())
-    assert all(reader.description.startswith(programs) for reader in READERS)
-    assert {"HiGHS", "GAMS", "BARON", "AMPL"} <= set(programs)
 
 
 def test_choices_are_those_of_the_models_and_of_the_formats():

@@ -90,7 +90,6 @@ REFUSED = [
     (["--scale", "100000"], "choose another scale"),
     (["--size", "12"], "is a field, which has its own grid"),
     (["--method", "greedy"], "is a field, which has its own grid"),
-    (["--crossings"], "is a field, which has its own grid"),
     (["--over", "nothing.svg"], "cannot be read"),
 ]
 

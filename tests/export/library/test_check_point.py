@@ -562,6 +562,16 @@ def test_a_packed_file_that_grows_without_end_is_refused_before_it_is_unpacked(t
     assert peak < 8 << 20
 
 
+def test_an_instance_of_an_earlier_version_with_crossings_is_refused(tmp_path):
+    path, instance = tmp_path / "old.json", make_instance()
+    document = json.loads(write_instance(instance, path).read_text())
+    path.write_text(json.dumps(document | {"crossings": document["strokes"][:1]}))
+    problem = formulate(instance, "milp-mccormick")
+    point = save_point(tmp_path / "a.sol", problem, np.zeros(problem.columns))
+    with pytest.raises(BadInputError, match="holds crossings"):
+        check(str(path), point)
+
+
 def test_a_point_of_another_instance_is_named_as_such(tmp_path):
     one, other = make_field(make_instance("full")), make_field(make_instance("row"))
     problem, foreign = (formulate(field.instance, "minlp-quartic") for field in (one, other))

@@ -403,7 +403,7 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
 
 @for_each("name", FORMULATIONS)
 def test_the_mathematics_has_every_line_of_the_declaration(name):
-    shown, declared = model(name, {}, crossings=True), declare(name)
+    shown, declared = model(name, {}), declare(name)
     assert len(shown.lines) == len(declared.objective) + len(declared.rows) + len(declared.variables)
     assert [line.label for line in shown.lines if line.label] == [row.paper for row in declared.rows]
     assert [line.role for line in shown.lines if line.role] == [

@@ -394,6 +394,6 @@ def test_every_row_comes_from_the_paper_or_says_so(name):
     tags = [family.tag for family in declared.rows]
     assert len(set(tags)) == len(tags)
     assert all(family.paper for family in (*declared.objective, *declared.rows))
-    assert [family.over for family in declared.objective] == ["pairs", "strokes", "crossings", "pixels"]
+    assert [family.over for family in declared.objective] == ["pairs", "strokes", "pixels"]
     assert set(declared.variables) <= set(n.VARIABLES)
     assert ("p1" in declared.variables) == (name not in {"minlp-parity", "qp-fixed"})

@@ -164,6 +164,11 @@ def test_a_field_that_is_not_optimal_is_never_certified(tmp_path):
             assert "status is claimed as optimal" in refusal(with_head(arrays, status="optimal"))
 
 
+def test_an_instance_with_two_strokes_at_one_pixel_is_refused(written):
+    _, arrays = written(1)
+    assert "instance_crossings" in refusal(arrays | {"instance_crossings": np.zeros(1, np.int32)})
+
+
 def changed(arrays, name, rng):
     """The arrays with one entry of one of them changed, little or much."""
     array = arrays[name].copy()
