@@ -81,7 +81,7 @@ def test_columns_and_rows_are_counted(label):
     assert (problem.lower <= problem.upper).all()
     for name, block in problem.blocks.items():
         whole = name in {"p", "p1", "p2"} and not problem.formulation.options.relax
-        assert block.integer == (whole and (problem.pinned is None or problem.free is not None))
+        assert block.integer == (whole and problem.pinned is None)
 
 
 @for_each("gauge", ["strokes", "box"])
