@@ -13,7 +13,6 @@ points only, and the start is the answer when there is none.
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -25,6 +24,7 @@ import numpy as np
 from ...models.errors import SolverError
 from ...models.instance.grid import Floats
 from ...models.processes.deadline import Deadline
+from ...models.processes.groups import on_interrupt
 from ...models.processes.side_by_side import leave_with_parent
 from ..solutions.readers.ampl import write_ampl_sol
 from .job import LEAST
@@ -151,7 +151,7 @@ def solve(
     """
     chosen = options(solver, seconds, gap) | {"print_time": False, "error_on_fail": False}
     watch = Watch(model)
-    signal.signal(signal.SIGINT, watch.on_signal)  # Bonmin puts a handler of its own in its place
+    on_interrupt(watch.on_signal)  # Bonmin puts a handler of its own in its place
     if solver == "ipopt":
         chosen["iteration_callback"] = watch
     else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
@@ -12,6 +11,7 @@ from typing import Final, NamedTuple
 
 from ...models.errors import SolverError
 from ...models.processes.deadline import Deadline
+from ...models.processes.groups import KILLED, ending, interrupt, kill, start
 from .job import Job
 
 GRACE: Final = 0.5
@@ -28,15 +28,15 @@ _TICK: Final = 0.1
 
 
 class ChildExit(NamedTuple):
-    """How a child ended: its exit code (negative: a signal), and whether the user interrupted it."""
+    """End of a child: exit code, whether the user interrupted it, and whether it was stopped.
+
+    code: negative for a signal. stopped: whether we interrupted or killed it, or never started it, because
+    its deadline had passed or the user interrupted it. A child that the system killed was not stopped.
+    """
 
     code: int
     interrupted: bool
-
-    @property
-    def killed(self) -> bool:
-        """Whether it was not let to its end."""
-        return self.code == -signal.SIGKILL
+    stopped: bool
 
 
 def solved_by(
@@ -52,7 +52,7 @@ def solved_by(
     ended = run_child(program, job.log, job.deadline)
     if job.solution.exists():
         return ended
-    stopped = ended.interrupted or ended.killed
+    stopped = ended.interrupted or ended.stopped
     if not (stopped and job.start is not None and job.problem.violation(job.start).worst <= FEASIBLE):
         raise SolverError(_no_answer(job, ended), file=job.model)
     leave_start()
@@ -61,10 +61,10 @@ def solved_by(
 
 def _no_answer(job: Job, ended: ChildExit) -> str:
     """What is said of a solver that left nothing: how it ended, and its last words."""
-    if ended.killed and not ended.interrupted:
+    if ended.stopped and not ended.interrupted:
         return f"{job.solver} left no answer within its time; give it more, or a start"
     last = job.log.read_text("utf-8", "replace").strip().splitlines()[-1:] or ["nothing in its log"]
-    how = "interrupted" if ended.interrupted else f"exit code {ended.code}"
+    how = "interrupted" if ended.interrupted else ending(ended.code)
     return f"{job.solver} left no answer ({how}): {last[0][:200]}; see {job.log.name} beside it"
 
 
@@ -72,21 +72,19 @@ def run_child(command: list[str], log: Path, deadline: Deadline) -> ChildExit:
     """How a child ended whose output went to `log`.
 
     Its standard input is a pipe that closes with this process. A deadline that has passed is as one that
-    kills it. Once the deadline has passed, or the user interrupts, the child is interrupted (SIGINT) and may
+    kills it. Once the deadline has passed, or the user interrupts, the child is interrupted and may
     leave what it has. A second Ctrl-C kills it at once and goes on as KeyboardInterrupt.
     """
     if deadline.passed():
-        return ChildExit(-signal.SIGKILL, interrupted=False)
+        return ChildExit(KILLED, interrupted=False, stopped=True)
     with log.open("wb") as output:
-        child = subprocess.Popen(
-            command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.PIPE, start_new_session=True
-        )
+        child = start(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.PIPE)
     with child:
-        kill = deadline.later(GRACE + GRACE_SHARE * deadline.left())
+        latest = deadline.later(GRACE + GRACE_SHARE * deadline.left())
         try:
-            return _Watch(child, log, deadline, kill).until_it_ends()
+            return _Watch(child, log, deadline, latest).until_it_ends()
         finally:
-            child.kill()
+            kill(child)
 
 
 @dataclass
@@ -96,14 +94,15 @@ class _Watch:
     child: subprocess.Popen[bytes]
     log: Path
     deadline: Deadline
-    kill: Deadline
+    latest: Deadline
     asked: int = 0
+    stopped: bool = False
     patience: Deadline | None = None
 
     def until_it_ends(self) -> ChildExit:
         while True:
             try:
-                return ChildExit(self.child.wait(_TICK), self.patience is not None)
+                return ChildExit(self.child.wait(_TICK), self.patience is not None, self.stopped)
             except subprocess.TimeoutExpired:
                 self._look()
             except KeyboardInterrupt:
@@ -114,12 +113,14 @@ class _Watch:
     def _look(self) -> None:
         # Before its first output it does not listen, and has nothing to hand over.
         listens = self.log.stat().st_size > 0
-        end = self.kill if listens else self.deadline
+        end = self.latest if listens else self.deadline
         if end.passed() or (self.patience is not None and self.patience.passed()):
-            self.child.kill()
+            kill(self.child)
+            self.stopped = True
         elif listens and self.asked < self._reasons():
-            self.child.send_signal(signal.SIGINT)
+            interrupt(self.child)
             self.asked += 1
+            self.stopped = True
 
     def _reasons(self) -> int:
         """How often it should have been interrupted by now; a first signal may come too early."""

@@ -16,6 +16,7 @@ from filelock import FileLock
 
 from ...models.errors import SolverError
 from ...models.processes.deadline import Deadline
+from ...models.processes.groups import kill, start
 from ...models.storage import make_folder
 from .child import run_child
 
@@ -30,11 +31,11 @@ def compiling() -> Iterator[None]:
         return
     none = subprocess.DEVNULL
     # Ctrl-C is for its parent, which ends it.
-    with subprocess.Popen(_COMMAND, stdin=none, stdout=none, stderr=none, start_new_session=True) as child:
+    with start(_COMMAND, stdin=none, stdout=none, stderr=none) as child:
         try:
             yield
         finally:
-            child.kill()
+            kill(child)
 
 
 def compile_proofs(folder: Path, deadline: Deadline) -> None:

@@ -5,7 +5,6 @@ The rest serves those who need its model in theirs.
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 from pathlib import Path
@@ -116,11 +115,12 @@ def main(arguments: list[str]) -> int:
     bound. It ends with its parent: when its standard input closes.
     """
     from ...models.processes.deadline import Deadline
+    from ...models.processes.groups import on_interrupt
     from ...models.processes.side_by_side import leave_with_parent
 
     leave_with_parent()
     stop = threading.Event()
-    signal.signal(signal.SIGINT, lambda *_: stop.set())
+    on_interrupt(lambda *_: stop.set())
     (model, solution, start), (deadline, gap, threads) = map(Path, arguments[:3]), arguments[3:]
     try:
         highs = loaded(model, silent=False, mip_rel_gap=float(gap), threads=int(threads))

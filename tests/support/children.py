@@ -2,29 +2,25 @@
 what they complain of, and who is left of whom.
 """
 
-import os
 import re
-import signal
 import subprocess
 import sys
 import time
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
+from crossfield.models.processes.groups import interrupt, start
+
 
 def interrupted(program: str) -> list[str]:
     """The words of the last line that a Python program prints when Ctrl-C comes after its first line,
     a number; it must end well.
     """
-    child = subprocess.Popen(
-        [sys.executable, "-c", program],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    command = [sys.executable, "-c", program]
+    child = start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert int(child.stdout.readline()) > 0
-    os.killpg(child.pid, signal.SIGINT)
+    interrupt(child)
     out, err = child.communicate()
     assert (child.returncode, err) == (0, "")
     return out.splitlines()[-1].split()
@@ -40,11 +36,28 @@ def running() -> dict[int, tuple[int, int]]:
     those that have ended and were not waited for are left out.
     """
     found = {}
+    require_proc()
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):  # it has ended meanwhile
             state, parent, group, *_ = path.read_text("utf-8", "replace").rpartition(")")[2].split()
             if state not in "ZX":
                 found[int(path.parent.name)] = (int(parent), int(group))
+    return found
+
+
+def require_proc() -> None:
+    """Skip the test on systems that do not list their processes in /proc."""
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("this system has no /proc, which lists the processes that run")
+
+
+def command_lines() -> dict[int, bytes]:
+    """The command line of every process; nothing between its words but a zero byte."""
+    require_proc()
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):  # it has ended meanwhile
+            found[int(path.parent.name)] = path.read_bytes()
     return found
 
 

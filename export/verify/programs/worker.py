@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import queue
-import signal
 import subprocess
 import sys
 import threading
@@ -19,6 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, Self
 
+from ....models.processes.groups import ending, kill, start
 from .protocol import NotTold, Refused, TooLarge
 from .reading import Points, load, save
 
@@ -62,21 +62,19 @@ class Worker:
             return parsed
         code = child.wait()
         self._stop()
-        how = f"was killed by signal {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-        return {"kind": "failed", "words": f"{how}: {self._last_words()}"}
+        return {"kind": "failed", "words": f"{ending(code)}: {self._last_words()}"}
 
     def _running(self) -> subprocess.Popen[str]:
         if self._child is None:
             self._folder.mkdir(parents=True, exist_ok=True)
             # -P: a folder `crossfield` or a file casadi.py where the user happens to be is not meant.
-            self._child = subprocess.Popen(
+            self._child = start(
                 [sys.executable, "-P", "-m", "crossfield.export.verify.programs.worker", self._program],
                 cwd=self._folder,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                text=True,
-                start_new_session=True,
+                encoding="ascii",
             )
             self._answers = queue.Queue()
             threading.Thread(target=self._listen, args=(self._child, self._answers), daemon=True).start()
@@ -95,10 +93,7 @@ class Worker:
         child, self._child = self._child, None
         if child is None:
             return
-        try:
-            os.killpg(child.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            child.kill()
+        kill(child)
         child.wait()
         if child.stdin is not None:
             with suppress(BrokenPipeError):  # what was not yet written goes with the child
@@ -146,7 +141,7 @@ def _result(module: Any, task: dict[str, Any]) -> Any:
 def main(arguments: list[str]) -> int:
     """0 when there are no more tasks."""
     (program,) = arguments
-    answers = os.fdopen(os.dup(1), "w")
+    answers = os.fdopen(os.dup(1), "w", encoding="ascii")
     with Path(_LOG).open("wb") as log:
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)

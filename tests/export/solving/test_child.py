@@ -1,5 +1,6 @@
 """A solver in a child process: who is interrupted, killed, let go on, and that none outlives its parent."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solving.child import run_child
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.groups import KILLED
 
 SLEEPS = "import time\nprint('solving', flush=True)\ntime.sleep(600)"
 DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + SLEEPS
@@ -32,22 +34,40 @@ class Clock:
         return 0.0 if self.begin is None else self.speed * (time.monotonic() - self.begin)
 
 
-@pytest.mark.parametrize("program,speed,code", [(HEARS, 0.01, 7), (DEAF, 10, -signal.SIGKILL)])
+@pytest.mark.parametrize("program,speed,code", [(HEARS, 0.01, 7), (DEAF, 10, KILLED)])
 def test_a_child_that_goes_on_is_interrupted_and_killed_if_it_does_not_hear(tmp_path, program, speed, code):
     log = tmp_path / "log"
     ending = run_child([sys.executable, "-c", program], log, Deadline.after(1e-3, Clock(log, speed)))
-    assert ending == (code, False)
+    assert ending == (code, False, True)
     assert log.read_text() == "solving\n"
+
+
+def test_a_child_that_others_kill_was_not_stopped(tmp_path):
+    """As the system does for want of memory: more time would not help."""
+    program = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    ending = run_child([sys.executable, "-c", program], tmp_path / "log", Deadline.after(600))
+    assert ending == (KILLED, False, False)
+
+
+def test_nothing_that_a_child_started_outlives_it(tmp_path):
+    before = descendants(os.getpid())
+    program = (
+        "import subprocess, sys; "
+        f"child = subprocess.Popen([sys.executable, '-c', {SILENT!r}]); print(child.pid, flush=True)"
+    )
+    log = tmp_path / "log"
+    assert run_child([sys.executable, "-c", program], log, Deadline.after(600)) == (0, False, False)
+    assert all_end({int(log.read_text())})
+    assert descendants(os.getpid()) == before
 
 
 @pytest.mark.parametrize(
     "program,seconds,code",
-    [(QUICK, 600.0, 0), (SILENT, 1.0, -signal.SIGKILL), (QUICK, -1.0, -signal.SIGKILL)],
+    [(QUICK, 600.0, 0), (SILENT, 1.0, KILLED), (QUICK, -1.0, KILLED)],
 )
 def test_a_child_that_has_nothing_to_hand_over_is_killed_at_its_deadline(tmp_path, program, seconds, code):
     ending = run_child([sys.executable, "-c", program], tmp_path / "log", Deadline.after(seconds))
-    assert ending == (code, False)
-    assert ending.killed == (code == -signal.SIGKILL)
+    assert ending == (code, False, code == KILLED)
 
 
 PARENT = """

@@ -1,0 +1,59 @@
+"""Child processes in groups of their own: starting, interrupting and killing them on each system.
+
+Ctrl-C on a terminal reaches the group in the foreground. A child in another group is left to the process that
+started it. On Windows, `kill` ends the child but not what the child has started.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any, Final
+
+KILLED: Final = 1 if sys.platform == "win32" else -int(signal.SIGKILL)
+"""Exit code of a process that was killed; on Windows other failures have it too."""
+
+
+def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
+    """Child process in a group of its own. `options` are those of `subprocess.Popen`."""
+    if sys.platform == "win32":
+        return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **options)
+    return subprocess.Popen(command, start_new_session=True, **options)
+
+
+def interrupt(child: subprocess.Popen[Any]) -> None:
+    """Send a child of `start` what Ctrl-C would send; the child listens with `on_interrupt`."""
+    if sys.platform == "win32":
+        child.send_signal(signal.CTRL_BREAK_EVENT)
+    else:
+        child.send_signal(signal.SIGINT)
+
+
+def on_interrupt(handler: Callable[..., object]) -> None:
+    """Call the handler with a number and a frame for each interrupt; only in the main thread."""
+    signal.signal(signal.SIGINT, handler)
+    if sys.platform == "win32":
+        signal.signal(signal.SIGBREAK, handler)
+
+
+def kill(child: subprocess.Popen[Any]) -> None:
+    """Kill a child of `start` with its group, also what is left of the group of a child that has ended."""
+    if sys.platform == "win32":
+        child.kill()
+        return
+    with suppress(ProcessLookupError, PermissionError):  # macOS denies it where only ended processes are left
+        os.killpg(child.pid, signal.SIGKILL)
+
+
+def ending(code: int) -> str:
+    """Description of an exit code: 'ended with code 3' or 'was killed by signal SIGSEGV'."""
+    if code >= 0:
+        return f"ended with code {code}"
+    try:
+        return f"was killed by signal {signal.Signals(-code).name}"
+    except ValueError:  # a real-time signal
+        return f"was killed by signal {-code}"
