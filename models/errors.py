@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 LONGEST: Final = 1000
 """Characters of a message, its file aside."""
@@ -49,6 +49,16 @@ class CrossfieldError(Exception):
         line = shortened(message, LONGEST)
         super().__init__(f"{printable(str(file))}: {line}" if file is not None else line)
         self.file = file
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the message as it stands: the constructor would shorten it again, file included."""
+        return _unpickled, (type(self), self.args), self.__dict__
+
+
+def _unpickled(kind: type[CrossfieldError], args: tuple[str, ...]) -> CrossfieldError:
+    error = kind.__new__(kind)
+    error.args = args
+    return error
 
 
 @contextmanager

@@ -1,9 +1,11 @@
 """Work in several processes: answers in order, errors as they were raised, and nobody left behind."""
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import crossfield as cf
@@ -39,9 +41,98 @@ def test_an_error_of_the_work_is_raised_here_and_the_process_goes_on():
         assert work(["4", "5"]) == [4, 5]
 
 
-def test_a_process_that_dies_is_said():
-    with side_by_side(os._exit, 2) as work, pytest.raises(WorkerError, match="fewer jobs or threads"):
+def test_a_process_that_dies_is_named_with_its_exit_code():
+    with side_by_side(os._exit, 2) as work, pytest.raises(WorkerError) as caught:
         work([3])
+    assert str(caught.value) == "a process ended before its work was done: it ended with code 3"
+
+
+@pytest.mark.parametrize("number,remedy", [(signal.SIGKILL, True), (signal.SIGABRT, False)])
+def test_memory_is_suspected_only_where_a_process_was_killed(number, remedy):
+    with side_by_side(signal.raise_signal, 2) as work, pytest.raises(WorkerError) as caught:
+        work([number])
+    assert f"it was killed by signal {number.name}" in str(caught.value)
+    assert ("lack of memory; try fewer jobs or threads" in str(caught.value)) == remedy
+
+
+MODULE = """
+import threading
+
+class OwnConstructor(Exception):
+    def __init__(self, place, cause):
+        super().__init__(f"{cause} at {place}")
+
+class Doubling(Exception):
+    def __init__(self, text):
+        super().__init__(f"code {text}")
+
+class Unpicklable(Exception):
+    def __init__(self, text):
+        super().__init__(text)
+        self.lock = threading.Lock()
+
+def work(task):
+    if task == "own constructor":
+        raise OwnConstructor("here", "nothing")
+    if task == "doubling":
+        raise Doubling(7)
+    if task == "unpicklable":
+        raise Unpicklable("no way")
+    if task == "long":
+        from crossfield.models.errors import InputError
+        raise InputError(2000 * "x", file="file")
+    return threading.Lock() if task == "lock" else task
+"""
+
+
+@pytest.fixture
+def module_of_a_user(tmp_path, monkeypatch):
+    """A module beside the user's program: this process finds it, though it is not installed."""
+    (tmp_path / "users_module.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield importlib.import_module("users_module")
+    del sys.modules["users_module"]
+
+
+@pytest.mark.parametrize(
+    "task,message",
+    [
+        ("own constructor", "OwnConstructor: nothing at here"),
+        ("doubling", "Doubling: code 7"),
+        ("unpicklable", "Unpicklable: no way"),
+        ("lock", "the result of a task cannot be sent back: TypeError: cannot pickle '_thread.lock' object"),
+    ],
+)
+def test_what_cannot_be_sent_back_is_named_and_the_process_goes_on(module_of_a_user, task, message):
+    with side_by_side(module_of_a_user.work, 2) as work:
+        with pytest.raises(WorkerError) as caught:
+            work([task])
+        assert str(caught.value) == message
+        assert "in _answer" in caught.value.__notes__[0]
+        assert work(["a", "b"]) == ["a", "b"]
+
+
+def test_an_error_of_ours_arrives_as_it_was(module_of_a_user):
+    with side_by_side(module_of_a_user.work, 2) as work, pytest.raises(InputError) as caught:
+        work(["long"])
+    with pytest.raises(InputError) as here:
+        module_of_a_user.work("long")
+    assert (str(caught.value), caught.value.file) == (str(here.value), "file")
+
+
+def test_a_function_that_a_process_cannot_import_is_named(module_of_a_user, tmp_path):
+    (tmp_path / "users_module.py").write_text("raise ImportError('half of it is missing')")
+    with side_by_side(module_of_a_user.work, 2) as work, pytest.raises(WorkerError) as caught:
+        work(["a"])
+    expected = "cannot import the function of its task or read its data: ImportError: half of it is missing"
+    assert expected in str(caught.value)
+
+
+def test_a_task_that_cannot_be_sent_is_named():
+    with side_by_side(abs, 2) as work:
+        with pytest.raises(WorkerError, match="a task cannot be sent to a process: TypeError: cannot pickle"):
+            work([threading.Lock()])
+        assert work([-1]) == [1]
 
 
 def test_no_process_stays_behind():
