@@ -7,20 +7,14 @@ once.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import Any, Final, TypeVar
 
 from ....models.errors import CrossfieldError, InputError
-from ....models.processes.side_by_side import checked
+from ....models.processes.side_by_side import WorkerError, workers
 
-P = ParamSpec("P")
 T = TypeVar("T")
 
 _AHEAD: Final = 64
@@ -33,15 +27,6 @@ class BuildError(CrossfieldError):
     """Workers that died or went away."""
 
 
-class _Here(Executor):
-    """Runs a task when it is submitted, in this process."""
-
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        future: Future[T] = Future()
-        future.set_result(fn(*args, **kwargs))
-        return future
-
-
 def ahead(jobs: int, scheduler: str | None) -> int:
     """How many tasks are handed out at once; a build that is killed loses those that are not done."""
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
@@ -51,45 +36,10 @@ def ahead(jobs: int, scheduler: str | None) -> int:
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Where tasks run. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
-        with _cluster(scheduler) if scheduler else _local(jobs) as chosen:
+        with _cluster(scheduler) if scheduler else workers(jobs) as chosen:
             yield chosen
-    except BrokenProcessPool as error:
-        raise BuildError(
-            "a process ended before its work was done, for want of memory most likely; "
-            "try again with fewer --jobs; of a build, what is whole is kept"
-        ) from error
-
-
-@contextmanager
-def _local(jobs: int) -> Iterator[Executor]:
-    if checked(jobs) == 1:
-        yield _Here()
-        return
-    others = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin_worker)
-    try:
-        yield pool
-    except BaseException:  # what is under way is lost in any case, so nobody waits for it
-        for worker in set(multiprocessing.active_children()) - others:
-            worker.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and leave with the parent however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
-
-
-def _leave_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    except WorkerError as error:
+        raise BuildError(f"{error}; of a build, what is whole is kept") from error
 
 
 @contextmanager

@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import casadi
 import highspy
@@ -21,7 +20,7 @@ import jsonschema
 import numpy as np
 import places
 import pytest
-from children import complaints
+from children import command_lines, complaints, descendants
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.building.build import build, rebuild
@@ -674,18 +673,17 @@ def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built,
     process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and len(list(out.glob("cf_*_n*_milp.json"))) < 1:
         time.sleep(0.01)
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    workers = [
-        int(child)
-        for child in children.read_text().split()
-        if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
-    ]
+    lines = command_lines()
+    workers = [child for child in descendants(process.pid) if b"processes.worker" in lines[child]]
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     error = complaints(process.communicate()[1])
     assert process.returncode == 1
     assert len(error.splitlines()) == 1
-    assert "a process ended before its work was done" in error
+    assert "a process ended before its work was done: it was killed by signal SIGKILL" in error
+    assert (
+        "probably for lack of memory; try fewer jobs or threads; of a build, what is whole is kept" in error
+    )
     whole = content(built.folder)
     assert all(whole[name] == data for name, data in content(out).items())
 

@@ -1,0 +1,73 @@
+"""Where a library's tasks run: in processes of the package, whatever the program is that asks for them."""
+
+import subprocess
+import sys
+
+import pytest
+from crossfield.export.library.building.executor import BuildError, Tasks, executor
+
+SPEC = """format = "crossfield-library-spec"
+version = 1
+title = "one small instance"
+formulations = ["qp-fixed"]
+
+[rungs.tiny]
+sizes = [4]
+formats = ["nl"]
+
+[[sketches]]
+name = "skew"
+sample = "skew"
+"""
+BUILD = """from crossfield.export.library.building.build import build
+from crossfield.export.library.plan.spec import read_spec
+
+print("the script runs")
+build(read_spec("spec.toml"), "library", jobs=2)
+"""
+TASKS = """import math
+from crossfield.export.library.building.executor import Tasks, executor
+
+print("the script runs")
+with executor(2, None) as chosen:
+    tasks = Tasks(chosen, 4)
+    for number in (16, 25):
+        tasks.add(math.isqrt, number, lambda root: open(f"root_{root}", "w").close())
+    tasks.run()
+"""
+
+
+def run_without_guard(script, folder):
+    """Run a script without the guard `if __name__ == "__main__"`; it must be read only once."""
+    (folder / "script.py").write_text(script, "utf-8")
+    command = [sys.executable, "script.py"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "the script runs\n", "")
+
+
+def test_a_script_without_a_guard_has_tasks_done_in_two_processes(tmp_path):
+    run_without_guard(TASKS, tmp_path)
+    assert {path.name for path in tmp_path.glob("root_*")} == {"root_4", "root_5"}
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_builds_a_library_in_two_processes(tmp_path):
+    (tmp_path / "spec.toml").write_text(SPEC, "utf-8")
+    run_without_guard(BUILD, tmp_path)
+    assert (tmp_path / "library" / "cf_skew_n004_qp.nl").exists()
+
+
+def test_a_process_that_ends_early_ends_the_build_with_its_exit_code():
+    from os import _exit
+
+    def build():
+        with executor(2, None) as chosen:
+            tasks = Tasks(chosen, 4)
+            tasks.add(_exit, 3, print)
+            tasks.run()
+
+    with pytest.raises(BuildError) as caught:
+        build()
+    assert str(caught.value) == (
+        "a process ended before its work was done: it ended with code 3; of a build, what is whole is kept"
+    )
