@@ -45,6 +45,7 @@ def pinned(field: CrossField) -> CrossField:
     -------
     CrossField
         The same jumps with their best angles.
+
     """
     instance, start = field.instance, fitted(field)
     quarter = np.full(instance.grid.size, QUARTER)
