@@ -855,15 +855,15 @@ class Quadratic:
         """The step on the free angles after which there is no slope, by conjugate gradients."""
         still = self.slope(np.zeros(len(slope)))
         step, rest = np.zeros(len(slope)), -slope
-        way, size = rest, float(rest @ rest)
+        way, size = rest, float(np.sum(rest * rest))
         enough = 1e-22 * size
         for _ in range(len(slope)):
             if size <= enough:
                 break
             change = np.where(free, self.slope(way) - still, 0.0) + 1e-9 * way
-            length = size / float(way @ change)
+            length = size / float(np.sum(way * change))
             step, rest = step + length * way, rest - length * change
-            size, before = float(rest @ rest), size
+            size, before = float(np.sum(rest * rest)), size
             way = rest + size / before * way
         return step
 

@@ -59,6 +59,7 @@ MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
 _MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
 _RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
 _WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
+_DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
 _MANY: Final = 4  # levels after which a gap that is left may be that of the field
 _LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
@@ -403,5 +404,5 @@ def _centre(field: CrossField) -> CrossField:
     """The same crosses in the gauge `strokes`, each pair with its best jump; 0 where no stroke reaches."""
     instance = field.instance.with_gauge("strokes")
     known = reached(instance)
-    alpha, beta = field.alpha * known, field.beta * known
+    alpha, beta = (np.round(angle, _DECIMALS) * known for angle in (field.alpha, field.beta))
     return relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])

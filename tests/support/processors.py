@@ -1,5 +1,7 @@
 """Environments in which a child process computes as on another processor."""
 
+import platform
+
 import numpy as np
 
 _FOUND = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
@@ -8,11 +10,13 @@ PLAIN = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
 }
 """NumPy without its faster loops, a C library without FMA."""
-_WIDE = [{"OPENBLAS_CORETYPE": "SkylakeX"}] if {"X86_V4", "AVX512_SKX"} & {*_FOUND} else []
-PROCESSORS = [
-    {"OPENBLAS_CORETYPE": "Haswell"},
+_AVX2 = [{"OPENBLAS_CORETYPE": "Haswell"}] if {"X86_V3", "AVX2"} & {*_FOUND} else []
+_AVX512 = [{"OPENBLAS_CORETYPE": "SkylakeX"}] if {"X86_V4", "AVX512_SKX"} & {*_FOUND} else []
+_X86 = [
+    *_AVX2,
     {"OPENBLAS_CORETYPE": "Nehalem"},
-    *_WIDE,
+    *_AVX512,
     {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN,
 ]
+PROCESSORS = _X86 if platform.machine().lower() in {"x86_64", "amd64"} else [{}]
 """Kernels of OpenBLAS that this processor can execute."""

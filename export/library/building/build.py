@@ -39,9 +39,10 @@ def build(
     """The library of a specification, now in the folder.
 
     jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
-    progress: called with a line for each entry that is made. Same specification and ledger, same bytes, with
-    any number of processes. Where the specification brings points, on every processor too; else points are
-    searched for, and may end in other digits on another kind. Raises InputError, OutputError, BuildError.
+    progress: called with a line for each entry that is made. The same specification and ledger give the same
+    bytes with any number of processes. With points in the specification they do so on every processor.
+    Without points they do so where every search takes the same branches. Raises InputError, OutputError,
+    BuildError.
     """
     plans = plan(spec)
     folder, is_new = Path(folder), not Path(folder).exists()

@@ -15,7 +15,7 @@ from ....models.field.field import CrossField
 from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import to_json
 from ....models.instance.instance import Instance
-from ....models.search.box_qp import fitted
+from ....models.search.pinned import pinned
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
@@ -118,7 +118,7 @@ def _searched(instance: Instance, recipe: InstanceRecipe) -> _Found:
     searched = searched_field(instance)
     proven = certified(searched.field) if recipe.prove else None
     found = better_in_1norm(searched.field, recipe.rung)
-    staged = [Known(fitted(each.field), ours("two stages")) for each in found]
+    staged = [Known(pinned(each.field), ours("two stages")) for each in found]
     low = [searched, *([proven.known] if proven else []), *found, *staged]
     return _Found(baseline_field(instance), low, (proven.data, proven.facts) if proven else None)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.field.field import CrossField
+from ....models.search.pinned import pinned
 from .points import Known, ours
 
 METHOD: Final = "prove"
@@ -47,7 +48,9 @@ def certified(start: CrossField) -> Certified | None:
     from ....models.proof.prove import prove  # it loads what is compiled
 
     effort = _Effort()
-    proof = prove(start.instance, start=start, jobs=1, progress=effort.tell, stop=effort.spent)
+    found = prove(start.instance, start=start, jobs=1, progress=effort.tell, stop=effort.spent)
+    field = pinned(found.field)
+    proof = replace(found, field=field, energy=field.energy().total)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         path = Path(folder) / "a.certificate.npz"
         said = write_certificate(proof, path)

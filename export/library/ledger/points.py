@@ -18,6 +18,7 @@ from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
 from ....models.proof.dual_start import search
 from ....models.search.greedy import greedy
+from ....models.search.pinned import pinned
 from ...formats.registry import generator
 
 _ROUNDS: Final = 8
@@ -54,12 +55,12 @@ def ours(method: str) -> Provenance:
 
 def baseline_field(instance: Instance) -> Known:
     """The greedy field: its jumps are the data of `qp-fixed`, so that no search may change them."""
-    return Known(greedy(instance), ours("greedy"))
+    return Known(pinned(greedy(instance)), ours("greedy"))
 
 
 def searched_field(instance: Instance) -> Known:
     """A field of low 2-norm energy, by a fixed amount of work: no clock decides about it."""
-    return Known(search(instance, rounds=_ROUNDS, jobs=1).field, ours("search"))
+    return Known(pinned(search(instance, rounds=_ROUNDS, jobs=1).field), ours("search"))
 
 
 def least_energy(known: Sequence[Known], norm: int) -> Known:

@@ -103,6 +103,20 @@ def test_a_library_with_points_is_the_same_on_every_processor_and_verifies_there
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(len(PROCESSORS) < 2, reason="this processor runs only one kind of OpenBLAS kernels")
+def test_a_library_without_points_is_the_same_under_other_kernels(tmp_path):
+    spec = write_spec(tmp_path, 'formulations = ["qp-fixed", "miqp-exact", "milp-mccormick"]')
+    found = []
+    for number, processor in enumerate((PROCESSORS[0], PROCESSORS[-1])):
+        folder = tmp_path / str(number)
+        on(processor, "build", spec, "-o", folder, "--quiet")
+        found.append(content(folder))
+    first, other = found
+    assert other.keys() == first.keys()
+    assert [name for name in first if other[name] != first[name]] == []
+
+
+@pytest.mark.slow
 def test_what_is_given_is_what_is_told_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
     made = build(read_spec(spec), tmp_path / "lib").folder
     assert verify_library(made) == []

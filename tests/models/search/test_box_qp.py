@@ -8,6 +8,7 @@ from crossfield.export.solving.two_stage import fit_angles
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from crossfield.models.search.box_qp import fitted
+from crossfield.models.search.pinned import pinned
 from crossfield.models.sketch.samples import sample, samples
 from crossfield.models.smooth.power_field import power_field
 from hypothesis import given, settings
@@ -214,3 +215,33 @@ def test_optimum_without_jumps_is_that_of_the_transposed_sketch():
         energies.append(fitted(CrossField(each, zero, zero, np.zeros(len(each.p_min)))).energy().total)
     assert energies[0] > 0.1
     assert energies[1] == pytest.approx(energies[0], rel=1e-9)
+
+
+@for_each("gauge", ["strokes", "box"])
+@for_each("seed", range(6))
+def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
+    instance = random_instance(seed, (4, 5), gauge, 1e-6)
+    field, other = (random_field(instance, number) for number in (seed, seed + 100))
+    found, same = pinned(field), pinned(CrossField(instance, other.alpha, other.beta, field.p))
+    assert found.alpha.tobytes() == same.alpha.tobytes()
+    assert found.beta.tobytes() == same.beta.tobytes()
+    assert_optimal(found)
+    assert found.energy().total <= fitted(field).energy().total * (1 + 1e-12)
+    again = pinned(found)
+    assert again.alpha.tobytes() == found.alpha.tobytes()
+    assert again.beta.tobytes() == found.beta.tobytes()
+
+
+@for_each("w_strokes", [0, 1])
+@for_each("w_beta", [0, 1e-6])
+def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(w_beta, w_strokes):
+    instance = replace(random_instance(7, (5, 5)), w_beta=w_beta, w_strokes=w_strokes)
+    assert_optimal(pinned(random_field(instance, 7)))
+
+
+def test_pinned_angles_of_a_part_without_strokes_stay():
+    mask = np.array([[True, True, False, True, True]])
+    instance = Instance("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
+    alpha = np.array([0.3, 0.3, 0.7, 0.7])
+    found = pinned(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
+    assert found.alpha.tolist() == alpha.tolist()

@@ -1,0 +1,92 @@
+"""The best angles for given jumps, the same on every processor.
+
+Solvers of linear systems round differently on each kind of processor: soft directions of the energy make
+angles differ by up to 1e-10. Here the solution is refined with slopes that are right to twice the digits of
+a double, and then rounded to twelve decimals. Fields with the same jumps get the same angles, wherever their
+angles come from.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from ..field.field import CrossField
+from ..instance.grid import Floats
+from ..instance.instance import QUARTER
+from ..smooth.systems import one_thread
+from .box_qp import fitted
+from .energy import LinearSolver, Quadratic, energy_at
+from .nearest_stroke import nearest_strokes
+
+_DECIMALS: Final = 12  # as directions of strokes have
+_AT_BOUND: Final = 1e-11  # radians from a bound within which an angle is at the bound
+_SMALLEST: Final = 1e-19  # radians: a smaller step changes no rounded angle
+_MOST_STEPS: Final = 60  # 4 to 8 are usual
+_LINEAR: Final = 1e-8  # relative residual of a step
+_SPLITTER: Final = 2.0**27 + 1
+
+
+@one_thread()
+def pinned(field: CrossField) -> CrossField:
+    """Field of least 2-norm energy with the jumps of `field`, angles rounded to twelve decimals.
+
+    Within the bounds that `fitted` keeps. Parts of the mask without strokes keep the angles that `fitted`
+    gives them, rounded too.
+
+    Parameters
+    ----------
+    field : CrossField
+        Jumps, and angles from which the search for the best ones starts.
+
+    Returns
+    -------
+    CrossField
+        The same jumps with their best angles.
+
+    """
+    instance, start = field.instance, fitted(field)
+    quarter = np.full(instance.grid.size, QUARTER)
+    lower = np.concatenate([instance.alpha_lower, -quarter])
+    upper = np.concatenate([instance.alpha_upper, quarter])
+    energy, solver = energy_at(instance, field.p), LinearSolver()
+    unreached = np.tile(nearest_strokes(instance) < 0, 2)
+    x, rest = np.concatenate([start.alpha, start.beta]), np.zeros(len(lower))
+    for _ in range(_MOST_STEPS):
+        slope = _slope(energy, x, rest)
+        held = unreached | ((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0))
+        step = solver.step(energy.matrix, -slope, _LINEAR, ~held)
+        moved = np.clip(x + (rest + step), lower, upper)
+        inside = (moved > lower) & (moved < upper)
+        x, rest = moved, np.where(inside, (rest + step) - (moved - x), 0.0)
+        if np.abs(step).max() <= _SMALLEST:
+            break
+    x = np.round(x + rest, _DECIMALS) + 0.0  # no -0.0
+    x = np.where(x - lower < _AT_BOUND, lower, np.where(upper - x < _AT_BOUND, upper, x))
+    alpha, beta = np.split(x, 2)
+    return CrossField(instance, alpha, beta, field.p)
+
+
+def _slope(energy: Quadratic, x: Floats, rest: Floats) -> Floats:
+    """Half the gradient at x + rest, shapes (2n,), each entry rounded once."""
+    matrix = energy.matrix
+    product, error = _two_product(matrix.data, x[matrix.indices])
+    terms = np.stack([product, error, matrix.data * rest[matrix.indices]], axis=1).ravel().tolist()
+    ends, vector = (3 * matrix.indptr).tolist(), energy.vector.tolist()
+    return np.array(
+        [
+            math.fsum([*terms[begin:end], -goal])
+            for begin, end, goal in zip(ends[:-1], ends[1:], vector, strict=True)
+        ]
+    )
+
+
+def _two_product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Products and their rounding errors, whose sums are exact (Dekker, Numer. Math. 18, 1971)."""
+    product = a * b
+    a_high, b_high = (_SPLITTER * each - (_SPLITTER * each - each) for each in (a, b))
+    a_low, b_low = a - a_high, b - b_high
+    error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+    return product, error
