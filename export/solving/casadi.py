@@ -21,8 +21,7 @@ def run(job: Job) -> RunEnd:
 
     Raises SolverError.
     """
-    numbers = job.deadline.at, float(job.limits.gap)
-    arguments = job.solver, job.model, job.solution, *map(repr, numbers), job.problem.stamp
+    arguments = job.solver, job.model, job.solution, float(job.limits.gap), job.problem.stamp
     ended = solved_by("casadi_driver", map(str, arguments), job, lambda: _leave_start(job))
     return RunEnd(ended.interrupted)
 

@@ -1,9 +1,10 @@
 """A driver in AMPL's manner: reads stub.nl, solves it with Ipopt or Bonmin through CasADi, leaves stub.sol.
 
-Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol deadline
-gap stamp`: a crash of a solver takes the child alone, and its log is the child's output. The log's first line
-says that the solver starts now; from then on an interrupt (SIGINT) ends the search and leaves the best point
-so far. It ends with its parent: when its standard input closes.
+Run as a child process, `python -m crossfield.export.solving.casadi_driver ipopt model.nl model.sol gap stamp
+seconds`: a crash of a solver ends only the child, and its log is the child's output. The seconds count from
+the start of the child. The log's first line says that the solver starts; from then on an interrupt (SIGINT)
+ends the search, and the best point so far is written. The child ends with its parent: when its standard input
+closes.
 
 The stamp says of which problem the model is, and is repeated in the message.
 
@@ -187,10 +188,11 @@ def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
 
 def main(arguments: list[str]) -> int:
     """0 when a .sol was written, in which the status stands; else 1, and the log ends with the reason."""
-    solver, path, solution, deadline, gap, stamp = arguments
+    solver, path, solution, gap, stamp, limit = arguments
+    deadline = Deadline.since_start(float(limit))
     leave_with_parent()
     model = read_nl(Path(path))
-    seconds = max(Deadline(float(deadline)).left(), LEAST)
+    seconds = max(deadline.left(), LEAST)
     columns, rows = len(model.start), len(model.row_lower)
     line = f"{solver}: {columns} columns, {rows} rows, at most {seconds:.3g} s"
     # What is printed is the log.

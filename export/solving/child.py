@@ -44,11 +44,13 @@ def solved_by(
 ) -> ChildExit:
     """How a module of this folder ended that was run as a program; the job's solution file is there then.
 
+    The program's last argument is the number of seconds that are left when it is started.
     leave_start: makes the start the solution; it is called where the program was stopped before it had one,
     if the start is feasible. Raises SolverError with the program's last words.
     """
     # -P: a folder `crossfield` or a file numpy.py where the user happens to be is not meant.
     program = [sys.executable, "-P", "-m", f"{__package__}.{module}", *map(str, arguments)]
+    program.append(repr(job.deadline.left()))
     ended = run_child(program, job.log, job.deadline)
     if job.solution.exists():
         return ended

@@ -91,8 +91,8 @@ def run(job: Job) -> RunEnd:
     start = job.solution.with_suffix(".start")
     if job.start is not None:
         save(start, LAYOUTS["highs"](Start(job.problem, job.start)))
-    numbers = map(repr, (job.deadline.at, float(job.limits.gap), job.limits.threads))
-    arguments = *map(str, (job.model, job.solution, start)), *numbers
+    files = map(str, (job.model, job.solution, start))
+    arguments = *files, repr(float(job.limits.gap)), str(job.limits.threads)
     try:
         ended = solved_by("highs", arguments, job, lambda: start.replace(job.solution))
     finally:
@@ -118,16 +118,17 @@ def main(arguments: list[str]) -> int:
     from ...models.processes.deadline import Deadline
     from ...models.processes.side_by_side import leave_with_parent
 
+    deadline = Deadline.since_start(float(arguments.pop()))
     leave_with_parent()
     stop = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: stop.set())
-    (model, solution, start), (deadline, gap, threads) = map(Path, arguments[:3]), arguments[3:]
+    (model, solution, start), (gap, threads) = map(Path, arguments[:3]), arguments[3:]
     try:
         highs = loaded(model, silent=False, mip_rel_gap=float(gap), threads=int(threads))
         if start.exists():
             highs.readSolution(str(start), _RAW)
         # It ends by itself, if it looks at the clock in time, before it is interrupted.
-        set_options(highs, time_limit=max(Deadline(float(deadline)).left() - 2 * _TICK, LEAST))
+        set_options(highs, time_limit=max(deadline.left() - 2 * _TICK, LEAST))
         _until_it_ends(highs, stop)
         leave(highs, solution)
     except CrossfieldError as error:

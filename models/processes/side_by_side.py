@@ -99,10 +99,13 @@ class _Workers:
 
     def ask(self, work: Callable[[Task], Found], task: Task) -> Found:
         """What a process makes of a task."""
-        child = self._take()
+        child, new = self._take()
         assert child.stdin is not None
         assert child.stdout is not None
         try:
+            if new:  # a deadline in the task counts from its arrival, so that imports must be done by then
+                send((_imported, work), child.stdin)
+                pickle.load(child.stdout)  # noqa: S301 - from a process of our own
             send((work, task), child.stdin)
             answer = pickle.load(child.stdout)  # noqa: S301 - from a process of our own
         except (OSError, EOFError, pickle.UnpicklingError) as error:
@@ -117,14 +120,19 @@ class _Workers:
         found: Found = answer
         return found
 
-    def _take(self) -> subprocess.Popen[bytes]:
+    def _take(self) -> tuple[subprocess.Popen[bytes], bool]:
+        """Take an idle process, or a new one: then the second value is true."""
         with self._lock:
             if self._ended:
                 raise WorkerError("the work was ended before its time")
             if self._idle:
-                return self._idle.pop()
+                return self._idle.pop(), False
             self._all.append(_started())
-            return self._all[-1]
+            return self._all[-1], True
+
+
+def _imported(_work: Callable[[Task], Found]) -> None:
+    """Return when the process has imported the module of the work."""
 
 
 def _started() -> subprocess.Popen[bytes]:

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import time
 
 from crossfield.models.processes.deadline import Deadline
 from hypothesis import given
@@ -28,6 +29,31 @@ def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
     assert (deadline.left(), deadline.passed()) == (1.0, False)
     clock.now += 5.0
     assert (deadline.left(), deadline.passed()) == (0.0, True)
+
+
+def test_a_limit_is_a_deadline_seconds_or_none():
+    deadline = Deadline.after(3.0, Clock())
+    assert Deadline.of(deadline) is deadline
+    assert Deadline.of(None) == Deadline()
+    assert 0.0 < Deadline.of(3.0).left() <= 3.0
+
+
+def test_a_step_that_would_end_late_is_not_begun():
+    clock = Clock()
+    over = Deadline.after(10.0, clock).steps()
+    assert not over()
+    clock.now += 4.0
+    assert not over()  # 6 s are left
+    clock.now += 4.0
+    assert over()  # 2 s are left, and the last step took 4 s
+    clock.now += 1.0
+    assert over()
+
+
+def test_a_deadline_counted_from_the_start_of_the_process_is_no_later_than_one_from_now():
+    deadline = Deadline.since_start(600.0)
+    assert deadline.left() <= 600.0
+    assert deadline.left() >= 600.0 - 2 * time.process_time()
 
 
 def test_without_a_limit_there_is_no_end():
