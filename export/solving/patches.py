@@ -20,7 +20,7 @@ from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import formulate, with_rest_fixed
 from ...models.instance.grid import Bools, Ints
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Deadline, Over, never
 from ...models.processes.interruption import interruptible
 from ...models.processes.side_by_side import side_by_side
 from ...models.search.energy import LinearSolver
@@ -83,7 +83,7 @@ class _Found(NamedTuple):
 def search_patches(
     field: CrossField,
     *,
-    seconds: float,
+    seconds: float | Deadline,
     solver: str = "bonmin",
     seed: int = 0,
     jobs: int = 2,
@@ -98,9 +98,10 @@ def search_patches(
     """
     if solver not in PATCH_SOLVERS:
         raise InputError(f"{solver!r} solves no patches; choose one of {', '.join(PATCH_SOLVERS)}")
-    if not seconds > 0 or jobs < 1:
+    if (isinstance(seconds, int | float) and not seconds > 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds and of jobs")
-    deadline = Deadline.after(seconds - min(_HAND_OVER, seconds / 4))
+    whole = Deadline.of(seconds)
+    deadline = whole.later(-min(_HAND_OVER, whole.left() / 4))
     state = _State(field, PATCH_SOLVERS[solver].side, np.random.default_rng(seed))
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as folder:
         try:
@@ -109,7 +110,7 @@ def search_patches(
                     tasks = [
                         _Task(state.field, free, solver, deadline, Path(folder)) for free in state.patches()
                     ]
-                    state.take(tasks, explore(tasks))
+                    state.take(tasks, explore(tasks), whole.passed)
                     progress(state.solved, state.energy)
         except KeyboardInterrupt:
             ended = "interrupted"
@@ -189,7 +190,7 @@ class _State:
         inside: Bools = np.all((off >= -first) & (off < side - first), axis=0)
         return inside
 
-    def take(self, tasks: list[_Task], found: list[_Found | None]) -> None:
+    def take(self, tasks: list[_Task], found: list[_Found | None], over: Over = never) -> None:
         """Take over what lowers the energy of the whole field, and note which patches are done with."""
         for centre, task, each in zip(self._chosen, tasks, found, strict=True):
             if each is None:
@@ -198,7 +199,7 @@ class _State:
             self.closed += each.closed
             self._open[centre] = False
             if each.field is not None and (each.field.p != each.piece.field.p).any():
-                lower = self._try(each.piece.put_back(each.field, self.field), task.free)
+                lower = self._try(each.piece.put_back(each.field, self.field), task.free, over)
                 # Labels may have changed with another patch's answer: then this one is solved once more.
                 self._open[centre] |= not lower and task.field is not self.field
         if not self._open.any():
@@ -210,11 +211,11 @@ class _State:
         self.side += not self.done
         self._open[:] = True
 
-    def _try(self, field: CrossField, free: Bools) -> bool:
+    def _try(self, field: CrossField, free: Bools, over: Over) -> bool:
         """Whether a field, brought up to date, is lower: then go on from it, patches near by open again."""
         state = FreeField.of(field)
-        settle(state, LinearSolver())
-        better = state.bounded()
+        settle(state, LinearSolver(), over)
+        better = state.bounded(over)
         if better.energy().total < self.energy - LOWER:
             self.field, self.energy = better, better.energy().total
             self.lower += 1

@@ -1,0 +1,129 @@
+"""Every method ends at its time limit, by a clock of the test, and returns a valid field."""
+
+import json
+import math
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import write
+from crossfield.export.solving.casadi import run
+from crossfield.export.solving.job import Job, Limits
+from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.solving.proven import NOTHING, certified
+from crossfield.models.errors import SolverError
+from crossfield.models.processes.deadline import Deadline
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.prove import _Limits
+from crossfield.models.search.greedy import greedy
+
+
+class Ticking:
+    """A clock that advances by one second whenever it is read."""
+
+    def __init__(self, start=0.0):
+        self.now = start
+
+    def __call__(self):
+        self.now += 1.0
+        return self.now
+
+
+LATE = {"greedy": 8, "power": 4, "polyvector": 4, "bend": 4, "search": 40, "patches": 16, "prove": 40}
+"""Most readings of the clock after the limit; a two-stage solve ends in the processes of its solvers."""
+
+
+@pytest.mark.parametrize("method", LATE)
+@pytest.mark.parametrize("seconds", [0.5, 6.0, 20.0])
+def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path):
+    clock = Ticking()
+    request = Request(cf.sample("mouse", 12), tmp_path, Limits(seconds, threads=1), clock=clock)
+    *_, found = METHODS[method].find(request)
+    assert clock.now <= 1 + seconds + LATE[method]
+    assert np.isfinite(found.field.energy().total)
+    assert (found.field.alpha >= request.instance.alpha_lower - 1e-12).all()
+    assert (found.field.alpha <= request.instance.alpha_upper + 1e-12).all()
+    assert (np.abs(found.field.beta) <= np.pi / 4 + 1e-12).all()
+
+
+def test_two_stages_without_time_return_the_start(tmp_path):
+    start = greedy(cf.sample("mouse", 12))
+    request = Request(start.instance, tmp_path, Limits(1e-3), start=start, clock=Ticking())
+    (only,) = METHODS["two-stage"].find(request)
+    assert only.field.energy(1).total == pytest.approx(start.energy(1).total, rel=1e-9)
+
+
+def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
+    """The deadline is far away, although its clock began long after that of other processes."""
+    field = greedy(cf.sample("mouse", 6))
+    problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
+    held = write(problem, tmp_path / "model.nl", start=field).problem
+    files = tmp_path / "model.nl", tmp_path / "model.sol", tmp_path / "log"
+    deadline = Deadline.after(600.0, lambda: -1e9)
+    run(Job("ipopt", *files, held, held.point(field), Limits(600.0), deadline))
+    first = files[2].read_text().splitlines()[0]
+    assert 500 < float(first.rpartition("at most ")[2].removesuffix(" s")) <= 600
+
+
+@pytest.fixture
+def passed():
+    """A deadline in the past."""
+    return Deadline(0.0, lambda: 1.0)
+
+
+def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
+    proof = cf.prove(cf.sample("mouse", 24), seconds=passed, certified=True)
+    assert (proof.bound, proof.status, proof.levels, proof.ended) == (0.0, "gap", (), "time")
+    path = tmp_path / "certificate.npz"
+    with pytest.raises(SolverError, match="nothing was proven"):
+        write_certificate(proof, path)
+    path.write_bytes(b"of an earlier call")
+    assert certified(proof, path, Deadline()) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("norm", ["1", "2"])
+def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsys):
+    stale = tmp_path / "mouse.proof.certificate.npz"
+    stale.write_bytes(b"of an earlier call")
+    given = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
+    assert invoke([*given, "-o", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert NOTHING in said.err
+    document = json.loads(said.out)
+    assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
+    assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
+    assert {path.name for path in tmp_path.iterdir()} == {"mouse.proof.field.npz", "mouse.proof.json"}
+
+
+def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
+    given = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
+    assert invoke(given) == 0
+    assert NOTHING in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]
+
+
+def limits(seconds):
+    """Limits of a certified proof whose clock stands still."""
+    return _Limits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
+
+
+def test_a_proof_keeps_time_for_its_certificate():
+    kept = limits(1e9)
+    kept.keep(1000.0)
+    first = kept.kept
+    assert 0 < first < 1e9
+    assert kept.deadline.at == kept.whole.at - first
+    kept.keep(2000.0)
+    assert kept.kept >= 2 * first
+    assert kept.certified
+
+
+def test_without_time_for_a_certificate_the_proof_uses_the_whole_time():
+    short = limits(1e-6)
+    short.keep(1000.0)
+    assert (short.certified, short.kept, short.deadline) == (False, 0.0, short.whole)
+    endless = limits(math.inf)
+    endless.keep(1000.0)
+    assert endless.deadline.at == math.inf
