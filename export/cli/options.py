@@ -151,7 +151,8 @@ SecondsInAll = Annotated[
         "--time-limit",
         min=0.1,
         metavar="SECONDS",
-        help="Seconds in all, reading and writing files included; methods that do not search end earlier.",
+        help="Seconds in all, reading and writing files included; methods that do not search end earlier."
+        " power, polyvector and bend complete their first factorisation in any case.",
     ),
 ]
 SecondsEach = Annotated[

@@ -140,7 +140,7 @@ _LEGEND: Final = """\
 
 
 def show_report(report: Report, folder: Path) -> None:
-    """Print what a run found and where it lies, and what failed."""
+    """Print the fields and files of a run, and which methods failed."""
     gap = ("gap",) if report.proven else ()  # the bound is the same for all
     columns = ("method", "2-norm", *gap, "1-norm", "off", "<45°", "sing.", "s", "status")
     rows = []
@@ -169,9 +169,7 @@ def show_report(report: Report, folder: Path) -> None:
     say(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
     words = ", proven optimal" if best.get("proven_optimal") else ""
     say(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
-    if report.proven:
-        bound = f"{best['bound_2_norm']:.10g}"
-        say(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
+    _say_proven(report, best)
     if report.interrupted in ("", "surface"):
         say(f"  pictures: {folder / 'overview.png'} and others beside it")
         say(f"  layers that fit on the drawing: {folder / 'overlay.svg'}")
@@ -187,6 +185,17 @@ def show_report(report: Report, folder: Path) -> None:
             complain(f"{candidate.method}: interrupted; its best field so far was kept")
     for method, reason in report.failures.items():
         complain(f"{method}: {reason}")
+
+
+def _say_proven(report: Report, best: dict[str, Any]) -> None:
+    """Print the bound, or that nothing was proven although a method tried."""
+    from ..solving.proven import NOTHING
+
+    if report.proven:
+        bound = f"{best['bound_2_norm']:.10g}"
+        say(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
+    elif any(candidate.proof for candidate in report.candidates):
+        say(_wrapped(NOTHING))
 
 
 def _wrapped(text: str) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 
 import typer
 
+from ...models.errors import SolverError
 from .inputs import choice_of, load
 from .options import (
     Curvature,
@@ -26,8 +27,12 @@ from .output import complain, progress, say, say_json, show_facts
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm
+    from ...models.processes.deadline import Deadline
     from ...models.proof.certificate import Certificate
     from ...models.proof.record import Proof
+
+UNPROVEN: Final = "unproven"
+"""Status in the report of a proof without a bound."""
 
 
 def prove_command(
@@ -68,7 +73,8 @@ def prove_command(
             "--time-limit",
             min=0.1,
             metavar="SECONDS",
-            help="Seconds for the proof; its certificate is written and checked after them.",
+            help="Seconds for the proof and for its certificate, which is written and checked."
+            " They count from when the sketch is read.",
         ),
     ] = 60.0,
     gap: Annotated[
@@ -99,47 +105,54 @@ def prove_command(
     if instance is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.field.file import read_field
+    from ...models.processes.deadline import Deadline
     from ...models.proof.prove import prove
 
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
         loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        deadline = Deadline.after(time_limit)
         proof = prove(
             loaded,
             norm=cast("Norm", norm),
             start=None if start is None else read_field(start, on=loaded),
-            seconds=time_limit,
+            seconds=deadline,
+            certified=True,
             gap=gap,
             progress=lambda bound, energy, labels: show(
                 f"bound {bound:.6f}, energy {energy:.6f}, {labels} labels; Ctrl-C keeps them"
             ),
         )
         show("writing and checking the certificate")
-        document = _write(proof, output)
+        document = _write(proof, output, deadline)
     if as_json:
         say_json(document)
     elif not quiet:
         show_facts(loaded.summary, {key: value for key, value in document.items() if key != "levels"})
-        say(f"field, {'certificate and ' if norm == 2 else ''}report: {output}")
+        certificate = "certificate and " if norm == 2 and document["status"] != UNPROVEN else ""
+        say(f"field, {certificate}report: {output}")
     if proof.ended == "interrupted":
         complain("interrupted; the best field and bound so far were kept")
+    if document["status"] == UNPROVEN:
+        from ..solving.proven import NOTHING
+
+        raise SolverError(f"{NOTHING}; field and report were written. Increase --time-limit", file=output)
 
 
-def _write(proof: Proof, folder: Path) -> dict[str, Any]:
-    """The facts of a proof, now in the folder with its field and, in the 2-norm, its certificate."""
+def _write(proof: Proof, folder: Path, deadline: Deadline) -> dict[str, Any]:
+    """Write field, report and, in the 2-norm, certificate of a proof; return the facts of the report."""
     from ...models.field.file import write_field
     from ...models.processes.interruption import interruptible
-    from ...models.proof.certificate import write_certificate
     from ...models.storage import make_folder, write_bytes
+    from ..solving.proven import certified
 
     stem = f"{proof.field.instance.name}.proof"
-    write_field(proof.field, make_folder(folder) / f"{stem}.field.npz")
-    said, bounds = facts(proof), [level.bound for level in proof.levels]
-    if proof.norm == 2:
-        with interruptible() as interrupted:
-            certificate = write_certificate(proof, folder / f"{stem}.certificate.npz", interrupted)
-        said, bounds = facts(certificate), certificate.verdict.levels  # what the checker confirms
+    path = make_folder(folder) / f"{stem}.certificate.npz"
+    with interruptible() as interrupted:
+        certificate = certified(proof, path, deadline, interrupted)
+    said, bounds = _proven(proof, certificate)
+    write_field(proof.field, folder / f"{stem}.field.npz")
     document = said | {
         "norm": proof.norm,
         "seconds": proof.seconds,
@@ -151,6 +164,15 @@ def _write(proof: Proof, folder: Path) -> dict[str, Any]:
     }
     write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
     return document
+
+
+def _proven(proof: Proof, certificate: Certificate | None) -> tuple[dict[str, Any], list[float]]:
+    """Return the facts that are proven, and the bound of each level: those that the checker confirms."""
+    if certificate is not None:
+        return facts(certificate), certificate.verdict.levels
+    if proof.norm == 1 and not proof.bound <= 0 < proof.energy:
+        return facts(proof), [level.bound for level in proof.levels]
+    return facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 
 def facts(said: Proof | Certificate) -> dict[str, Any]:

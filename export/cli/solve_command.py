@@ -150,13 +150,13 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
     from ...models.field.file import write_field
     from ...models.storage import make_folder
     from ..solving.methods import METHODS
-    from ..solving.proven import certified
+    from ..solving.proven import Proven
 
     target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
     *_, candidate = METHODS[name].find(request)
     write_field(candidate.field, target)
     certificate = target.with_name(f"{request.instance.name}.{name}.certificate.npz")
-    return candidate, certified(candidate.proof, certificate, deadline), target
+    return candidate, Proven.by(candidate.proof, certificate, deadline), target
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
@@ -185,7 +185,9 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
 def _tell_candidate(
     candidate: Candidate, proven: Proven | None, field: Path, *, quiet: bool, as_json: bool
 ) -> None:
-    """Print the facts of a method's field, and where it lies."""
+    """Print the facts of a method's field and the path of its file."""
+    from ..solving.proven import NOTHING
+
     facts = candidate.facts()
     if proven:
         facts |= proven.facts(facts["energy_2_norm"])
@@ -196,6 +198,8 @@ def _tell_candidate(
         say(f"field: {field}")
         if proven:
             say(f"certificate: {proven.certificate}")
+    if candidate.proof is not None and proven is None:
+        complain(NOTHING)
     if candidate.interrupted:
         complain("interrupted; the best field so far was kept")
 

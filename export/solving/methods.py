@@ -12,7 +12,7 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Clock, Deadline
 from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
@@ -31,7 +31,6 @@ from .two_stage import find_jumps, fit_angles, jumps_until
 if TYPE_CHECKING:
     from ...models.proof.record import Proof
 
-_PROVING: Final = 0.6  # share of the seconds for a proof; in the rest its certificate is written and checked
 _STARTING: Final = 0.5  # share of the seconds that the field may take from which solvers start
 
 
@@ -112,7 +111,8 @@ def finite(value: Any) -> Any:
 class Request:
     """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
 
-    start: a field to go on from, for methods that start from one; None: their own, the greedy field.
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field. clock:
+    measures the time limit.
     """
 
     instance: Instance
@@ -121,6 +121,11 @@ class Request:
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
     progress: Progress = silent
+    clock: Clock = time.monotonic
+
+    def deadline(self) -> Deadline:
+        """Return the end of the time limit, counted from now."""
+        return Deadline.after(self.limits.seconds, self.clock)
 
     def begin(self, deadline: Deadline) -> CrossField:
         """The field to start from; the greedy one is improved for no more than half of the time."""
@@ -142,38 +147,42 @@ class Method:
 
 def _greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
-    over = Deadline.after(request.limits.seconds).passed
+    over = request.deadline().passed
     yield _timed("greedy", lambda: greedy(request.instance, over=over))
 
 
 def _power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
+    over = request.deadline().passed
     power = _timed("power", lambda: power_field(request.instance))
     yield power
-    yield _timed("power + QP", lambda: fitted(power.field))
+    yield _timed("power + QP", lambda: fitted(power.field, over))
 
 
 def _polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
-    over = Deadline.after(request.limits.seconds).passed
+    over = request.deadline().passed
     yield _timed("polyvector", lambda: polyvector_field(request.instance))
-    yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
+    if not over():
+        yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
 
 
 def _bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
-    yield _timed("bend", lambda: bend_field(polyvector_field(request.instance, hold=max(HOLDS))))
-    start = request.start
+    deadline, start = request.deadline(), request.start
+    own = deadline if start is None else deadline.share(_STARTING)
+    hard = polyvector_field(request.instance, hold=max(HOLDS))
+    yield _timed("bend", lambda: bend_field(hard, over=own.steps()))
     if start is not None:
-        yield _timed("start + bend", lambda: bend_field(start))
+        yield _timed("start + bend", lambda: bend_field(start, over=deadline.steps()))
 
 
 def _search(request: Request) -> Iterator[Candidate]:
-    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
+    begin, deadline = time.perf_counter(), request.deadline()
     request.progress("search: starting fields")
     found = search(
         request.instance,
-        seconds=request.limits.seconds,
+        seconds=deadline,
         jobs=_processes(request),
         start=request.start,
         progress=_teller(request, deadline, "search", "rounds"),
@@ -204,18 +213,18 @@ def _teller(request: Request, deadline: Deadline, method: str, things: str) -> C
 
 
 def _prove(request: Request) -> Iterator[Candidate]:
-    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
+    begin, deadline = time.perf_counter(), request.deadline()
     from ...models.proof.prove import prove  # it loads what is compiled
 
     if not is_compiled():
         request.progress("prove: compiling what proofs need, once on this machine")
         compile_proofs(request.folder, deadline)
-    deadline = deadline.share(_PROVING)
     request.progress("prove: starting fields")
     proof = prove(
         request.instance,
         start=request.start,
-        seconds=request.limits.until(deadline).seconds,
+        seconds=deadline,
+        certified=True,
         gap=request.limits.gap,
         jobs=_processes(request),
         progress=lambda bound, energy, labels: request.progress(
@@ -229,13 +238,17 @@ def _prove(request: Request) -> Iterator[Candidate]:
 
 
 def _two_stage(request: Request) -> Iterator[Candidate]:
-    deadline = Deadline.after(request.limits.seconds)
-    limits = request.limits.until(jumps_until(deadline))
+    deadline = request.deadline()
+    start = request.begin(jumps_until(deadline))
+    begin, limits = time.perf_counter(), request.limits.until(jumps_until(deadline))
     request.progress(
         f"HiGHS: MILP for the jumps, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far"
     )
-    milp = find_jumps(request.instance, request.folder, limits=limits, start=request.start, **request.options)
+    milp = find_jumps(request.instance, request.folder, limits=limits, start=start, **request.options)
     yield _of("MILP", milp)
+    files = time.perf_counter() - begin - (milp.seconds or 0.0)
+    if deadline.left() <= files:  # those of the second stage take about as long
+        return
     request.progress("Ipopt: angles for the jumps of the MILP")
     yield _of("two-stage", fit_angles(milp.field, request.folder, limits=request.limits.until(deadline)))
 
@@ -251,19 +264,22 @@ METHODS: Final = {
         ),
         Method(
             "power",
-            "smooth exp(4 i theta), right angles; then the best angles for its jumps",
+            "smooth exp(4 i theta), right angles; then the best angles for its jumps; no limit cuts off the"
+            " first factorisation",
             _power,
             timed=False,
         ),
         Method(
             "polyvector",
-            "smooth polynomials whose roots are the lines, at any angle; then the best angles for its jumps",
+            "smooth polynomials whose roots are the lines, at any angle; then the best angles for its jumps;"
+            " no limit cuts off the first factorisation",
             _polyvector,
             timed=False,
         ),
         Method(
             "bend",
-            "lines that change little along the other line, from the PolyVector field with hard strokes",
+            "lines that change little along the other line, from the PolyVector field with hard strokes; no"
+            " limit cuts off the factorisation of that field",
             _bend,
             timed=False,
         ),

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import SolverError
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Deadline, Over, never
 from ...models.proof.record import EXACT, Proof
 
-_CHECKING: Final = 0.8  # share of the time for a certificate; in the rest it is packed
+if TYPE_CHECKING:
+    from ...models.proof.certificate import Certificate
+
+NOTHING: Final = "nothing was proven within the time limit: the bound is 0, and there is no certificate"
+"""Statement of a proof without a result."""
+
+_CHECKING: Final = 0.9  # share of the time for a certificate; in the rest it is packed
 
 
 @dataclass(frozen=True)
@@ -19,6 +25,15 @@ class Proven:
 
     bound: float
     certificate: Path
+
+    @classmethod
+    def by(cls, proof: Proof | None, path: Path, deadline: Deadline) -> Proven | None:
+        """Return what a proof proves, with its certificate at `path`; None if that is nothing.
+
+        Errors are those of `certified`.
+        """
+        found = certified(proof, path, deadline)
+        return None if found is None else cls(found.bound, path)
 
     def facts(self, energy: float) -> dict[str, Any]:
         """Bound, relative gap, and whether it is none, of a field with that 2-norm energy."""
@@ -33,18 +48,22 @@ class Proven:
         return {"status": status, **facts, "certificate": self.certificate.name}
 
 
-def certified(proof: Proof | None, path: Path, deadline: Deadline) -> Proven | None:
-    """What a proof's certificate says, which is at `path` now; None, and no file, where nothing is proven.
+def certified(proof: Proof | None, path: Path, deadline: Deadline, stop: Over = never) -> Certificate | None:
+    """Write the certificate of a proof to `path`, if it proves something.
 
-    With little time the certificate says less, or nothing. Raises InputError for a proof that the checker
-    refuses, and OutputError when the file cannot be written.
+    With little time the certificate proves less. If nothing is proven or no time is left, there is none, and
+    a file of an earlier call is removed. stop: whether the user asks to end. Raises InputError for a proof
+    that the checker refuses, and OutputError when the file cannot be written.
     """
     path.unlink(missing_ok=True)
-    if proof is None or proof.bound <= 0 < proof.energy:
+    if proof is None or proof.norm != 2 or not proof.levels:
+        return None
+    if proof.bound <= 0 < proof.energy or deadline.passed():
         return None
     from ...models.proof.certificate import write_certificate
 
+    checking = deadline.share(_CHECKING)
     try:
-        return Proven(write_certificate(proof, path, deadline.share(_CHECKING).passed).bound, path)
+        return write_certificate(proof, path, lambda: checking.passed() or stop())
     except SolverError:
         return None

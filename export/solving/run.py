@@ -27,7 +27,7 @@ from ..surfaces.report import surface_facts
 from .compiling import compiling
 from .limits import Limits
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
-from .proven import Proven, certified
+from .proven import Proven
 from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
@@ -275,7 +275,7 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
         return None
     progress("writing and checking the certificate")
     try:
-        return certified(by.proof, path, Deadline.after(limits.seconds - by.seconds))
+        return Proven.by(by.proof, path, Deadline.after(limits.seconds - by.seconds))
     except CrossfieldError as error:
         found.failures["certificate"] = str(error)
     except KeyboardInterrupt:

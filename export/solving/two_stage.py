@@ -19,6 +19,7 @@ from .local import solve
 _ANGLES: Final = 0.2
 """Share of the time that the second stage keeps, and least seconds: its process has to start."""
 _ANGLES_LEAST: Final = 2.0
+_STARTING: Final = 0.5  # share of the time of the first stage that its start may take
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ def find_jumps(
     """
     limits = limits or Limits()
     deadline = Deadline.after(limits.seconds)
-    start = start or first_field(instance)
+    start = start or first_field(instance, deadline.share(_STARTING).passed)
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
     return solve(problem, None, folder, limits=limits.until(deadline), start=start)

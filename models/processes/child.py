@@ -68,6 +68,7 @@ class Child:
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._closed = False
+        self._loaded: set[str] = set()
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -98,10 +99,8 @@ class Child:
             raise KilledError("no time was left to start the work")
         try:
             process = self._running(watch)
-            task = Task(_pickled(work, arguments), log)  # now, since deadlines among the arguments run
-            assert process.stdin is not None
-            with suppress(BrokenPipeError):  # the child died; its exit code tells why
-                send(task, process.stdin)
+            self._load(work, process, watch)
+            self._send(Task(_pickled(work, arguments), log), process)
             answer = self._next(watch)
         except _UnsentError:
             raise
@@ -140,6 +139,21 @@ class Child:
             self._next(watch)  # the worker reports that it is ready
         return process
 
+    def _load(self, work: Callable[..., Any], process: subprocess.Popen[bytes], watch: _Watch) -> None:
+        """Have the child import the module of the work first, for deadlines in its arguments run on arrival."""
+        module = getattr(work, "func", work).__module__
+        if module in self._loaded:
+            return
+        self._send(Task(_pickled(_imported, (work,)), None), process)
+        _result(self._next(watch))
+        self._loaded.add(module)
+
+    @staticmethod
+    def _send(task: Task, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
+        with suppress(BrokenPipeError):  # the child died; its exit code tells why
+            send(task, process.stdin)
+
     def _started(self) -> subprocess.Popen[bytes]:
         # -P: a folder `crossfield` or a file numpy.py in the current folder must not be imported.
         process = start(
@@ -149,7 +163,7 @@ class Child:
             cwd=self._folder,
             env=os.environ | (_ONE_THREAD if self._one_thread else {}),
         )
-        self._answers = queue.SimpleQueue()
+        self._answers, self._loaded = queue.SimpleQueue(), set()
         threading.Thread(target=_listen, args=(process, self._answers), daemon=True).start()
         return process
 
@@ -180,6 +194,10 @@ class Child:
         if process is not None and process.stdin is not None:
             with suppress(OSError):
                 send(Stop(), process.stdin)
+
+
+def _imported(_work: Callable[..., Any]) -> None:
+    """Do nothing; the module of the work was imported when this call arrived."""
 
 
 class _UnsentError(WorkerError):

@@ -23,10 +23,10 @@ def never() -> bool:
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment of `time.monotonic`, the same in all processes of a machine; `inf` for none.
+    """A moment of the clock of this process; `inf` for none.
 
-    That holds on Linux and is promised nowhere. So a pickled deadline says how much is left when it is sent,
-    and counts from its arrival.
+    Other processes may have another clock. A pickled deadline therefore holds the seconds that are left when
+    it is sent, and counts them from its arrival.
     """
 
     at: float = math.inf
@@ -36,6 +36,13 @@ class Deadline:
     def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
         """The moment so many seconds from now."""
         return cls(clock() + seconds, clock)
+
+    @classmethod
+    def of(cls, limit: float | Deadline | None) -> Deadline:
+        """Deadline of a limit: itself, the moment so many seconds from now, or none for None."""
+        if isinstance(limit, Deadline):
+            return limit
+        return cls() if limit is None else cls.after(limit)
 
     def __reduce__(self) -> tuple[Callable[[float], Deadline], tuple[float]]:
         return Deadline.after, (self.left(),)
@@ -47,6 +54,20 @@ class Deadline:
     def passed(self) -> bool:
         """Whether nothing is left."""
         return self.left() == 0.0
+
+    def steps(self) -> Over:
+        """Return a function to call before each of some equal steps of work.
+
+        It says whether the deadline would pass during the next step, if that took as long as the last one.
+        """
+        began = [self.clock()]
+
+        def over() -> bool:
+            now = self.clock()
+            last, began[0] = now - began[0], now
+            return self.at - now <= last
+
+        return over
 
     def later(self, seconds: float) -> Deadline:
         """The moment so many seconds after this one; before it where they are negative."""

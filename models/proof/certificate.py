@@ -81,18 +81,21 @@ def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Cer
 
     It claims what the checker confirms, which may be less than the proof says. Same proof, same bytes.
     over: says whether to end; then the certificate has the levels only that were checked by then.
-    Raises InputError for a proof that the checker refuses or that is in the 1-norm, SolverError when it is
-    over before the coarsest level is checked, and OutputError when the file cannot be written.
+    Raises InputError for a proof that the checker refuses or that is in the 1-norm, SolverError for a proof
+    without levels and when it is over before the coarsest level is checked, and OutputError when the file
+    cannot be written.
     """
     path = Path(path)
     if proof.norm != 2:
         raise InputError("certificates are of the 2-norm; a proof in the 1-norm has none", file=path)
-    arrays = _arrays(proof, "gap", 0.0)
+    if not proof.levels:
+        raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
+    arrays = certificate_arrays(proof, "gap", 0.0)
     verdict = _confirmed(arrays, path, over)
     status, bound = _claim(verdict)
     kept = len(verdict.levels)
     confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])
-    write_bytes(path, pack_arrays(_arrays(confirmed, status, bound)))
+    write_bytes(path, pack_arrays(certificate_arrays(confirmed, status, bound)))
     return Certificate(proof.field, verdict.energy, bound, status, verdict)
 
 
@@ -156,7 +159,7 @@ def _claim(verdict: Verdict) -> tuple[Status, float]:
     return cast("Status", verdict.status), max(0.0, bound)
 
 
-def _arrays(proof: Proof, status: Status, bound: float) -> Arrays:
+def certificate_arrays(proof: Proof, status: Status, bound: float) -> Arrays:
     """The arrays of a proof's certificate."""
     field = proof.field
     head = {

@@ -13,7 +13,7 @@ from typing import Final
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.deadline import Over, never
+from ..processes.deadline import Deadline, Over, never
 from ..search.search import RoundProgress, Search
 from ..search.search import search as search_patches
 
@@ -29,7 +29,7 @@ _COMPILING: Final = 60.0  # seconds; with less, compiling would
 def search(
     instance: Instance,
     *,
-    seconds: float | None = None,
+    seconds: float | Deadline | None = None,
     rounds: int | None = None,
     seed: int = 0,
     jobs: int = 2,

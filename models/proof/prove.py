@@ -32,6 +32,7 @@ from ..search.improvement import improved
 from ..search.search import search
 from ..search.starts import first_field, polyvector_start
 from ..smooth.systems import one_thread
+from .certificate_pace import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
@@ -74,7 +75,8 @@ def prove(
     *,
     norm: Norm = 2,
     start: CrossField | None = None,
-    seconds: float | None = None,
+    seconds: float | Deadline | None = None,
+    certified: bool = False,
     gap: float = 0.0,
     seed: int = 0,
     jobs: int = 2,
@@ -84,7 +86,9 @@ def prove(
     """The field of least energy that was found, and a lower bound of the energy of all fields.
 
     norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; of its proofs there are no
-    certificates. seconds: when to end; levels that could not be recorded by then are not begun. gap: the
+    certificates. seconds: when to end; levels that could not be recorded by then are not begun. If no level
+    was recorded, the bound is 0 and `levels` is empty. certified: end sooner, by the estimated time that
+    `write_certificate` takes for the levels; a level whose certificate would be late is not begun. gap: the
     relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field to begin
     with where, improved, it is better than the first field. seed: of the search that follows where
     the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every good place
@@ -93,28 +97,53 @@ def prove(
     and seldom tight.
     Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs.
     """
-    if (seconds is not None and not seconds > 0) or not gap >= 0 or jobs < 1:
+    spent = isinstance(seconds, int | float) and not seconds > 0
+    if spent or not gap >= 0 or jobs < 1:
         raise InputError("a proof needs a positive number of seconds and of jobs, and a gap of 0 or more")
     if norm not in (1, 2):
         raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
     began = time.monotonic()
     with interruptible() as interrupted, crew(jobs) as hands:
-        deadline = Deadline() if seconds is None else Deadline.after(seconds)
-        limits = _Limits(deadline, interrupted, stop, gap)
+        limits = _Limits(Deadline.of(seconds), interrupted, stop, gap, certified and norm == 2)
         kind = _of_norm(norm)
         work = kind(instance, kind.first(instance, start, limits.over), limits, hands, (seed, jobs), progress)
         ended = work.run()
         return work.proof(time.monotonic() - began, ended)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Limits:
-    """When to end: a deadline, whether the user or the caller asks for it, and a gap that is enough."""
+    """When to end: a deadline, whether the user or the caller asks for it, and a gap that is enough.
 
-    deadline: Deadline
+    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. pace:
+    greatest measured seconds per unit of its effort. kept: the seconds that it is expected to take.
+    """
+
+    whole: Deadline
     interrupted: Over
     stop: Over
     gap: float
+    certified: bool
+    pace: float = 0.0
+    kept: float = 0.0
+
+    @property
+    def deadline(self) -> Deadline:
+        """The end of the proof itself."""
+        return self.whole.later(-self.kept)
+
+    def keep(self, effort: float) -> None:
+        """Keep time for a certificate of that effort.
+
+        If there is too little for the first level, no certificate can be written in time. The proof then uses
+        all of the time, and looks for better fields.
+        """
+        if not self.certified or self.whole.at == np.inf:
+            return
+        self.pace = max(self.pace, checking_pace())
+        seconds = effort * self.pace
+        self.certified = self.kept > 0 or self.whole.left() > seconds
+        self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
         """Which limit of time is met; empty when none is."""
@@ -152,6 +181,11 @@ class _Chain:
     parents: list[int] = field(default_factory=list)
     bound: float = 0.0
     forced: int = 0
+
+    @property
+    def effort(self) -> float:
+        """The effort of a certificate of these levels."""
+        return sum(map(certificate_effort, self.levels))
 
 
 @dataclass(frozen=True, order=True)
@@ -230,8 +264,11 @@ class Work:
 
     def _descend(self) -> str:
         """Go through the levels round the best field; how it ended, empty where a better one was found."""
+        if met := self.limits.met():
+            return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
         dual = coarser = Dual(self.level(_centre(before)), self.hands)
+        self.limits.keep(self._effort_with(dual.lattice))
         patient = False
         while True:
             self._ascend(dual, _SLOW / 10 if patient else _SLOW)
@@ -250,13 +287,22 @@ class Work:
                 return self._branch(coarser)
             if not small and patient:
                 return "labels"
+            if not small and self._closing(dual)():
+                return self.limits.met() or "time"
             patient = not small
             if small:
+                self.limits.keep(self._effort_with(lattice))
                 coarser, dual = dual, prolonged(dual, lattice)
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
-        """Whether there is time for some passes over the lattice that follows."""
-        return not self.limits.over(_WORTH * dual.seconds_on(lattice))
+        """Whether there is time for some passes over the lattice that follows, and for its certificate."""
+        passes = _WORTH * dual.seconds_on(lattice)
+        certificate = self._effort_with(lattice) * self.limits.pace if self.limits.certified else 0.0
+        return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
+
+    def _effort_with(self, lattice: Lattice) -> float:
+        """The effort of a certificate with one more level."""
+        return max(self.proven.effort, self.chain.effort + certificate_effort(lattice))
 
     def _closing(self, dual: Dual) -> Over:
         """Says whether the time that is left is what it takes to record the level."""
@@ -284,7 +330,7 @@ class Work:
             if not parts or full or len(levels) + len(parts) > MOST_LEVELS:
                 return "labels"
             for part in parts:
-                if self.limits.over(_WORTH * part.seconds):
+                if not self._in_time(part, part.lattice):
                     return self.limits.met() or "time"
                 heappush(waiting, self._raised(part, branch))
             self.chain.bound = min(waiting[0].bound, self.energy(self.best))
@@ -303,6 +349,7 @@ class Work:
     def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
         """The branch of a dual, which is raised as long as it pays, and recorded."""
         reached, energy = -np.inf, self.energy(self.best)
+        self.limits.keep(self._effort_with(dual.lattice))
         closing = self._closing(dual)
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, closing)
@@ -332,12 +379,14 @@ class Work:
 
     def _search(self, share: float) -> None:
         """Search for a better field from the best one, for a share of the time, or some rounds."""
-        left, (seed, jobs) = self.limits.deadline.left(), self.seed_and_jobs
-        timed = np.isfinite(left)
+        if self.limits.over():
+            return
+        seed, jobs = self.seed_and_jobs
+        timed = np.isfinite(self.limits.deadline.left())
         self._offer(
             search(
                 self.instance,
-                seconds=max(share * left, EXACT) if timed else None,
+                seconds=self.limits.deadline.share(share) if timed else None,
                 rounds=None if timed else _ROUNDS,
                 seed=seed + self.searches, jobs=jobs, start=self.best,
             ).field
@@ -385,7 +434,8 @@ class Work:
         """Solve the convex problem that is left, if all is forced."""
         if what.everything:
             found, least = what.least(self.energy(self.best), self.limits.over)
-            self._offer(self.improved(relabelled(self.instance, found.alpha, found.beta, found.p)))
+            jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
+            self._offer(self.improved(jumps, self.limits.over))
             self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
 
 

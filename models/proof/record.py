@@ -29,6 +29,7 @@ class LevelRecord:
     bound: sum over pixels of min (D + shares) + sum over pairs of min (c - shares), over allowed labels; D
     and c are in models/proof/costs.py. An error bound for its float64 sums is taken off.
     energy: U when the level was pruned; what the next level lacks has more (models/proof/pruning.py).
+    work: additions of a pass, as of its lattice.
     """
 
     h: float
@@ -45,6 +46,7 @@ class LevelRecord:
     quantum: float
     bound: float
     energy: float
+    work: float = 0.0
 
     @classmethod
     def of(cls, dual: Dual, energy: float) -> Self:
@@ -53,6 +55,7 @@ class LevelRecord:
         return cls(
             at.h, at.alpha, at.beta, at.p, at.alpha_first, at.alpha_count, at.beta_first, at.beta_count,
             at.allowed, state.shares_first.copy(), state.shares_second.copy(), quantum, dual.bound(), energy,
+            at.work,
         )  # fmt: skip
 
 

@@ -99,10 +99,11 @@ def _stitch(
         sums = np.cumsum(cost[open_][order])
         many = max(1, int(np.searchsorted(sums, max(pace.batch, pace.share * added), side="right")))
         added += float(sums[many - 1])
-        chosen = open_ if over() else open_[order[:many]]
+        late = over()
+        chosen = open_ if late else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
-        _settle(state, known, solver, pace.local)
+        _settle(state, known, solver, _LARGE.local if late else pace.local)
         if progress is not None:
             progress(int(known.sum()), len(known))
 

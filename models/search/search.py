@@ -74,7 +74,7 @@ class Search:
 def search(
     instance: Instance,
     *,
-    seconds: float | None = None,
+    seconds: float | Deadline | None = None,
     rounds: int | None = None,
     seed: int = 0,
     jobs: int = 2,
@@ -96,15 +96,15 @@ def search(
     far. Raises InputError for a limit that is not positive and too many jobs, InstanceError for a start on
     another one.
     """
-    if (seconds is not None and not seconds > 0) or (rounds is not None and rounds < 0) or jobs < 1:
+    spent = isinstance(seconds, int | float) and not seconds > 0
+    if spent or (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
     checked(jobs)
     if start is not None:
         start.check_instance(instance)
     with interruptible() as interrupted:
-        limits = _Limits(
-            Deadline(np.inf) if seconds is None else Deadline.after(seconds), rounds, interrupted, suggest
-        )
+        deadline = Deadline.of(seconds)
+        limits, closing = _Limits(deadline, rounds, interrupted, suggest), _closing(deadline)
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
@@ -115,13 +115,14 @@ def search(
                 ended = hunt.run(explorers, limits, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
-        return Search(hunt.best(_closing(seconds)), hunt.round, tuple(hunt.energies), ended)
+        return Search(hunt.best(closing()), hunt.round, tuple(hunt.energies), ended)
 
 
-def _closing(seconds: float | None) -> Over:
-    """When the last solve has to end."""
+def _closing(deadline: Deadline) -> Callable[[], Over]:
+    """When the last solve has to end, counted from the end of the search, or from a deadline before that."""
     share, more = _CLOSING
-    return never if seconds is None else Deadline.after(share * seconds + more).passed
+    seconds = share * deadline.left() + more
+    return lambda: deadline.within(0.0).later(seconds).passed if np.isfinite(seconds) else never
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..field.field import CrossField
 from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
+from ..processes.deadline import Over, never
 from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
@@ -40,7 +41,9 @@ _FALL: Final = 1e-4  # share of the energy that a round has to take off for anot
 
 
 @one_thread()
-def bend_field(start: CrossField, *, harmonic: float | None = None, hold: float = HOLD) -> CrossField:
+def bend_field(
+    start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, over: Over = never
+) -> CrossField:
     """The crosses of little bend that the lines of `start` lead to, as a field with the best jumps.
 
     With line angles u, v in radians the energy is the sum of (v . grad u)^2 + (u . grad v)^2 over pixels, of
@@ -57,12 +60,16 @@ def bend_field(start: CrossField, *, harmonic: float | None = None, hold: float 
 
     harmonic: weight of plain smoothness, above 0; None: as the strokes tremble in the field of `HARMONIC`,
     that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05. hold: factor of the stroke weights, above 0.
+    over: asked before each round whether to end. If so, the function returns the field of the rounds so far,
+    or `start` before the first round.
     """
+    if over():
+        return start
     if harmonic is not None:
-        return _bent(start, harmonic, hold)
-    smooth = _bent(start, HARMONIC, hold)
+        return _bent(start, harmonic, hold, over)
+    smooth = _bent(start, HARMONIC, hold, over)
     wanted = max(HARMONIC * (tremble(smooth) / TREMBLE) ** 2, _LEAST_HARMONIC)
-    return _bent(start, wanted, hold) if wanted < HARMONIC else smooth
+    return smooth if wanted >= HARMONIC or over() else _bent(start, wanted, hold, over)
 
 
 def tremble(field: CrossField) -> float:
@@ -75,8 +82,8 @@ def tremble(field: CrossField) -> float:
     return _SIGMA * float(np.median(deviation)) if len(deviation) else 0.0
 
 
-def _bent(start: CrossField, harmonic: float, hold: float) -> CrossField:
-    """As `bend_field`, for a given weight of plain smoothness."""
+def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossField:
+    """Bend field for a given weight of plain smoothness, after at least one round."""
     bend = _Bend.of(start, harmonic, hold)
     x = np.concatenate(_lines(start))
     energy = bend.energy(x)
@@ -85,7 +92,7 @@ def _bent(start: CrossField, harmonic: float, hold: float) -> CrossField:
         fallen = energy - bend.energy(moved)
         if fallen > 0:
             x, energy = moved, energy - fallen
-        if fallen <= _FALL * energy:
+        if fallen <= _FALL * energy or over():
             break
     return CrossField.from_lines(start.instance, *np.split(x, 2))
 

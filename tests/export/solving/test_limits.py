@@ -1,57 +1,130 @@
-"""What a solve returns without time, shares of limits, and what the child process of a solver loads."""
+"""Every method ends at its time limit, by a clock of the test, and returns a valid field."""
 
-import subprocess
-import sys
+import json
+import math
 
 import crossfield as cf
+import numpy as np
 import pytest
-from crossfield.export.solutions.readers.text import Status
+from crossfield.export.cli.app import invoke
+from crossfield.export.formats.registry import write
+from crossfield.export.solving.limits import Limits
+from crossfield.export.solving.local import Files, Solvers
+from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.solving.proven import NOTHING, certified
+from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.prove import _Limits
+from crossfield.models.search.greedy import greedy
 
 
-@pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact"])
-def test_without_time_the_start_is_the_answer(tmp_path, name):
-    """No solver is started then; a feasible start is the best point so far."""
-    instance = cf.sample("skew", 6)
-    start = cf.greedy(instance)
-    problem = cf.formulate(instance, name, p=start.p if name == "qp-fixed" else None)
-    found = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
-    assert found.status == Status.LIMIT_WITH_POINT
-    assert "nothing better than the start" in found.message
-    assert found.objective == pytest.approx(start.energy().total, rel=1e-9)
-    assert not list(tmp_path.glob("*.log"))
-    assert cf.solve(problem, limits=cf.Limits(1e-6)).status == Status.LIMIT_WITHOUT_POINT
+class Ticking:
+    """A clock that advances by one second whenever it is read."""
+
+    def __init__(self, start=0.0):
+        self.now = start
+
+    def __call__(self):
+        self.now += 1.0
+        return self.now
 
 
-def test_the_second_stage_keeps_a_part_of_the_time():
-    from crossfield.export.solving.two_stage import jumps_until
-
-    now = [0.0]
-    for seconds, kept in ((60, 12.0), (10, 2.0), (6, 2.0), (2, 1.0), (0.1, 0.05), (0, 0.0)):
-        whole = Deadline.after(seconds, lambda: now[0])
-        assert whole.at - jumps_until(whole).at == pytest.approx(kept)
+LATE = {"greedy": 8, "power": 4, "polyvector": 4, "bend": 4, "search": 40, "prove": 40}
+"""Most readings of the clock after the limit; a two-stage solve ends in the processes of its solvers."""
 
 
-def test_limits_become_what_is_left():
-    now = [0.0]
-    deadline = Deadline.after(10.0, lambda: now[0])
-    limits = cf.Limits(60.0, 1e-3, 2)
-    assert limits.until(deadline) == cf.Limits(10.0, 1e-3, 2)
-    now[0] = 20.0
-    assert 0 < limits.until(deadline).seconds < 0.1
+@pytest.mark.parametrize("method", LATE)
+@pytest.mark.parametrize("seconds", [0.5, 6.0, 20.0])
+def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path):
+    clock = Ticking()
+    request = Request(cf.sample("mouse", 12), tmp_path, Limits(seconds, threads=1), clock=clock)
+    *_, found = METHODS[method].find(request)
+    assert clock.now <= 1 + seconds + LATE[method]
+    assert np.isfinite(found.field.energy().total)
+    assert (found.field.alpha >= request.instance.alpha_lower - 1e-12).all()
+    assert (found.field.alpha <= request.instance.alpha_upper + 1e-12).all()
+    assert (np.abs(found.field.beta) <= np.pi / 4 + 1e-12).all()
 
 
-def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
-    code = "import sys, crossfield.export.programs.casadi; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "casadi" in done.stdout.split()
-    assert not {"sympy", "scipy", "jinja2", "highspy"} & set(done.stdout.split())
+def test_two_stages_without_time_return_the_start(tmp_path):
+    start = greedy(cf.sample("mouse", 12))
+    request = Request(start.instance, tmp_path, Limits(1e-3), start=start, clock=Ticking())
+    (only,) = METHODS["two-stage"].find(request)
+    assert only.field.energy(1).total == pytest.approx(start.energy(1).total, rel=1e-9)
 
 
-def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
-    instance = cf.sample("skew", 6)
-    start, problem = cf.greedy(instance), cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
-    assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
-    assert found.bound is None
-    assert not list(tmp_path.glob("*.log"))
+def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
+    """The deadline is far away, although its clock began long after that of other processes."""
+    field = greedy(cf.sample("mouse", 6))
+    problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
+    held = write(problem, tmp_path / "model.nl", start=field).problem
+    files, deadline = Files.beside(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)
+    with Solvers() as solvers:
+        solvers.solve_file(held, "ipopt", files, Limits(600.0), deadline, start=field)
+    first = files.log.read_text().splitlines()[0]
+    assert 500 < float(first.rpartition("at most ")[2].removesuffix(" s")) <= 600
+
+
+@pytest.fixture
+def passed():
+    """A deadline in the past."""
+    return Deadline(0.0, lambda: 1.0)
+
+
+def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
+    proof = cf.prove(cf.sample("mouse", 24), seconds=passed, certified=True)
+    assert (proof.bound, proof.status, proof.levels, proof.ended) == (0.0, "gap", (), "time")
+    path = tmp_path / "certificate.npz"
+    with pytest.raises(SolverError, match="nothing was proven"):
+        write_certificate(proof, path)
+    path.write_bytes(b"of an earlier call")
+    assert certified(proof, path, Deadline()) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("norm", ["1", "2"])
+def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsys):
+    stale = tmp_path / "mouse.proof.certificate.npz"
+    stale.write_bytes(b"of an earlier call")
+    given = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
+    assert invoke([*given, "-o", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert NOTHING in said.err
+    document = json.loads(said.out)
+    assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
+    assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
+    assert {path.name for path in tmp_path.iterdir()} == {"mouse.proof.field.npz", "mouse.proof.json"}
+
+
+def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
+    cf.prove(cf.sample("mouse", 4))  # compiles what proofs need
+    given = ["solve", "mouse", "--size", "24", "-m", "prove", "--time-limit", "0.1", "-o", str(tmp_path)]
+    assert invoke(given) == 0
+    assert NOTHING in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["mouse.prove.field.npz"]
+
+
+def limits(seconds):
+    """Limits of a certified proof whose clock stands still."""
+    return _Limits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
+
+
+def test_a_proof_keeps_time_for_its_certificate():
+    kept = limits(1e9)
+    kept.keep(1000.0)
+    first = kept.kept
+    assert 0 < first < 1e9
+    assert kept.deadline.at == kept.whole.at - first
+    kept.keep(2000.0)
+    assert kept.kept >= 2 * first
+    assert kept.certified
+
+
+def test_without_time_for_a_certificate_the_proof_uses_the_whole_time():
+    short = limits(1e-6)
+    short.keep(1000.0)
+    assert (short.certified, short.kept, short.deadline) == (False, 0.0, short.whole)
+    endless = limits(math.inf)
+    endless.keep(1000.0)
+    assert endless.deadline.at == math.inf

@@ -30,6 +30,25 @@ def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
     assert (deadline.left(), deadline.passed()) == (0.0, True)
 
 
+def test_a_limit_is_a_deadline_seconds_or_none():
+    deadline = Deadline.after(3.0, Clock())
+    assert Deadline.of(deadline) is deadline
+    assert Deadline.of(None) == Deadline()
+    assert 0.0 < Deadline.of(3.0).left() <= 3.0
+
+
+def test_a_step_that_would_end_late_is_not_begun():
+    clock = Clock()
+    over = Deadline.after(10.0, clock).steps()
+    assert not over()
+    clock.now += 4.0
+    assert not over()  # 6 s are left
+    clock.now += 4.0
+    assert over()  # 2 s are left, and the last step took 4 s
+    clock.now += 1.0
+    assert over()
+
+
 def test_without_a_limit_there_is_no_end():
     deadline = Deadline(math.inf)
     assert deadline.left() == deadline.share(0.5).left() == deadline.later(-1e9).left() == math.inf

@@ -136,6 +136,33 @@ def test_a_task_that_cannot_be_sent_is_named():
         assert work([-1]) == [1]
 
 
+def test_a_task_is_sent_when_its_process_has_imported_the_work(tmp_path, monkeypatch):
+    """A deadline in it counts from its arrival, and imports take seconds on a busy machine."""
+    (tmp_path / "slow_work.py").write_text(
+        "import os, pathlib\n"
+        "pathlib.Path(__file__).with_suffix('.imported').touch()\n"
+        "def work(task): return task\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    from slow_work import work as slow
+
+    flag = tmp_path / "slow_work.imported"
+    flag.unlink()
+    with side_by_side(slow, 2) as work:
+        assert work([Sent(flag)]) == [True]
+
+
+class Sent:
+    """A task that becomes, when it is sent, whether a file exists."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return bool, (int(self.path.exists()),)
+
+
 def test_no_process_stays_behind():
     """Neither after a good end, nor after an error of the caller's, nor while tasks are under way."""
     before = descendants(os.getpid())

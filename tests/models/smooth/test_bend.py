@@ -8,7 +8,7 @@ import pytest
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import HALF, QUARTER
-from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, bend_field, tremble
+from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, _lines, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import random_instance, sketch
 from hypothesis import given, settings
@@ -162,3 +162,24 @@ def test_the_method_bends_a_given_start_too(tmp_path):
     assert [own.method, given.method] == ["bend", "start + bend"]
     assert (given.field.alpha == bend_field(start).alpha).all()
     assert (given.field.p == bend_field(start).p).all()
+
+
+def test_rounds_end_when_the_time_is_over():
+    """Asked once a round; what was reached by then comes back, and the start where nothing was."""
+    start = polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
+    asked = []
+
+    def over(rounds):
+        asked.append(rounds)
+        return len(asked) > rounds
+
+    assert bend_field(start, over=lambda: over(0)) is start
+    energies = []
+    for rounds in (1, 2, 3):
+        asked.clear()
+        found = bend_field(start, harmonic=HARMONIC, over=lambda rounds=rounds: over(rounds))
+        assert len(asked) == rounds + 1
+        energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
+    assert energies == sorted(energies, reverse=True)
+    whole = bend_field(start)
+    assert np.array_equal(bend_field(start, over=lambda: False).alpha, whole.alpha)

@@ -1,0 +1,57 @@
+"""What a solve returns without time, shares of limits, and what the child process of a solver loads."""
+
+import subprocess
+import sys
+
+import crossfield as cf
+import pytest
+from crossfield.export.solutions.readers.text import Status
+from crossfield.models.processes.deadline import Deadline
+
+
+@pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact"])
+def test_without_time_the_start_is_the_answer(tmp_path, name):
+    """No solver is started then; a feasible start is the best point so far."""
+    instance = cf.sample("skew", 6)
+    start = cf.greedy(instance)
+    problem = cf.formulate(instance, name, p=start.p if name == "qp-fixed" else None)
+    found = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
+    assert found.status == Status.LIMIT_WITH_POINT
+    assert "nothing better than the start" in found.message
+    assert found.objective == pytest.approx(start.energy().total, rel=1e-9)
+    assert not list(tmp_path.glob("*.log"))
+    assert cf.solve(problem, limits=cf.Limits(1e-6)).status == Status.LIMIT_WITHOUT_POINT
+
+
+def test_the_second_stage_keeps_a_part_of_the_time():
+    from crossfield.export.solving.two_stage import jumps_until
+
+    now = [0.0]
+    for seconds, kept in ((60, 12.0), (10, 2.0), (6, 2.0), (2, 1.0), (0.1, 0.05), (0, 0.0)):
+        whole = Deadline.after(seconds, lambda: now[0])
+        assert whole.at - jumps_until(whole).at == pytest.approx(kept)
+
+
+def test_limits_become_what_is_left():
+    now = [0.0]
+    deadline = Deadline.after(10.0, lambda: now[0])
+    limits = cf.Limits(60.0, 1e-3, 2)
+    assert limits.until(deadline) == cf.Limits(10.0, 1e-3, 2)
+    now[0] = 20.0
+    assert 0 < limits.until(deadline).seconds < 0.1
+
+
+def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
+    code = "import sys, crossfield.export.programs.casadi; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "casadi" in done.stdout.split()
+    assert not {"sympy", "scipy", "jinja2", "highspy"} & set(done.stdout.split())
+
+
+def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
+    instance = cf.sample("skew", 6)
+    start, problem = cf.greedy(instance), cf.formulate(instance, "milp-mccormick")
+    found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
+    assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
+    assert found.bound is None
+    assert not list(tmp_path.glob("*.log"))
