@@ -140,7 +140,7 @@ class Child:
         return process
 
     def _load(self, work: Callable[..., Any], process: subprocess.Popen[bytes], watch: _Watch) -> None:
-        """Have the child import the module of the work first, for deadlines in its arguments run on arrival."""
+        """Have the child import the module of the work first, since deadlines in its arguments then run."""
         module = getattr(work, "func", work).__module__
         if module in self._loaded:
             return
