@@ -43,8 +43,6 @@ SKETCHES: Final = (".svg", ".png", ".scap")
 PROVERS: Final = ("gurobi", "cplex")
 PROOF_SECONDS: Final = 60.0
 RANDOM: Final = 8  # random instances of 5 x 5 pixels
-PATCHED: Final = ("cylinder_bend", "mouse", "singular")
-PATCH_SECONDS: Final = 40.0
 HUGE: Final = 256
 IPOPT_SIZE: Final = 64
 
@@ -228,30 +226,6 @@ def picture(sketch: Sketch, folder: Path) -> str:
     return f"![{name}: greedy on the left, search on the right](pictures/{path.name})"
 
 
-def patches(sketch: Sketch, folder: Path) -> list[str]:
-    """What exact solvers reach from the improved greedy field, and from that of the search."""
-    size, here = min(SIZES), place(folder, sketch, min(SIZES))
-    start = here / "improved.npz"
-    cf.write_field(cf.improved(cf.read_field(field_in(here / "greedy"))), start)
-    cells = [sketch.name, f"{cf.read_field(start).energy().total:.4f}"]
-    again = solved(sketch, size, "search", PATCH_SECONDS, here / "again", "--start", str(start))
-    cells.append(f"{again['energy_2_norm']:.4f}")
-    found = str(field_in(here / "search"))
-    for solver, given in (("bonmin", str(start)), ("highs", str(start)), ("bonmin", found), ("highs", found)):
-        kept = here / f"patches-{solver}-{'start' if given == str(start) else 'search'}"
-        options = ("--solver", solver, "--start", given)
-        facts = solved(sketch, size, "patches", PATCH_SECONDS, kept, *options)
-        counts = [facts[key] for key in ("patches", "patches_closed", "patches_lower")]
-        cells.append(f"{facts['energy_2_norm']:.4f} ({' / '.join(map(str, counts))})")
-    print(*cells, file=sys.stderr, flush=True)
-    return cells
-
-
-PATCH_COLUMNS: Final = (
-    "sketch", "improved", "search", "Bonmin", "HiGHS", "search, then Bonmin", "search, then HiGHS",
-)  # fmt: skip
-
-
 def best_angles(sketch: Sketch, folder: Path) -> list[str]:
     """Greedy field and angles at size 256, and the angles beside those of Ipopt at size 64."""
     seconds = 600.0
@@ -420,7 +394,6 @@ def main() -> None:
         rows = [row(sketch, size, given.seconds, folder) for size in SIZES for sketch in every]
         large = [row(sketch, LARGE, given.seconds, folder) for sketch in every[-LARGE_SKETCHES:]]
         angles = [best_angles(sketch, folder) for sketch in every[-2:]]
-        exact = [patches(sketch, folder) for sketch in [*named(every, PATCHED), every[-1]]]
         closed = proofs()
         text = PAGE.format(
             said=said(f"python docs/energies.py --sketches FOLDER --seconds {given.seconds:g}"),
@@ -432,10 +405,7 @@ def main() -> None:
             table=markdown(COLUMNS, [each.cells() for each in rows]),
             large=markdown(COLUMNS, [each.cells() for each in large]),
             pictures="\n\n".join(picture(sketch, folder) for sketch in named(every, PICTURED)),
-            patches=markdown(PATCH_COLUMNS, exact),
-            patch_seconds=f"{PATCH_SECONDS:g}",
             angles=markdown(QP_COLUMNS, angles),
-            patch_size=min(SIZES),
             proof_seconds=f"{PROOF_SECONDS:g}",
             proofs=closed,
         )
@@ -487,17 +457,6 @@ of `qp-fixed` that Ipopt finds from the written .nl, and by how much ours differ
 that is more.
 
 {angles}
-
-## Patches solved exactly
-
-`crossfield solve --method patches` sets small patches of the grid free, fixes all else and hands each to a
-solver: `miqp-exact` to Bonmin, in patches of 4 x 4 and more, or `milp-mccormick` to HiGHS and then the QP, in
-patches of 5 x 5 and more. Size {patch_size}, {patch_seconds} s each. Three columns start at the improved
-greedy field: *search*, also at the improved power field where that is lower, *Bonmin* and *HiGHS*. The last
-two go on from the field of the search in the first table. In brackets: patches solved / solved to the end /
-that lowered the energy.
-
-{patches}
 
 ## Against proven optima
 

@@ -44,7 +44,7 @@ SEEDS: Final = 3
 OFF: Final = 10.0
 """Degrees from which a stroke pixel counts as off its stroke."""
 MIDDLE: Final = 32
-OF_ENERGIES: Final = {"prove", "patches", "two-stage"}
+OF_ENERGIES: Final = {"prove", "two-stage"}
 """Methods whose one aim is a lower energy than that of others."""
 Rows = list[dict[str, Any]]
 

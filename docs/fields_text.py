@@ -19,7 +19,7 @@ this for one drawing.
 
 Degrees over all curves, mean / median, and in brackets the mean over drawings with its standard error: curves
 of one drawing are alike, so that this is the error to look at. Default weights; {seconds:g} s for a field
-that is searched. `prove`, `two-stage` and `patches`, which only look for less energy, at one size.
+that is searched. `prove` and `two-stage`, which only look for less energy, at one size.
 
 {methods}
 

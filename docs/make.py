@@ -94,8 +94,7 @@ def methods(instance: Instance) -> Iterator[Candidate]:
     with tempfile.TemporaryDirectory() as folder:
         request = Request(instance, Path(folder), cf.Limits(seconds=SECONDS))
         for method in METHODS.values():
-            if method.in_runs:
-                yield from method.find(request)
+            yield from method.find(request)
 
 
 def accuracy() -> None:

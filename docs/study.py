@@ -19,10 +19,10 @@ The plan (studying/plan.py), every run on one thread:
               that proves fewer than a tenth of a rung is not run on the next one, and a row says so
     quality   drawings without one of their curves, surfaces with known answers, sizes 24 and 32: fields of
               many energies, both norms, several weights; the error beside the gap to the best
-    practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: nine ways to a
+    practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: eight ways to a
               field, 1 s or 10 s for those with a limit
 
-18,500 runs, 28 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
+18,400 runs, 28 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
 leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
 """
 

@@ -140,13 +140,6 @@ class StartFile(NamedTuple):
     convex: bool = False
 
 
-class PatchUse(NamedTuple):
-    """What a solver solves of a patch, and the side in pixels of the first: what it closes in seconds."""
-
-    formulation: str
-    side: int
-
-
 @dataclass(frozen=True)
 class Solver:
     """A solver: the formats it reads, the preferred one first; what brings it; what it refuses, by trait.
@@ -155,7 +148,7 @@ class Solver:
     of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
     start: the file it starts from beside a model, where it takes one. driver: the module in export/solving
     that runs it on a file of its first format, empty where it is not driven here. not_for: classes of
-    problems for which others come first. patch: how it solves patches, where it does. vendor: who makes it,
+    problems for which others come first. vendor: who makes it,
     where others of its maker stand here too: what they find is one opinion. feasible_within: how far a row
     may be broken by the points that it tells.
     """
@@ -170,7 +163,6 @@ class Solver:
     start: StartFile | None = None
     driver: str = ""
     not_for: tuple[str, ...] = ()
-    patch: PatchUse | None = None
     vendor: str = ""
     feasible_within: float = 5e-6  # solvers keep to 1e-6 in rows that they scale
 
@@ -236,7 +228,7 @@ SOLVERS: Final = {
                 ),
             },
             start=StartFile("highs", ".sol", "highs --read_solution_file START.sol MODEL.mps"),
-            driver="highs", not_for=("QP",), patch=PatchUse("milp-mccormick", 5),
+            driver="highs", not_for=("QP",),
         ),
         Solver(
             "scip", "SCIP", ("nl", "mps", "lp", "osil"), "scip",
@@ -268,7 +260,7 @@ SOLVERS: Final = {
                     "local", "Bonmin is exact for convex problems, elsewhere a heuristic"
                 )
             },
-            proves="convex", driver="casadi", patch=PatchUse("miqp-exact", 4), vendor="COIN-OR",
+            proves="convex", driver="casadi", vendor="COIN-OR",
         ),
         Solver(
             "gams-cplex", "CPLEX in GAMS", ("gms",), "gams",

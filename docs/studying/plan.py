@@ -35,7 +35,7 @@ SEEDS: Final = (0, 1)
 """Of perturbed fields."""
 SEARCHES: Final = (1.0, 3.0)
 """Seconds of searches in the part about quality."""
-METHODS_TIMED: Final = ("search", "patches", "two-stage", "prove")
+METHODS_TIMED: Final = ("search", "two-stage", "prove")
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ PRACTICE_TEXT: Final = {
 Every way to a field on every drawing, whole and without one of its three longest curves, on grids of 24 to
 256 pixels; one thread, default weights. The [methods](mathematics.md#10-ways-to-a-field) are those of
 `crossfield solve --method`, `power` and `polyvector` with the best angles for their jumps. `two-stage` is
-section 5 of the paper: HiGHS on the MILP, then Ipopt on the convex QP. It, `patches`, `search` and `prove`
+section 5 of the paper: HiGHS on the MILP, then Ipopt on the convex QP. It, `search` and `prove`
 begin at a field that is improved already, so that their answer is no worse. Hidden curves: mean over drawings
 and standard error. The least energy is that of any way here.""",
     "plot": """![Error to hidden curves beside seconds, by size](pictures/study_practice.svg)

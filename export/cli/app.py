@@ -133,7 +133,7 @@ def run_command(
 ) -> None:
     """Do everything for one sketch: write all solver files, try methods, keep a field, draw it.
 
-    The methods are {methods of a run}. The bend field is kept, and that of least 2-norm energy beside it.
+    The methods are {methods}. The bend field is kept, and that of least 2-norm energy beside it.
     report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
     """
     from ..solving.job import Limits

@@ -24,11 +24,6 @@ NAMES: Final = {
     "formats": _of("..formats.registry", "FORMATS"),
     "default formats": _of("..formats.registry", "DEFAULTS"),
     "methods": _of("..solving.methods", "METHODS"),
-    "methods of a run": _of(
-        "..solving.methods",
-        "METHODS",
-        lambda methods: [each.name for each in methods.values() if each.in_runs],
-    ),
     "kept method": _of("..solving.run", "KEPT", lambda name: [name]),
     "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
     "solvers": _of("..solvers_table", "DRIVEN"),

@@ -182,7 +182,7 @@ Threads = Annotated[
     typer.Option(
         "--threads",
         callback=_threads,
-        help=f"Cores that HiGHS, search and patches use at once; 1 to {MOST}, or 0: as many as they choose.",
+        help=f"Cores that HiGHS and search use at once; 1 to {MOST}, or 0: as many as they choose.",
     ),
 ]
 Start = Annotated[

@@ -109,7 +109,6 @@ def solve_command(
             output,
             options=options_of(facet, stroke_norm, beta_norm, relax=relax),
             start=None if start is None else read_field(start, on=loaded),
-            solver=solver,
             progress=show,
             limits=Limits(time_limit, gap, threads).until(deadline),
         )
@@ -117,7 +116,7 @@ def solve_command(
             _check_method(method, solver, relax=relax)
             candidate, proven, target = _by_method(method, request, deadline)
         else:
-            solution, target = _by_solver(str(formulation), request)
+            solution, target = _by_solver(str(formulation), solver, request)
     if method is not None:
         _tell_candidate(candidate, proven, target, quiet=quiet, as_json=as_json)
         return
@@ -142,10 +141,8 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     known([name], METHODS, "method")
     if relax:
         raise typer.BadParameter("--relax goes with --formulation, not with a method")
-    solvers = METHODS[name].solvers
-    if solver is not None and solver not in solvers:
-        what = f"can do with {' or '.join(solvers)}" if solvers else "has its own solvers"
-        raise typer.BadParameter(f"--solver {solver}: the method {name} {what}")
+    if solver is not None:
+        raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
 def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candidate, Proven | None, Path]:
@@ -162,7 +159,7 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
     return candidate, certified(candidate.proof, certificate, deadline), target
 
 
-def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
+def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
     """The solution of one formulation, and the file of its field, which is there if it has a point."""
     from ...models.field.file import write_field
     from ...models.formulations.problem import formulate
@@ -176,7 +173,7 @@ def _by_solver(name: str, request: Request) -> tuple[Solution, Path]:
     problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, request.solver, request.folder, limits=limits, start=start)
+    solution = solve(problem, solver, request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None or solution.doubt:
         target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one

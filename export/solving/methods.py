@@ -26,14 +26,13 @@ from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
 from .job import Limits
-from .patches import PATCH_SOLVERS, PatchSearch, search_patches
 from .two_stage import find_jumps, fit_angles, jumps_until
 
 if TYPE_CHECKING:
     from ...models.proof.record import Proof
 
 _PROVING: Final = 0.6  # share of the seconds for a proof; in the rest its certificate is written and checked
-_STARTING: Final = 0.5  # share of the seconds that the field may take from which patches start
+_STARTING: Final = 0.5  # share of the seconds that the field may take from which solvers start
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +112,7 @@ def finite(value: Any) -> Any:
 class Request:
     """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
 
-    start: a field to go on from, for methods that start from one; None: their own, the greedy field. solver:
-    one of those that the method can do with; None: the method's choice.
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field.
     """
 
     instance: Instance
@@ -122,7 +120,6 @@ class Request:
     limits: Limits = field(default_factory=Limits)
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
-    solver: str | None = None
     progress: Progress = silent
 
     def begin(self, deadline: Deadline) -> CrossField:
@@ -134,16 +131,13 @@ class Request:
 class Method:
     """A way to a field. find: the fields it comes to, one by one, for a later one may fail.
 
-    The last one is its answer. solvers: those that may be chosen for it; timed: whether it goes on up to the
-    time limit, or ends when it is done; in_runs: whether `run` tries it.
+    The last one is its answer. timed: whether it goes on up to the time limit, or ends when it is done.
     """
 
     name: str
     summary: str
     find: Callable[[Request], Iterator[Candidate]]
-    solvers: tuple[str, ...] = ()
     timed: bool = True
-    in_runs: bool = True
 
 
 def _greedy(request: Request) -> Iterator[Candidate]:
@@ -187,21 +181,7 @@ def _search(request: Request) -> Iterator[Candidate]:
     yield _searched("search", found, begin, rounds=found.rounds)
 
 
-def _patches(request: Request) -> Iterator[Candidate]:
-    begin, deadline = time.perf_counter(), Deadline.after(request.limits.seconds)
-    request.progress("patches: greedy field")
-    found = search_patches(
-        request.begin(deadline),
-        seconds=request.limits.until(deadline).seconds,
-        solver=request.solver or "bonmin",
-        jobs=_processes(request),
-        progress=_teller(request, deadline, "patches", "patches"),
-    )
-    counts = {"patches": found.patches, "patches_closed": found.closed, "patches_lower": found.lower}
-    yield _searched("patches", found, begin, **counts)
-
-
-def _searched(method: str, found: Search | PatchSearch, begin: float, **counts: int) -> Candidate:
+def _searched(method: str, found: Search, begin: float, **counts: int) -> Candidate:
     """What a search came to that began at a time of the performance counter."""
     seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
     return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
@@ -291,13 +271,6 @@ METHODS: Final = {
             "search",
             "local search over jumps and singularities from the greedy field on, up to the time limit",
             _search,
-        ),
-        Method(
-            "patches",
-            "patches of 4 x 4 and more, each solved by Bonmin (or HiGHS) from its file, up to the time limit",
-            _patches,
-            solvers=tuple(PATCH_SOLVERS),
-            in_runs=False,
         ),
         Method(
             "two-stage",

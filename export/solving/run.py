@@ -26,7 +26,7 @@ from ..surfaces.files import SHADED, write_shaded
 from ..surfaces.report import surface_facts
 from .compiling import compiling
 from .job import Limits
-from .methods import METHODS, Candidate, Method, Request, field_facts, finite, solution_facts
+from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven, certified
 from .stopwatch import Stopwatch
 
@@ -148,13 +148,9 @@ class Report:
 
 def plan(limits: Limits) -> str:
     """How long the searches of a run may take in all, and each."""
-    timed = [method.name for method in _tried() if method.timed]
+    timed = [method.name for method in METHODS.values() if method.timed]
     each = ", ".join(f"{name} {limits.seconds:g}" for name in timed)
     return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures on top"
-
-
-def _tried() -> list[Method]:
-    return [method for method in METHODS.values() if method.in_runs]
 
 
 def run(
@@ -254,7 +250,7 @@ class _Found:
 def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
     """The start, and what the methods of a run find in turn, until one of them is interrupted."""
     found = _Found([Candidate(START, start, watch.stages[START])])
-    for method in _tried():
+    for method in METHODS.values():
         try:
             for candidate in method.find(request):
                 found.candidates.append(candidate)

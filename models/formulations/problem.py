@@ -195,16 +195,14 @@ class Problem:
     """A formulation bound to an instance.
 
     jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns
-    are fixed (equal bounds, continuous), or None. free: with `pinned`, pixels (n,) whose angles and jumps are
-    not fixed; the angles and jumps of all others then are. windows: narrower ones than those of the gauge, or
-    None.
+    are fixed (equal bounds, continuous), or None. windows: narrower ones than those
+    of the gauge, or None.
     """
 
     instance: Instance
     formulation: Formulation
     jumps: Ints | None = None
     pinned: CrossField | None = None
-    free: Bools | None = None
     windows: Windows | None = None
 
     def __post_init__(self) -> None:
@@ -224,10 +222,6 @@ class Problem:
             object.__setattr__(self, "jumps", jumps)
         if self.pinned is not None:
             self.pinned.check_instance(self.instance)
-        if self.free is not None and self.free.shape != (self.instance.grid.size,):
-            raise FormulationError(
-                f"free has shape {self.free.shape}, but the grid has {self.instance.grid.size} pixels"
-            )
         if self.windows is not None:
             self.windows.check(self.instance)
 
@@ -306,11 +300,9 @@ class Problem:
                 np.broadcast_to(self._value(bound), shape) for bound in (variable.lower, variable.upper)
             )
             integer = variable.integer and not self.formulation.options.relax
-            fixed = self._fixed(variable)
-            if self.pinned is not None and fixed is not None:
-                at = _at_field(self, name, _angles_and_jumps(self.pinned))
-                lower, upper = np.where(fixed, at, lower), np.where(fixed, at, upper)
-                integer = integer and not fixed.all()
+            if self.pinned is not None and variable.integer:
+                lower = upper = _at_field(self, name, _angles_and_jumps(self.pinned))
+                integer = False
             blocks[name] = Block(name, variable.over, offset, lower, upper, integer)
             offset += shape[0]
         return blocks
@@ -319,16 +311,6 @@ class Problem:
         """Values of a bound: one for each element, or one for all."""
         symbols = sorted(bound.free_symbols, key=_name)
         return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
-
-    def _fixed(self, variable: Variable) -> Bools | None:
-        """Which columns of a variable are fixed at the pinned field; None when none can be."""
-        count = elements(self.instance, variable.over)
-        if self.free is None:
-            return np.ones(count, bool) if variable.integer else None
-        if variable.integer:
-            grid = self.instance.grid
-            return ~(self.free[grid.first] | self.free[grid.second])
-        return ~self.free if variable.name in {"alpha", "beta"} else None
 
     @property
     def columns(self) -> int:
@@ -488,10 +470,6 @@ class Problem:
             digest.update(b"" if jumps is None else jumps.astype("<i4").tobytes())
         if self.windows is not None:
             digest.update(self.windows.bytes)
-        if self.pinned is not None and self.free is not None:
-            for values in (self.pinned.alpha, self.pinned.beta):
-                digest.update(values.astype("<f8").tobytes())
-            digest.update(np.packbits(self.free).tobytes())
         return digest.hexdigest()
 
 
@@ -556,15 +534,6 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     return replace(problem, pinned=field)
 
 
-def with_rest_fixed(problem: Problem, field: CrossField, free: Bools) -> Problem:
-    """The problem in which only some pixels' angles and the jumps to and between them are free.
-
-    free: those pixels, shape (n,). Raises InstanceError when the field is on another instance,
-    FormulationError for another shape.
-    """
-    return replace(problem, pinned=field, free=free)
-
-
 def tightened(problem: Problem, windows: Windows) -> Problem:
     """The same problem with narrower windows of alpha and beta and ranges of jumps.
 
@@ -589,5 +558,4 @@ __all__ = [
     "lifted",
     "tightened",
     "with_integers_fixed",
-    "with_rest_fixed",
 ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed, with_rest_fixed
+from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed
 from crossfield.models.instance.grid import Floats
 from crossfield.models.instance.instance import QUARTER, Instance
 
@@ -50,7 +50,6 @@ _VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("miqp-mccormick", {"beta_norm": 1}),
     ("milp-mccormick", {"stroke_norm": 2, "beta_norm": 2}),
     *((name, {"pinned": True}) for name in FORMULATIONS if name != "qp-fixed"),
-    *((name, {"pinned": "outside"}) for name in FORMULATIONS),
 ]
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -101,9 +100,6 @@ def problem_of(label: str) -> Problem:
     pinned = given.pop("pinned", False)
     instance = make_instance(**{key: given.pop(key) for key in ("shape", "gauge") if key in given})
     problem = make_problem(name, instance, **given)
-    if pinned == "outside":
-        free = np.random.default_rng(5).random(instance.grid.size) < 0.5
-        return with_rest_fixed(problem, make_field(instance), free)
     return with_integers_fixed(problem, make_field(instance)) if pinned else problem
 
 

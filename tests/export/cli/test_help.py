@@ -15,7 +15,7 @@ from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
 
 NAMED = {
-    "run": ["samples", "size", "methods of a run"],
+    "run": ["samples", "size", "methods"],
     "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
     "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
     "solve": ["samples", "size", "formulations", "short names", "methods", "solvers"],

@@ -5,12 +5,11 @@ from __future__ import annotations
 import ast
 import re
 
-import numpy as np
 import places
 from cases import LOW_DEGREE, make_field, make_instance, make_problem, problem_of
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.writing.canonical import Canonical
-from crossfield.models.formulations.problem import with_rest_fixed
+from crossfield.models.formulations.problem import with_integers_fixed
 from loops import for_each
 
 EXPORT = places.ROOT / "export"
@@ -40,20 +39,13 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
     """All formats go by this rule but .nl, whose header counts integers within [0, 1], fixed ones too."""
     problem = make_problem("milp-mccormick", make_instance())
-    field, free = make_field(problem.instance), np.zeros(problem.instance.grid.size, bool)
-    free[:2] = True
-    partly = Canonical(with_rest_fixed(problem, field, free))
     form = Canonical(problem)
-    p1 = form.problem.blocks["p1"]
+    p1 = problem.blocks["p1"]
     assert form.kind(p1) == "binary"
-    assert partly.kind(partly.problem.blocks["p1"]) == "integer"
-    assert 0 < partly.binary[p1.columns].sum() < partly.layout.binary[p1.columns].sum() == p1.count
-    keywords = {"lp": "Generals", "bar": "INTEGER_VARIABLES"}
-    for name, keyword in keywords.items():
-        line = lines_of(partly, name)
-        assert any(each.strip().startswith("p1_") for each in line[line.index(keyword) :])
-    assert "Binaries" not in lines_of(partly, "lp")
     assert "Binaries" in lines_of(form, "lp")
+    held = Canonical(with_integers_fixed(problem, make_field(problem.instance)))
+    assert held.kind(held.problem.blocks["p1"]) == "continuous"
+    assert "Binaries" not in lines_of(held, "lp")
 
 
 def test_no_rule_of_the_form_stands_anywhere_else():

@@ -13,7 +13,7 @@ from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.models.errors import FormulationError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed, with_rest_fixed
+from crossfield.models.formulations.problem import formulate, lifted, with_integers_fixed
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from loops import for_each
 
@@ -81,7 +81,7 @@ def test_columns_and_rows_are_counted(label):
     assert (problem.lower <= problem.upper).all()
     for name, block in problem.blocks.items():
         whole = name in {"p", "p1", "p2"} and not problem.formulation.options.relax
-        assert block.integer == (whole and (problem.pinned is None or problem.free is not None))
+        assert block.integer == (whole and problem.pinned is None)
 
 
 @for_each("gauge", ["strokes", "box"])
@@ -210,40 +210,6 @@ def test_fixed_integers_are_continuous_columns_with_equal_bounds(name):
     assert (pinned.lower[problem.integer] == problem.point(field)[problem.integer]).all()
     assert pinned.objective_value(pinned.point(field)) == problem.objective_value(problem.point(field))
     assert pinned.sha256 != problem.sha256
-
-
-@for_each("name", FORMULATIONS)
-def test_with_the_rest_fixed_only_what_lies_inside_is_free(name):
-    field = make_field(make_instance("full"))
-    grid = field.instance.grid
-    problem = make_problem(name, field.instance)
-    free = grid.rows > 0
-    patch = with_rest_fixed(problem, field, free)
-    fixed = patch.lower == patch.upper
-    inside = {"pixels": free, "pairs": free[grid.first] | free[grid.second]}
-    point = problem.point(field)
-    for quantity, block in problem.blocks.items():
-        if quantity in {"alpha", "beta", "p", "p1", "p2"}:
-            expected = ~inside[block.over] | (problem.lower == problem.upper)[block.columns]
-            assert (fixed[block.columns] == expected).all()
-            outside = np.nonzero(~inside[block.over])[0] + block.offset
-            assert (patch.lower[outside] == point[outside]).all()
-        else:
-            assert not fixed[block.columns].any()
-    assert patch.integer.any() == problem.integer.any()
-    assert patch.objective_value(point) == problem.objective_value(point)
-    others = (
-        problem,
-        with_rest_fixed(problem, field, ~free),
-        with_rest_fixed(problem, make_field(field.instance, 9), free),
-    )
-    assert len({patch.sha256, *(other.sha256 for other in others)}) == 4
-
-
-def test_free_pixels_are_told_for_the_whole_grid():
-    field = make_field(make_instance("row"))
-    with pytest.raises(FormulationError, match=r"free has shape \(2,\), but the grid has 5 pixels"):
-        with_rest_fixed(formulate(field.instance, "miqp-exact"), field, np.ones(2, bool))
 
 
 def test_jumps_belong_to_qp_fixed_alone():
