@@ -1,7 +1,6 @@
 """The wheel: everything of the tree that is needed, nothing that is not, and one top-level name."""
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -81,11 +80,3 @@ def test_the_wheel_names_its_licence_and_its_command(wheel):
     assert "licenses/LICENSE" in facts
     assert "License-Expression: MIT" in facts["METADATA"]
     assert "Root-Is-Purelib: true" in facts["WHEEL"]
-
-
-def test_the_layers_point_one_way():
-    """Modules of `models` never import from `export` or `templates`."""
-    upwards = re.compile(r"from \.+(export|templates)\b|crossfield\.(export|templates)")
-    paths = sorted((ROOT / "models").rglob("*.py"))
-    assert len(paths) > 40
-    assert [path for path in paths if upwards.search(path.read_text())] == []

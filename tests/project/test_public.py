@@ -140,15 +140,6 @@ def test_the_models_know_no_solver_and_no_template():
     assert not loaded & SOLVERS_AND_LAYOUT
 
 
-def test_the_models_import_nothing_of_export():
-    code = "import crossfield\n" + "\n".join(
-        f"import crossfield.{name}" for name in MODULES if name.startswith("models.")
-    )
-    command = [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules)"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert not [name for name in done.stdout.split() if name.startswith("crossfield.export")]
-
-
 def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
     loaded = loaded_after("import crossfield as cf\ncf.greedy(cf.sample('skew', 6))")
     assert not loaded & SOLVERS_AND_LAYOUT

@@ -20,11 +20,6 @@ def listed(page, heading):
     return set(re.findall(r"^- `([\w-]+)`", section, re.MULTILINE))
 
 
-def test_the_glossary_has_every_word_once_and_in_order():
-    words = [word for word, _ in glossary()]
-    assert words == sorted(set(words), key=str.lower)
-
-
 def test_every_page_that_lists_the_methods_has_those_of_the_table():
     (methods,) = (meaning for word, meaning in glossary() if word == "method")
     assert set(methods.partition(": ")[2].split(", ")) == set(METHODS)

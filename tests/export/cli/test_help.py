@@ -9,7 +9,6 @@ from crossfield.export.cli import options
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.cli.help_texts import NAMES, filled
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.solutions.readers.registry import READERS
 from crossfield.models.formulations.declaration import FACETS
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
@@ -73,13 +72,6 @@ def test_the_help_names_what_the_tables_have_within_80_columns(text):
 def test_every_table_in_a_help_is_named_there():
     assert set(NAMES) == {table for tables in NAMED.values() for table in tables}
     assert filled("{size}, at most") == f"{DEFAULT_SIZE}, at most"
-
-
-def test_every_reader_is_covered_by_a_program_of_the_help():
-    """Sixteen kinds of files, of eleven programs."""
-    programs = tuple(NAMES["answers"]())
-    assert all(reader.description.startswith(programs) for reader in READERS)
-    assert {"HiGHS", "GAMS", "BARON", "AMPL"} <= set(programs)
 
 
 def test_choices_are_those_of_the_models_and_of_the_formats():
