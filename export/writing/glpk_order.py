@@ -3,6 +3,9 @@
 Every pair names its second pixel before its first one: (14) and (16) have both on the right side, and GLPK
 adds from the back. Then the strokes follow, and of the skew all pixels. Order: GLPK 5.0, `glpsol -m x.mod -d
 x.dat --wglp` names the columns it numbers.
+
+`crossfield read` needs this order: it accepts what `glpsol -w` writes for a .mod model (docs/files.md), and
+such a file carries no names.
 """
 
 from __future__ import annotations
