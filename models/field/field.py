@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ..errors import InstanceError
-from ..instance.angles import line_difference
+from ..instance.angles import MOST_ANGLE, line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
 from ..previews import Pictured
@@ -32,7 +32,6 @@ MOST: Final = 0.9
 """Share of the stroke pixels that deviate no more than `Shape.most_deviation`."""
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
-_MOST_ANGLE: Final = 1e6  # radians that leave enough digits modulo pi
 
 
 @dataclass(frozen=True)
@@ -338,11 +337,11 @@ def _angles(instance: Instance, given: Any, name: str) -> Floats:
         raise InstanceError(
             f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"
         )
-    wrong = ~(np.abs(angles) <= _MOST_ANGLE)
+    wrong = ~(np.abs(angles) <= MOST_ANGLE)
     if wrong.any():
         raise InstanceError(
             f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
-            f"give radians up to {_MOST_ANGLE:g}"
+            f"give radians up to {MOST_ANGLE:g}"
         )
     return angles
 

@@ -18,6 +18,7 @@ import numpy as np
 from ..array_archive import Expected, pack_arrays, unpack_arrays
 from ..errors import InputError, InstanceError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
+from ..instance.angles import MOST_ANGLE
 from ..instance.file import (
     are_places,
     arrays_of,
@@ -47,7 +48,6 @@ _ARCHIVE: Final = {
     "p": Expected(1, 2 * MAX_GRID**2),
 }
 _MOST_JUMP: Final = 1_000_000
-_MOST_ANGLE: Final = 1e6  # radians; beyond, nothing is left of the angle itself
 _Kind = TypeVar("_Kind")
 
 
@@ -133,7 +133,8 @@ def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
         raise InstanceError(f"its instance: {error}") from error
 
 
-def _json(field: CrossField) -> bytes:
+def field_to_json(field: CrossField) -> bytes:
+    """Return the bytes of the field's JSON file, its instance included."""
     grid = field.instance.grid
     columns: tuple[np.ndarray[Any, Any], ...] = (
         grid.rows,
@@ -157,7 +158,11 @@ def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
     return jumps
 
 
-def _of_json(data: bytes) -> CrossField:
+def field_of_json(data: bytes) -> CrossField:
+    """Return the field that a JSON file holds, given as its bytes.
+
+    Raises InstanceError with the place in the document.
+    """
     document = parse_json(decoded(data))
     check_version(document, FORMAT, VERSION)
     checked = check_schema(document, "field", __package__, rows={"pixels": _are_pixels})
@@ -188,9 +193,9 @@ def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
     """The field. Raises InstanceError for numbers that are no angles."""
     for name, values in (("alpha", alpha), ("beta", beta)):
         size = np.abs(np.asarray(values, dtype=np.float64))
-        if (np.isfinite(size) & (size > _MOST_ANGLE)).any():  # CrossField tells of those that are not finite
+        if (np.isfinite(size) & (size > MOST_ANGLE)).any():  # CrossField tells of those that are not finite
             raise InstanceError(
-                f"{name} holds numbers beyond {_MOST_ANGLE:g}, which are no angles; write it again"
+                f"{name} holds numbers beyond {MOST_ANGLE:g}, which are no angles; write it again"
             )
     return CrossField(instance, alpha, beta, p)
 
@@ -221,7 +226,7 @@ def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> N
 
 _WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
     ".npz": _npz,
-    ".json": _json,
+    ".json": field_to_json,
     ".rawfield": to_rawfield,
 }
-_READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _of_npz, ".json": _of_json}
+_READERS: Final[dict[str, Callable[[bytes], CrossField]]] = {".npz": _of_npz, ".json": field_of_json}

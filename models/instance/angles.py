@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from .elementary import arctangent, cosine, sine
 from .grid import Floats
+
+MOST_ANGLE: Final = 1e6
+"""Largest absolute angle in radians that keeps enough digits modulo pi."""
 
 
 def wrap(angle: Floats, lower: Floats | float, period: float) -> Floats:

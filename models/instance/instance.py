@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InstanceError, NoStrokeError
 from ..previews import Pictured
-from .angles import wrap
+from .angles import MOST_ANGLE, wrap
 from .digits import in_digits
 from .grid import Bools, Floats, Grid, Ints
 from .reading import Reading
@@ -35,7 +35,6 @@ _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _FARTHEST = 1e100  # coordinates whose squares are finite numbers
-_MOST_ANGLE = 1e6  # radians that leave enough digits modulo pi
 _SLACK = 1e-9  # floor and ceil of jump bounds, and the ends of ranges, forgive this much rounding
 
 MOST_WEIGHT: Final = 1e6
@@ -74,7 +73,7 @@ def _check_lines(at: Ints, theta: Floats, w: Floats, outside: Bools) -> None:
     """Raise InstanceError, with the pixel, unless the strokes at those pixels obey the rules."""
     for label, wrong in (
         ("theta is not a finite number", ~np.isfinite(theta)),
-        (f"theta is beyond {_MOST_ANGLE:g} radians", ~(np.abs(theta) <= _MOST_ANGLE)),
+        (f"theta is beyond {MOST_ANGLE:g} radians", ~(np.abs(theta) <= MOST_ANGLE)),
         ("w is not in (0, 1]", ~((w > 0) & (w <= 1))),
         ("is outside the mask", outside),
     ):

@@ -7,14 +7,12 @@ started it writes the files.
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
-from ....models.field.file import write_field
+from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import to_json
 from ....models.instance.instance import Instance
 from ....models.search.box_qp import fitted
@@ -27,7 +25,6 @@ from ..ledger.points import (
     Known,
     Provenance,
     baseline_field,
-    field_from,
     least_energy,
     ours,
     searched_field,
@@ -52,7 +49,7 @@ class Submitted:
 
     def known(self) -> Known:
         """The field."""
-        return Known(field_from(self.data), self.provenance)
+        return Known(field_of_json(self.data), self.provenance)
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ def prepare(task: Preparation) -> Files:
         same = next((other for other in fields if _same(chosen[other].field, known.field)), None)
         name = f"{task.name}{ROLES[same or role]}"
         if same is None:
-            files[name] = field_bytes(known.field)
+            files[name] = field_to_json(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
     certificate = _certificate(found, task, files)
@@ -139,12 +136,6 @@ def _certificate(found: _Found, task: Preparation, files: Files) -> dict[str, An
     name = f"{task.name}.certificate.npz"
     files[name], facts = found.certificate
     return {"certificate": {"file": name, **facts}}
-
-
-def field_bytes(field: CrossField) -> bytes:
-    """A field as the bytes of its JSON file."""
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        return write_field(field, Path(folder) / "a.field.json").read_bytes()
 
 
 def _chosen(instance: Instance, task: Preparation, found: _Found) -> dict[str, Known]:

@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
+from ....models.field.file import field_of_json
 from ....models.storage import read_bytes, write_bytes
 from ..documents.archive import opened
 from ..documents.documents import about_file, are_whole, read_about, read_library
 from ..plan.recipe import digest
-from .points import Known, Provenance, field_from
+from .points import Known, Provenance
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _DATE: Final = (1980, 1, 1, 0, 0, 0)  # of every member of an archive, so that its bytes follow from its files
@@ -41,7 +42,7 @@ class Given:
     def field(self, role: str) -> Known:
         """The field of a role of ROLES. Raises InstanceError for a damaged one."""
         facts = self.about["fields"][role]
-        return Known(field_from(self.files[facts["file"]]), Provenance.of(facts))
+        return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
     @property
     def certificate(self) -> tuple[bytes, dict[str, Any]] | None:

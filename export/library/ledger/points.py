@@ -6,16 +6,13 @@ without solver tolerances.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from ....models.field.field import CrossField
-from ....models.field.file import read_field
 from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
@@ -47,14 +44,6 @@ class Known:
 
     field: CrossField
     provenance: Provenance
-
-
-def field_from(data: bytes) -> CrossField:
-    """The field of a JSON file, given as its bytes. Raises InstanceError for a damaged one."""
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        path = Path(folder) / "given.field.json"
-        path.write_bytes(data)
-        return read_field(path)
 
 
 def ours(method: str) -> Provenance:
