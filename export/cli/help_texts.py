@@ -27,7 +27,7 @@ NAMES: Final = {
     "methods": _of("..solving.methods", "METHODS"),
     "kept method": _of("..solving.run", "KEPT", lambda name: [name]),
     "default methods": _of("..solving.evaluate", "DEFAULT_METHODS"),
-    "solvers": _of("..solvers_table", "BUNDLED"),
+    "bundled solvers": _of("..solvers_table", "BUNDLED"),
     "all solvers": _of("..solvers_table", "SOLVERS"),
     "logs": _of(
         "..solutions.logs.registry", "LOG_READERS", lambda readers: sorted(each.title for each in readers)

@@ -65,7 +65,9 @@ def solve_command(
     solver: Annotated[
         str | None,
         typer.Option(
-            "--solver", metavar="NAME", help="{solvers}; by default one that suits the formulation."
+            "--solver",
+            metavar="NAME",
+            help="{all solvers}; by default one of {bundled solvers} that suits the formulation.",
         ),
     ] = None,
     size: Size = None,
