@@ -274,8 +274,8 @@ NAMES = {
     ),
     "formulation to solve": (["solve", "-f", "quartc"], "there is no formulation 'quartc' (is it quartic?)"),
     "solver": (
-        ["solve", "-f", "milp-mccormick", "--solver", "gurobi"],
-        "there is no solver 'gurobi'; choose one of highs, ipopt, bonmin",
+        ["solve", "-f", "milp-mccormick", "--solver", "gurobo"],
+        "there is no solver 'gurobo'; choose one of gurobi, cplex, xpress, highs, scip",
     ),
     "class": (
         ["solve", "-f", "minlp-cubic"],

@@ -134,7 +134,7 @@ def two_parts(tmp_path_factory):
         "--size",
         9,
         "--time-limit",
-        0.5,
+        5,
         "--threads",
         1,
         "-o",
@@ -147,7 +147,7 @@ def test_a_run_leaves_everything(two_parts):
     folder, done = two_parts
     assert (done.returncode, without_progress(done.stderr)) == (0, "")
     report = json.loads((folder / "report.json").read_text())
-    proven = {"certificate.npz"} if report["proof"] else set()  # in half a second perhaps nothing
+    proven = {"certificate.npz"} if report["proof"] else set()  # in a few seconds perhaps nothing
     shaded = {report["surface"]["picture"]} - {None}
     assert bool(shaded) == report["surface"]["trusted"]
     assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven | shaded
@@ -504,20 +504,11 @@ def test_exports_are_the_same_bytes_twice(tmp_path):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_leaves_a_field_and_tells_its_energy(tmp_path, crossfield, instance_file, method):
-    out = crossfield(
-        "solve",
-        instance_file,
-        "--method",
-        method,
-        "--time-limit",
-        0.5,
-        "--threads",
-        1,
-        "--json",
-        "-o",
-        tmp_path,
-    )
+def test_every_method_writes_a_field_and_reports_its_energy(tmp_path, crossfield, instance_file, method):
+    # A proof that finds no time says so on standard error; it ends by itself in much less than its limit.
+    limit = 60 if method == "prove" else 0.5
+    limits = ("--time-limit", limit, "--threads", 1)
+    out = crossfield("solve", instance_file, "--method", method, *limits, "--json", "-o", tmp_path)
     facts = json.loads(out)
     (path,) = tmp_path.glob(f"*.{method}.field.npz")
     assert facts["energy_2_norm"] == pytest.approx(cf.read_field(path).energy().total, rel=1e-12)

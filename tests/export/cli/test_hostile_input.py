@@ -18,7 +18,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models import input_limits
-from crossfield.models.array_archive import Expected, pack_arrays, unpack_arrays
+from crossfield.models.array_archive import ArrayArchive, Expected, pack_arrays
 from crossfield.models.errors import LONGEST, CrossfieldError, InputError, InstanceError, printable, shortened
 from crossfield.models.instance.file import arrays_of
 from crossfield.models.sketch.svg import read_svg
@@ -358,8 +358,8 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
     with zipfile.ZipFile(buffer, "w") as archive:
         content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(packed)) + packed + bytes(24)
         archive.writestr("u.npy", content)
-    with pytest.raises(InstanceError, match="a header is"):
-        unpack_arrays(buffer.getvalue(), {"u": Expected(1, 10)})
+    with pytest.raises(InstanceError, match="no header as NumPy writes it"):
+        ArrayArchive(buffer.getvalue()).arrays({"u": Expected(1, 10)})
 
 
 def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
@@ -374,11 +374,7 @@ def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
     data = pack_arrays({"u": np.zeros(3)})
     with warnings.catch_warnings(action="default"):
         before = list(warnings.filters)
-        assert unpack_arrays(data, {"u": Expected(1, 10)}, optional=Watched())["u"].tolist() == [
-            0.0,
-            0.0,
-            0.0,
-        ]
+        assert ArrayArchive(data).arrays(Watched({"u": Expected(1, 10)}))["u"].tolist() == [0.0] * 3
     assert found == [before]
 
 

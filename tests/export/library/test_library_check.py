@@ -829,9 +829,15 @@ def test_a_point_that_cannot_be_is_one_line_and_changes_nothing(
         ({"entry": f"{STEM}_milp"}, "another instance, formulation or option"),
         ({"entry": ENTRY, "by": "two\nlines"}, "one line"),
         ({"entry": ENTRY, "solver": "x" * 300}, "at most 200"),
-        ({"entry": ENTRY, "seconds": float("inf")}, "--seconds must be a finite number from 0"),
-        ({"entry": ENTRY, "seconds": float("nan")}, "--seconds must be a finite number from 0"),
-        ({"entry": ENTRY, "seconds": -1.0}, "--seconds must be a finite number from 0"),
+        (
+            {"entry": ENTRY, "seconds": float("inf")},
+            "seconds is inf; give a finite number",
+        ),
+        (
+            {"entry": ENTRY, "seconds": float("nan")},
+            "seconds is nan; give a finite number that is not negative",
+        ),
+        ({"entry": ENTRY, "seconds": -1.0}, "seconds is -1.0; give a finite number that is not negative"),
     ],
 )
 def test_wrong_options_are_refused_before_anything_is_written(options, words, solved, built, tmp_path):
