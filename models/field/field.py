@@ -237,12 +237,16 @@ class CrossField(Pictured):
         )
 
     def cross_error(self, u: Floats, v: Floats) -> Floats:
-        """Angle to the crosses with line angles u and v (n,), in radians.
+        """Angle to the crosses with line angles u and v, (n,) or one for all pixels, in radians; shape (n,).
 
         The mean of the two line differences, for the better of the two assignments of lines
         (docs/mathematics.md, 9). Raises InstanceError for the same u and v as `from_lines`.
         """
-        u, v = _angles(self.instance, u, "u"), _angles(self.instance, v, "v")
+        size = self.instance.grid.size
+        u, v = (
+            _angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
+            for name, line in (("u", u), ("v", v))
+        )
         mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
         straight = line_difference(mine, u) + line_difference(other, v)
         crossed = line_difference(mine, v) + line_difference(other, u)

@@ -45,6 +45,7 @@ def lines_of(path):
     return path.read_text().splitlines(keepends=True) if path.exists() else []
 
 
+@pytest.mark.slow
 def test_a_study_that_is_killed_goes_on_and_every_run_has_one_row(study, tmp_path):
     program = SMALL.format(docs=str(DOCS), data=str(tmp_path), scheduler=None)
     file = tmp_path / "practice.csv"

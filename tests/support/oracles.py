@@ -60,6 +60,7 @@ OTHERS = {
         "Chromium with its driver, or selenium,",
         "apt install chromium chromium-driver; pip install selenium",
     ),
+    "gzip": (shutil.which("gzip"), "gzip", "apt install gzip"),
     "distributed": (importlib.util.find_spec("distributed"), "distributed", "pip install '.[cluster]'"),
 }
 """Programs that `verify` does not know: a sign that they are here, their names,

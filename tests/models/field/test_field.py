@@ -139,8 +139,9 @@ def test_cross_error_names_the_shape_that_it_needs():
     field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0, 0], [0, 0, 0], [0, 0])
     with pytest.raises(InstanceError, match=r"^u has shape \(3, 2\), but \w+ has 3 pixels; give an angle"):
         field.cross_error(field.u, field.v)
-    with pytest.raises(InstanceError, match=r"^v has shape \(\), but"):
-        field.cross_error([0, 0, 0], 1.0)
+    with pytest.raises(InstanceError, match=r"^v has shape \(2,\), but"):
+        field.cross_error([0, 0, 0], [HALF, HALF])
+    assert field.cross_error(0.0, [HALF]) == pytest.approx([0, 0, 0])
 
 
 @pytest.mark.parametrize("index", [0.25, -0.25])

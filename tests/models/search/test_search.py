@@ -182,7 +182,7 @@ def test_search_gets_below_the_greedy_field():
 
 @pytest.mark.parametrize("gauge", ["strokes", pytest.param("box", marks=pytest.mark.slow)])
 def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
-    instance = cf.sample("mouse", 14).with_gauge(gauge)
+    instance = cf.sample("mouse", 10).with_gauge(gauge)
     fields = [cf.search(instance, rounds=2, seed=7, jobs=jobs).field for jobs in (1, 2)]
     for name in ("alpha", "beta", "p"):
         assert len({getattr(field, name).tobytes() for field in fields}) == 1
