@@ -178,6 +178,8 @@ class Child:
                 watch.interrupt()
             else:
                 if isinstance(answer, _Ended):
+                    if watch.asked:
+                        raise KilledError("ended when it was asked to stop", interrupted=watch.interrupted)
                     raise WorkerError(self._how_it_ended())
                 return answer
 
