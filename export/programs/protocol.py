@@ -49,16 +49,17 @@ class Job(NamedTuple):
     """A solve that a program is asked for.
 
     solver: name in the table of solvers. model: the file to solve; solution: the file to write, in the
-    solver's own layout. start: a file with a starting point, or None. deadline: when the search has to end.
-    gap: relative gap at which a discrete search may stop. threads: 0 for the solver's choice. precise:
-    whether tolerances are as tight as the solver takes them. stamp: names the problem, for files that can
-    hold a message.
+    solver's own layout. start: a file with a starting point, or None. limit: most seconds for the search;
+    deadline: when it has to end, the solution written. gap: relative gap at which a discrete search may stop.
+    threads: 0 for the solver's choice. precise: whether tolerances are as tight as the solver takes them.
+    stamp: names the problem, for files that can hold a message.
     """
 
     solver: str
     model: Path
     solution: Path
     start: Path | None
+    limit: float
     deadline: Deadline
     gap: float
     threads: int
@@ -67,8 +68,8 @@ class Job(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """Seconds for the search: what is left, less the time to write the solution."""
-        return max(self.deadline.left() - _WRITING, _LEAST)
+        """Seconds for the search: the limit, or what is left less the time to write the solution."""
+        return max(min(self.limit, self.deadline.left() - _WRITING), _LEAST)
 
 
 class Outcome(NamedTuple):

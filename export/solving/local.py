@@ -227,12 +227,11 @@ class Solvers:
         *,
         start: CrossField | None = None,
         precise: bool = False,
-        late: float = 0.0,
     ) -> Solution:
         """Solve a model file that was written for a solver, and read the answer.
 
-        held: the problem as the file holds it. precise: whether tolerances are as tight as the solver takes
-        them. late: seconds after the deadline at which a solver that does not look at the clock is killed.
+        held: the problem as the file holds it. deadline: when a solver that does not end by itself is asked
+        to; `limits` hold for the search. precise: whether tolerances are as tight as the solver takes them.
         """
         entry = SOLVERS[solver]
         for stale in (files.solution, files.log, files.start):
@@ -243,6 +242,7 @@ class Solvers:
             files.model,
             files.solution,
             begins,
+            limits.seconds,
             deadline,
             limits.gap,
             limits.threads,
@@ -253,7 +253,7 @@ class Solvers:
         begin = time.perf_counter()
         try:
             outcome, interrupted = self.child(entry.program).call(
-                call, entry.program, "solve", job, deadline=deadline.later(late), log=files.log
+                call, entry.program, "solve", job, deadline=deadline, log=files.log
             )
         except TooLargeError as error:
             raise UnsupportedBySolverError(

@@ -51,7 +51,7 @@ TOLERANCE: Final = 1e-6
 READING_SECONDS: Final = 80.0
 """Seconds in which a program has to read a file."""
 LATE: Final = 20.0
-"""Seconds beyond its limit after which a solver that does not look at the clock is killed."""
+"""Seconds beyond its limit after which a solver that does not look at the clock is asked to stop."""
 GAP: Final = 0.0
 """Relative gap of a solve: none, so that optima can be compared."""
 
@@ -315,7 +315,7 @@ class _Bench:
         limits = Limits(seconds, GAP, threads=1)
         try:
             found = self.solvers.solve_file(
-                subject.held, solver, files, limits, Deadline.after(seconds), precise=True, late=LATE
+                subject.held, solver, files, limits, Deadline.after(seconds + LATE), precise=True
             )
         except UnsupportedBySolverError:
             return ended(Verdict.NOT_TRIED, self._too_large(subject))

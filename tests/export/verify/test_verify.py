@@ -400,7 +400,7 @@ def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: fl
     """Whether the solver, asked all the same, gives the optimum and calls it one."""
     files, limits = Files.beside(path, solver), Limits(1.0, 0.0, 1)
     try:
-        found = solvers.solve_file(held, solver, files, limits, Deadline.after(1.0), precise=True, late=20.0)
+        found = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)
     except CrossfieldError:
         return False
     return (
