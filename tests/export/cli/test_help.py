@@ -18,7 +18,7 @@ NAMED = {
     "run": ["samples", "size", "methods"],
     "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
     "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
-    "solve": ["samples", "size", "formulations", "short names", "methods", "solvers"],
+    "solve": ["samples", "size", "formulations", "short names", "methods", "all solvers", "bundled solvers"],
     "prove": ["samples", "size"],
     "evaluate": ["samples", "size", "methods", "default methods"],
     "read": ["answers"],
