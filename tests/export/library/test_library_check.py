@@ -495,8 +495,8 @@ SEALED = {
     ),
     "an objective that is no number": (
         lambda lib: change(lib / QP, best__objective=float("nan")),
-        f"{STEM}_qp.sol",
-        "has objective",
+        QP,
+        "a number that is not finite",
     ),
     "a bound beyond all numbers": (
         lambda lib: change(lib / QP, **bound_of(10**400)),
