@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from crossfield.export.cli.solve_command import _by_method
-from crossfield.export.solving.job import Limits
+from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.sketch.samples import sample
