@@ -63,7 +63,7 @@ class Sketch:
     def weights(self, size: int) -> list[str]:
         """The weights whose coefficients at that size are those of the paper, 1 and 1e-6."""
         scale = size / REFERENCE
-        return ["--w-strokes", repr(scale), "--w-beta", repr(1e-6 * scale**2)]
+        return ["--stroke-weight", repr(scale), "--skew-weight", repr(1e-6 * scale**2)]
 
     def instance(self, size: int) -> Instance:
         """The instance of that size, with the coefficients of the paper."""
@@ -71,7 +71,9 @@ class Sketch:
             found = cf.sample(self.what, size)
         else:
             found = cf.read_sketch(self.what, size=size, mask=self.mask)
-        return replace(found, w_strokes=Instance.w_strokes, w_beta=Instance.w_beta)
+        return replace(
+            found, stroke_coefficient=Instance.stroke_coefficient, skew_coefficient=Instance.skew_coefficient
+        )
 
 
 def sketches(folder: Path | None) -> list[Sketch]:

@@ -94,13 +94,13 @@ def methods(task: Task) -> Rows:
 
 def weights(task: Task) -> Rows:
     """Hidden curves of a drawing in greedy fields, by weight of the strokes."""
-    found = [(w, angles(task, task.instance.with_weights(w_strokes=w), ["greedy"])) for w in TRIED]
+    found = [(w, angles(task, task.instance.with_weights(stroke_weight=w), ["greedy"])) for w in TRIED]
     return [row | {"weight": w} for w, rows in found for row in rows]
 
 
 def strokes(task: Task) -> Rows:
     """The share of the stroke pixels of a drawing that greedy fields miss by more than OFF, by weight."""
-    fields = [cf.greedy(task.instance.with_weights(w_strokes=w)) for w in TRIED]
+    fields = [cf.greedy(task.instance.with_weights(stroke_weight=w)) for w in TRIED]
     return [
         {"drawing": task.name, "size": task.size, "weight": w, "off": round(missing(field), 5)}
         for w, field in zip(TRIED, fields, strict=True)
@@ -114,7 +114,7 @@ def surfaces(task: Task) -> Rows:
     for w in TRIED:
         errors = []
         for seed in range(SEEDS if task.noise else 1):
-            field = cf.greedy(noisy(truth.instance, task.noise, seed).with_weights(w_strokes=w))
+            field = cf.greedy(noisy(truth.instance, task.noise, seed).with_weights(stroke_weight=w))
             errors.append(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
         facts = {"surface": task.name, "size": task.size, "noise": task.noise, "weight": w}
         rows.append(facts | {"error": round(float(np.mean(errors)), 3)})

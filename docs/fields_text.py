@@ -49,7 +49,7 @@ On `torus_patch` at 24 pixels no jump is wrong: with the jumps of the true field
 off as the others. The instance has one arc and one nearly straight line, 29 of 148 pixels, and nothing in it
 says how the second family turns beside its one line; smoothness moves that line along unturned. Only a
 preference for right angles mends it: the power field before its angles are fitted, which has no others
-([accuracy](accuracy.md)), or `--w-beta 30`. It harms where perspective makes crosses skew.
+([accuracy](accuracy.md)), or `--skew-weight 30`. It harms where perspective makes crosses skew.
 """
 
 WEIGHTS: Final = """# Weights
@@ -66,19 +66,19 @@ many pairs, each with half the difference: the sum stays. But a stroke runs thro
 there are four times as many pixels that may be skew. With the same coefficients a stroke counts half as much
 on a grid of twice the pixel size, and a field at 12 pixels misses strokes that the field at 96 follows.
 
-So the weights that `--w-strokes` and `--w-beta` say, and `w_strokes` and `w_beta` of `cf.read_sketch`,
-`cf.sample` and `Instance.with_weights`, are divided by the pixels $n$ of the grid's longer side and by their
-square. On a grid of 24 pixels, which is the default, they are the coefficients:
+Therefore weights are divided by the pixels $n$ of the grid's longer side and by their square. These are the
+weights of `--stroke-weight` and `--skew-weight`, and `stroke_weight` and `skew_weight` of `cf.read_sketch`,
+`cf.sample` and `Instance.with_weights`. On a grid of 24 pixels, the default, they are the coefficients:
 
 $$
 \\text{{w\\_strokes}} = W_\\text{{strokes}} \\frac{{24}}{{n}}, \\qquad
 \\text{{w\\_beta}} = W_\\beta \\left(\\frac{{24}}{{n}}\\right)^2 .
 $$
 
-An instance, its file and every problem file hold the coefficients; `Instance.stroke_weight` and
-`Instance.skew_weight` give the weights back. The paper has the coefficients 1 and 1e-6 on every grid; so have
-instances made by hand, and those of the [library](library.md). `crossfield export mouse --size 48 --w-strokes
-2 --w-beta 4e-6` is under them.
+An instance, its file and every problem file hold the coefficients (`Instance.stroke_coefficient`,
+`Instance.skew_coefficient`); `Instance.stroke_weight` and `Instance.skew_weight` are the weights. The paper
+has the coefficients 1 and 1e-6 on every grid; so have instances made by hand, and those of the
+[library](library.md). `crossfield export mouse --size 48 --stroke-weight 2 --skew-weight 4e-6` has them.
 
 ## The default of the strokes: {default}
 

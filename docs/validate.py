@@ -40,7 +40,13 @@ def instance_of(gauge: Gauge) -> Instance:
     mask = np.ones(SHAPE, dtype=bool)
     pixels = np.argwhere(mask)[np.sort(rng.permutation(mask.size)[:STROKES])]
     return Instance(
-        "small", mask, pixels, rng.uniform(0, np.pi, STROKES), np.ones(STROKES), w_beta=1e-3, gauge=gauge
+        "small",
+        mask,
+        pixels,
+        rng.uniform(0, np.pi, STROKES),
+        np.ones(STROKES),
+        skew_coefficient=1e-3,
+        gauge=gauge,
     )
 
 

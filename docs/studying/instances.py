@@ -57,7 +57,8 @@ def made(name: str, size: int) -> Instance:
         what if kind in {"whole", "crop"} else int(what), size
     )
     label = f"{kind}_{what}_{size}"
-    return replace(found, name=label, w_strokes=Instance.w_strokes, w_beta=Instance.w_beta)
+    coefficients = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
+    return replace(found, name=label, **coefficients)
 
 
 def crop(name: str, size: int) -> Instance:

@@ -120,8 +120,8 @@ def run_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     facet: Facet = None,
     time_limit: SecondsEach = 60.0,
     gap: Gap = 1e-6,
@@ -144,7 +144,16 @@ def run_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        instance = load(
+            sketch,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
     if not (quiet or as_json):
         say(plan(limits))
     with progress(quiet=quiet) as show:
@@ -177,8 +186,8 @@ def instance_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
@@ -192,7 +201,16 @@ def instance_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        instance = load(
+            sketch,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     if not quiet:
         say(f"{output}: {instance.summary}")
@@ -211,8 +229,8 @@ def export_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
     beta_norm: BetaNorm = None,
@@ -250,7 +268,16 @@ def export_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        loaded = load(
+            instance,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
         field = None if start is None else read_field(start, on=loaded)
         proof = None
         if tightened is not None:

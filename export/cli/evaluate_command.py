@@ -54,8 +54,8 @@ def evaluate_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     time_limit: Annotated[
         float,
         typer.Option(
@@ -81,7 +81,16 @@ def evaluate_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        instance = load(sketch, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        instance = load(
+            sketch,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
         found = evaluate(
             instance,
             sketch=sketch,

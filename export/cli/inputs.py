@@ -25,8 +25,8 @@ def load(
     gauge: Gauge | None,
     choice: Choice,
     *,
-    w_strokes: float | None,
-    w_beta: float | None,
+    stroke_weight: float | None,
+    skew_weight: float | None,
     quiet: bool,
 ) -> Instance:
     """The instance, of a size that can be written, under the weights that are given, a file's too.
@@ -39,7 +39,7 @@ def load(
     from ...models.memory import available_memory
     from ...models.sketch.read import check_memory
 
-    instance = _found(what, size, mask, gauge, choice).with_weights(w_strokes, w_beta)
+    instance = _found(what, size, mask, gauge, choice).with_weights(stroke_weight, skew_weight)
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())
     warn_of(instance, quiet=quiet)
     return instance

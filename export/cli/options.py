@@ -101,7 +101,7 @@ GaugeName = Annotated[
 StrokeWeight = Annotated[
     float | None,
     typer.Option(
-        "--w-strokes",
+        "--stroke-weight",
         metavar="X",
         help="Weight of the distance from the strokes, 0 to {most weight}, the same on every grid; by default"
         " {stroke weight}, or that of the instance file.",
@@ -110,7 +110,7 @@ StrokeWeight = Annotated[
 SkewWeight = Annotated[
     float | None,
     typer.Option(
-        "--w-beta",
+        "--skew-weight",
         metavar="X",
         help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default {skew weight},"
         " or that of the instance file.",

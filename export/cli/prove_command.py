@@ -64,8 +64,8 @@ def prove_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     start: Start = None,
     time_limit: Annotated[
         float,
@@ -111,7 +111,16 @@ def prove_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        loaded = load(
+            instance,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
         deadline = Deadline.after(time_limit)
         proof = prove(
             loaded,

@@ -111,8 +111,8 @@ def shade_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     time_limit: SecondsInAll = 60.0,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -133,11 +133,20 @@ def shade_command(
         show("reading")
         field, candidate, below = _saved(what, on), None, over
         if field is None:
-            instance = load(what, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+            instance = load(
+                what,
+                size,
+                mask,
+                gauge,
+                choice,
+                stroke_weight=stroke_weight,
+                skew_weight=skew_weight,
+                quiet=quiet,
+            )
             candidate = _made(instance, method, output, time_limit, show)
             field, below = candidate.field, over or drawing_of(what)
         else:
-            _refuse_options(what, choice, size, mask, gauge, w_strokes, w_beta, method)
+            _refuse_options(what, choice, size, mask, gauge, stroke_weight, skew_weight, method)
         found = surface(field, hints, flip=flip, progress=show)
         about = _about(candidate, hints, lamp, flip=flip)
         show("drawing and writing")

@@ -76,8 +76,8 @@ def solve_command(
     curvature: Curvature = None,
     view: View = None,
     gauge: GaugeName = None,
-    w_strokes: StrokeWeight = None,
-    w_beta: SkewWeight = None,
+    stroke_weight: StrokeWeight = None,
+    skew_weight: SkewWeight = None,
     facet: Facet = None,
     stroke_norm: StrokeNorm = None,
     beta_norm: BetaNorm = None,
@@ -105,7 +105,16 @@ def solve_command(
     with progress(quiet=quiet) as show:
         show("reading the sketch")
         choice = choice_of(silhouette, curvature, view)
-        loaded = load(instance, size, mask, gauge, choice, w_strokes=w_strokes, w_beta=w_beta, quiet=quiet)
+        loaded = load(
+            instance,
+            size,
+            mask,
+            gauge,
+            choice,
+            stroke_weight=stroke_weight,
+            skew_weight=skew_weight,
+            quiet=quiet,
+        )
         request = Request(
             loaded,
             output,

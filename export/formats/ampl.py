@@ -98,8 +98,9 @@ def data(problem: Problem, header: list[str]) -> Iterator[bytes]:
     yield b";\nparam: S_c: theta w :=\n"
     strokes: Pieces = [Counted(counts, "strokes", words(instance.w))]
     yield from _listed(instance, "strokes", [words(instance.target), b" ", *strokes])
-    weights = f"param w_strokes := {number(instance.w_strokes)};\nparam w_beta := {number(instance.w_beta)};"
-    yield b";\n" + weights.encode() + b"\n"
+    weights = {"w_strokes": instance.stroke_coefficient, "w_beta": instance.skew_coefficient}
+    lines = "\n".join(f"param {name} := {number(value)};" for name, value in weights.items())
+    yield b";\n" + lines.encode() + b"\n"
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"

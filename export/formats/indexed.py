@@ -40,7 +40,7 @@ class Indexed(Language):
     def symbol(self, symbol: sp.Symbol) -> Piece:
         """A symbol's name and index; scalars have none."""
         if symbol in SCALARS:
-            return SCALARS[symbol].encode()
+            return str(symbol.name).encode()
         name, kind = SLOTS[self._over][symbol]
         index = self.second if kind == "second" else self.index["pixels"] if kind == "first" else self._own
         return f"{name}{self.brackets[0]}{index}{self.brackets[1]}".encode()
@@ -94,9 +94,10 @@ def narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
 
 
 def check_indexed(problem: Problem, layout: str, instead: str) -> None:
-    """Nothing, or UnsupportedByFormatError: for columns fixed, and for a weight that solvers would drop."""
+    """Raise UnsupportedByFormatError for columns fixed one by one, or weights that solvers would drop."""
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(f"{layout} has no place for columns fixed one by one; write {instead}")
-    for name in ("w", "w_strokes", "w_beta"):
-        check_coefficients(getattr(instance, name), f"{name} of {instance.name}")
+    weights = (instance.w, instance.stroke_coefficient, instance.skew_coefficient)
+    for name, values in zip(("w", "w_strokes", "w_beta"), weights, strict=True):
+        check_coefficients(values, f"{name} of {instance.name}")

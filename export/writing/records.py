@@ -439,7 +439,7 @@ def check_coefficients(values: Floats | float, where: str) -> None:
 
 
 _LARGER: Final = (
-    "make w, w_strokes or w_beta larger (0 leaves a term out), "
+    "make w, the stroke weight or the skew weight larger (0 removes a term), "
     "or the direction of a stroke that is nearly horizontal exactly 0"
 )
-_SMALLER: Final = "make w_strokes or w_beta smaller"
+_SMALLER: Final = "make the stroke weight or the skew weight smaller"

@@ -181,8 +181,8 @@ class CrossField(Pictured):
         size = np.abs if norm == 1 else np.square
         return Energy(
             smooth=2 * float(np.sum(size(self.residual_a)) + np.sum(size(self.residual_b))),
-            strokes=instance.w_strokes * float(np.sum(instance.w * size(self.residual_r))),
-            beta=instance.w_beta * float(np.sum(size(self.beta))),
+            strokes=instance.stroke_coefficient * float(np.sum(instance.w * size(self.residual_r))),
+            beta=instance.skew_coefficient * float(np.sum(size(self.beta))),
         )
 
     @cached_property

@@ -58,7 +58,7 @@ def _of_pixels(field: CrossField) -> Floats:
     terms, instance = field.instance.stroke_terms, field.instance
     residual = terms.residuals(field.alpha, field.beta)
     strokes = terms.at_pixels(terms.weight * residual * residual, instance.grid.size)
-    skew: Floats = instance.w_beta * field.beta * field.beta
+    skew: Floats = instance.skew_coefficient * field.beta * field.beta
     return strokes + skew
 
 

@@ -115,8 +115,8 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
 }
 """For each index set: symbol -> (quantity, way to it)."""
 
-SCALARS: Final = {w_strokes: "w_strokes", w_beta: "w_beta"}
-"""Symbols that are one number for the whole instance."""
+SCALARS: Final = {w_strokes: "stroke_coefficient", w_beta: "skew_coefficient"}
+"""Symbols that are one number for the whole instance, and the attribute of the instance that holds it."""
 
 LATEX: Final = {
     **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},

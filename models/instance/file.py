@@ -22,7 +22,15 @@ from .instance import Instance
 
 FORMAT: Final = "crossfield-instance"
 VERSION: Final = 1
-_SCALARS = ("name", "gauge", "source", "w_strokes", "w_beta", "pixel_size")
+_SCALARS = {
+    "name": "name",
+    "gauge": "gauge",
+    "source": "source",
+    "w_strokes": "stroke_coefficient",
+    "w_beta": "skew_coefficient",
+    "pixel_size": "pixel_size",
+}
+"""Attributes of an instance by the keys of a file."""
 _ARRAYS = ("mask", "stroke_pixels", "theta", "w")
 _MOST_ERRORS: Final = 100  # of a document, among which the outermost one is told
 _ARCHIVE: Final = {
@@ -65,7 +73,7 @@ def to_json(instance: Instance) -> str:
     strokes = _lines(instance)
     head = (
         {"format": FORMAT, "version": VERSION}
-        | {key: getattr(instance, key) for key in _SCALARS}
+        | {key: getattr(instance, name) for key, name in _SCALARS.items()}
         | {"origin": list(instance.origin)}
     )
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
@@ -167,7 +175,7 @@ def of_document(document: object) -> Instance:
             theta=np.array([stroke[2] for stroke in strokes], dtype=float),
             w=np.array([stroke[3] for stroke in strokes], dtype=float),
             origin=tuple(document.get("origin", (0.0, 0.0))),
-            **{key: document[key] for key in _SCALARS if key in document},
+            **{name: document[key] for key, name in _SCALARS.items() if key in document},
         )
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
@@ -266,7 +274,9 @@ def _npz(instance: Instance) -> bytes:
 
 def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     """The instance as named arrays; `head` is JSON text with format, version and scalars."""
-    head = {"format": FORMAT, "version": VERSION} | {key: getattr(instance, key) for key in _SCALARS}
+    head = {"format": FORMAT, "version": VERSION} | {
+        key: getattr(instance, name) for key, name in _SCALARS.items()
+    }
     arrays = {
         "head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8),
         "origin": np.array(instance.origin),
@@ -299,7 +309,7 @@ def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     check_version(head, FORMAT, VERSION)
     check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
     try:
-        scalars = {key: head[key] for key in _SCALARS}
+        scalars = {name: head[key] for key, name in _SCALARS.items()}
         origin = (float(arrays["origin"][0]), float(arrays["origin"][1]))
         entries: dict[str, Any] = scalars | {key: arrays[key] for key in _ARRAYS}
         return Instance(origin=origin, **entries)

@@ -106,9 +106,9 @@ class Instance(Pictured):
     rounded to 12 decimals, and as 0 within 1e-8 of the horizontal: a cost that small would be dropped by
     readers of the files.
     w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
-    w_strokes, w_beta: coefficients of the stroke and the skew term of the energy (1 and 1e-6), at most
-    1e6: beyond, an energy that rounding leaves in the one term hides the others. They count per pixel;
-    weights that mean the same on every grid: `with_weights`.
+    stroke_coefficient, skew_coefficient: coefficients w_strokes and w_beta of the energy (1 and 1e-6), at
+    most 1e6, because rounding errors of a larger term would hide the others. They count per pixel;
+    `with_weights` takes weights that mean the same on every grid.
     gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
     source: where the sketch came from, one line of text.
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
@@ -127,8 +127,8 @@ class Instance(Pictured):
     stroke_pixels: Ints
     theta: Floats
     w: Floats
-    w_strokes: float = 1.0
-    w_beta: float = 1e-6
+    stroke_coefficient: float = 1.0
+    skew_coefficient: float = 1e-6
     gauge: Gauge = "strokes"
     source: str = ""
     pixel_size: float = 1.0
@@ -142,7 +142,7 @@ class Instance(Pictured):
         for name in ("theta", "w"):
             self._freeze(name, np.asarray(getattr(self, name), dtype=np.float64))
         object.__setattr__(self, "origin", (in_digits(self.origin[0]), in_digits(self.origin[1])))
-        for name in ("w_strokes", "w_beta"):
+        for name in ("stroke_coefficient", "skew_coefficient"):
             object.__setattr__(self, name, float(getattr(self, name)))
         object.__setattr__(self, "pixel_size", in_digits(self.pixel_size))
         self._check_scalars()
@@ -166,7 +166,7 @@ class Instance(Pictured):
             )
         if self.gauge not in GAUGES:
             raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
-        for name in ("w_strokes", "w_beta"):
+        for name in ("stroke_coefficient", "skew_coefficient"):
             _check_weight(name, getattr(self, name))
         if not 1 / _FARTHEST <= self.pixel_size <= _FARTHEST:
             raise InstanceError(
@@ -241,7 +241,7 @@ class Instance(Pictured):
     @cached_property
     def stroke_terms(self) -> StrokeTerms:
         """The residuals of all strokes."""
-        return StrokeTerms(self.stroke_index, self.target, self.w_strokes * self.w)
+        return StrokeTerms(self.stroke_index, self.target, self.stroke_coefficient * self.w)
 
     @cached_property
     def alpha_lower(self) -> Floats:
@@ -275,32 +275,32 @@ class Instance(Pictured):
         """The same instance under another gauge."""
         return replace(self, gauge=gauge)
 
-    def with_weights(self, w_strokes: float | None = None, w_beta: float | None = None) -> Instance:
+    def with_weights(self, stroke_weight: float | None = None, skew_weight: float | None = None) -> Instance:
         """The same instance under other weights, which mean the same on every grid (docs/weights.md).
 
-        w_strokes, w_beta: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6; on another
-        one they are w_strokes 24 / side and w_beta (24 / side)^2. None leaves a weight as it is. Raises
-        InstanceError.
+        stroke_weight, skew_weight: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On
+        another grid the coefficients are stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a
+        weight. Raises InstanceError for a weight or coefficient out of range.
         """
         changed: dict[str, Any] = {}
-        for name, weight, coefficient in (
-            ("w_strokes", w_strokes, stroke_coefficient),
-            ("w_beta", w_beta, skew_coefficient),
+        for weight, given, coefficient in (
+            ("stroke_weight", stroke_weight, stroke_coefficient),
+            ("skew_weight", skew_weight, skew_coefficient),
         ):
-            if weight is not None:
-                _check_weight(name, weight)
-                changed[name] = coefficient(weight, max(self.mask.shape))
+            if given is not None:
+                _check_weight(weight, given)
+                changed[coefficient.__name__] = coefficient(given, max(self.mask.shape))
         return replace(self, **changed) if changed else self
 
     @property
     def stroke_weight(self) -> float:
-        """The weight of the strokes that means the same on every grid; w_strokes on one of 24 pixels."""
-        return stroke_weight(self.w_strokes, max(self.mask.shape))
+        """Weight of the strokes that means the same on every grid; the coefficient on one of 24 pixels."""
+        return stroke_weight(self.stroke_coefficient, max(self.mask.shape))
 
     @property
     def skew_weight(self) -> float:
-        """The weight of the skew that means the same on every grid; w_beta on one of 24 pixels."""
-        return skew_weight(self.w_beta, max(self.mask.shape))
+        """Weight of the skew that means the same on every grid; the coefficient on one of 24 pixels."""
+        return skew_weight(self.skew_coefficient, max(self.mask.shape))
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """The same instance with only those stroke pixels, shape (s,).
@@ -355,11 +355,12 @@ class Instance(Pictured):
 
     @property
     def _other_weights(self) -> str:
-        said = {"w_strokes": (self.stroke_weight, STROKE_WEIGHT), "w_beta": (self.skew_weight, SKEW_WEIGHT)}
+        weights = {"stroke": (self.stroke_weight, STROKE_WEIGHT), "skew": (self.skew_weight, SKEW_WEIGHT)}
         return "".join(
-            f", {name} {weight:g}"
-            for name, (weight, of_sketches) in said.items()
-            if weight != of_sketches and getattr(self, name) != getattr(Instance, name)
+            f", {term} weight {weight:g}"
+            for term, (weight, of_sketches) in weights.items()
+            if weight != of_sketches
+            and getattr(self, f"{term}_coefficient") != getattr(Instance, f"{term}_coefficient")
         )
 
     @cached_property
@@ -369,7 +370,8 @@ class Instance(Pictured):
         for text in (self.name, self.gauge, self.source):
             digest.update(text.encode() + b"\0")
         scalars = np.array(
-            [*self.mask.shape, self.w_strokes, self.w_beta, self.pixel_size, *self.origin], dtype="<f8"
+            [*self.mask.shape, self.stroke_coefficient, self.skew_coefficient, self.pixel_size, *self.origin],
+            dtype="<f8",
         )
         for array in (
             scalars,

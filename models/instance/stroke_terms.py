@@ -13,7 +13,8 @@ from .grid import Floats, Ints
 class StrokeTerms:
     """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
 
-    pixel: its number. goal: its direction in the gauge's range. weight: w_strokes times its reliability.
+    pixel: its number. goal: its direction in the gauge's range. weight: its reliability times the
+    instance's `stroke_coefficient`.
     """
 
     pixel: Ints

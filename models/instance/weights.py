@@ -21,12 +21,12 @@ SKEW_WEIGHT: Final = 1e-6
 
 
 def stroke_coefficient(weight: float, longer: int) -> float:
-    """The coefficient w_strokes of a weight of the strokes; longer: pixels of the grid's longer side."""
+    """The coefficient of a weight of the strokes; longer: pixels of the grid's longer side."""
     return weight * REFERENCE / longer
 
 
 def skew_coefficient(weight: float, longer: int) -> float:
-    """The coefficient w_beta of a weight of the skew; longer: pixels of the grid's longer side."""
+    """The coefficient of a weight of the skew; longer: pixels of the grid's longer side."""
     return weight * REFERENCE**2 / longer**2
 
 

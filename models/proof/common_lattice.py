@@ -73,7 +73,7 @@ class CommonLattice(Lattice):
 
     def unary_costs(self) -> Floats:
         """D of each label, flat: skew and stroke term; inf where it is not allowed."""
-        cost: Floats = self.instance.w_beta * np.abs(self.angles[1])
+        cost: Floats = self.instance.skew_coefficient * np.abs(self.angles[1])
         weight = stroke_weight(self.instance)[self.pixel]
         at = np.flatnonzero(weight)
         pixel, alpha, beta = self.pixel[at], self.angles[0][at], self.angles[1][at]

@@ -45,7 +45,7 @@ def unary_costs(lattice: Lattice) -> Floats:
         return lattice.unary_costs()
     instance, h = lattice.instance, lattice.h
     alpha, beta = lattice.angles
-    cost: Floats = instance.w_beta * (beta**2 - h * h / 4)
+    cost: Floats = instance.skew_coefficient * (beta**2 - h * h / 4)
     weight = stroke_weight(instance)[lattice.pixel]
     at = np.flatnonzero(weight)
     cost[at] += weight[at] * _misfit(lattice, at, alpha[at], beta[at])

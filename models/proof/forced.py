@@ -143,7 +143,7 @@ class Piece:
     def _given(self, field: CrossField) -> Floats:
         """By how much the quadratic is less than Q at each stroke, shape (s,)."""
         instance = field.instance
-        at, weight = instance.stroke_index, instance.w_strokes * instance.w
+        at, weight = instance.stroke_index, instance.stroke_coefficient * instance.w
         beta, u = field.beta[at], field.residual_r
         v = field.alpha[at] - HALF * self.lines - beta - instance.target
         above, below = self._beyond()
@@ -156,7 +156,7 @@ class Piece:
         lattice = self.left.lattice
         instance, n = lattice.instance, lattice.instance.grid.size
         energy, at = energy_at(instance, lattice.p), instance.stroke_index
-        weight, v = instance.w_strokes * instance.w, self.lines != 0
+        weight, v = instance.stroke_coefficient * instance.w, self.lines != 0
         above, below = self._beyond()
         vector = energy.vector.copy()
         vector[at] += weight * v * HALF * self.lines

@@ -81,7 +81,7 @@ class Forced1Norm(Forced):
         upper = np.concatenate([left.alpha_high, left.beta_high])
         fit = LinearFit.of(instance, left.lattice.p, lower, upper)
         alpha, beta = np.split(fit.x, 2)
-        beyond = 2 * instance.w_strokes * float(instance.w @ (self.above + self.below))
+        beyond = 2 * instance.stroke_coefficient * float(instance.w @ (self.above + self.below))
         return CrossField(instance, alpha, beta, left.lattice.p), fit.bound - beyond
 
 

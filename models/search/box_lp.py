@@ -51,7 +51,7 @@ class Residuals:
                 [
                     np.full(2 * m, 2.0),
                     strokes.weight,
-                    np.full(n, instance.w_beta),
+                    np.full(n, instance.skew_coefficient),
                 ]
             ),
         )

@@ -48,8 +48,8 @@ def halved(instance: Instance) -> Instance | None:
         stroke_pixels=np.stack(np.divmod(kept, mask.shape[1]), axis=1),
         theta=np.arctan2(turn[1][kept], turn[0][kept]) / 2,
         w=weight[kept] / 4,
-        w_strokes=min(4 * instance.w_strokes, MOST_WEIGHT),
-        w_beta=min(4 * instance.w_beta, MOST_WEIGHT),
+        stroke_coefficient=min(4 * instance.stroke_coefficient, MOST_WEIGHT),
+        skew_coefficient=min(4 * instance.skew_coefficient, MOST_WEIGHT),
         pixel_size=2 * instance.pixel_size,
     )
 

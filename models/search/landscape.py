@@ -112,7 +112,7 @@ class Landscape:
         self.p = p.copy()
         self._around = x
         self._defined = PatchEnergy(patch, x, p)
-        soft = max(PULL, _SOFTEST - patch.instance.w_beta)
+        soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
         self._lower, self._upper = _bounds(patch)
         self._held: dict[int, float] = {}

@@ -46,7 +46,10 @@ class PatchEnergy:
         r = self._strokes.residuals(alpha, beta)
         strokes = float(self._strokes.weight @ (r * r))
         return (
-            self._rest + 2 * float(a @ a + b @ b) + strokes + instance.w_beta * float(inside[1] @ inside[1])
+            self._rest
+            + 2 * float(a @ a + b @ b)
+            + strokes
+            + instance.skew_coefficient * float(inside[1] @ inside[1])
         )
 
 
@@ -57,4 +60,4 @@ def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
     terms, skew = instance.stroke_terms, field.beta[~free] ** 2
     stroke = terms.weight * terms.residuals(field.alpha, field.beta) ** 2
     pair[pairs], stroke[strokes] = 0.0, 0.0
-    return float(2 * pair.sum() + stroke.sum() + instance.w_beta * skew.sum())
+    return float(2 * pair.sum() + stroke.sum() + instance.skew_coefficient * skew.sum())

@@ -75,7 +75,7 @@ def _polyvector(hold: float, instance: Instance, _: Over) -> FreeField:
 
 def _greedy(hold: float, instance: Instance, over: Over) -> FreeField:
     """Held less, strokes that contradict each other leave fewer vortices."""
-    light = rough_greedy(replace(instance, w_strokes=hold * instance.w_strokes), over)
+    light = rough_greedy(replace(instance, stroke_coefficient=hold * instance.stroke_coefficient), over)
     return FreeField(instance, light.alpha, light.beta, light.p)
 
 

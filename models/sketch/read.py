@@ -85,8 +85,8 @@ def read_sketch(
     mask: str | Path | None = None,
     gauge: Gauge = "strokes",
     name: str | None = None,
-    w_strokes: float = STROKE_WEIGHT,
-    w_beta: float = SKEW_WEIGHT,
+    stroke_weight: float = STROKE_WEIGHT,
+    skew_weight: float = SKEW_WEIGHT,
     silhouette: Silhouette = "none",
     curvature: Iterable[str] = (),
     view: str | None = None,
@@ -99,9 +99,9 @@ def read_sketch(
     mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
     from half its area on.
-    gauge: as in Instance. name: the instance's name; by default made from the file name. w_strokes, w_beta:
-    weights of the stroke and the skew term that mean the same on every grid, as in `Instance.with_weights`;
-    their defaults are 20 and 1e-6 (docs/weights.md).
+    gauge: as in Instance. name: the instance's name; by default made from the file name.
+    stroke_weight, skew_weight: weights of the stroke and the skew term that mean the same on every grid, as
+    in `Instance.with_weights`; their defaults are 20 and 1e-6 (docs/weights.md).
     silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
     (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
     colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
@@ -130,7 +130,7 @@ def read_sketch(
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
-    return read.with_weights(w_strokes, w_beta)
+    return read.with_weights(stroke_weight, skew_weight)
 
 
 def instance_of(

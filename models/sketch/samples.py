@@ -76,13 +76,13 @@ def sample(
     size: int = DEFAULT_SIZE,
     gauge: Gauge = "strokes",
     *,
-    w_strokes: float = STROKE_WEIGHT,
-    w_beta: float = SKEW_WEIGHT,
+    stroke_weight: float = STROKE_WEIGHT,
+    skew_weight: float = SKEW_WEIGHT,
     silhouette: Silhouette = "none",
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
-    name: of one in `samples()`; size: 1..4096; gauge: as in Instance; w_strokes, w_beta: as in
+    name: of one in `samples()`; size: 1..4096; gauge: as in Instance; stroke_weight, skew_weight: as in
     `Instance.with_weights`; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an
     analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight
     that cannot be.
@@ -96,7 +96,7 @@ def sample(
     else:
         svg = sample_svg(name).encode()
         found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge, choice=choice)
-    return found.with_weights(w_strokes, w_beta)
+    return found.with_weights(stroke_weight, skew_weight)
 
 
 def sample_svg(name: str) -> str:

@@ -209,8 +209,8 @@ def analytic(
     size: int = DEFAULT_SIZE,
     gauge: Gauge = "strokes",
     *,
-    w_strokes: float = STROKE_WEIGHT,
-    w_beta: float = SKEW_WEIGHT,
+    stroke_weight: float = STROKE_WEIGHT,
+    skew_weight: float = SKEW_WEIGHT,
 ) -> AnalyticInstance:
     """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
 
@@ -218,7 +218,7 @@ def analytic(
     evenly parametrised curvature lines of both families, so many that the share of stroke pixels comes as
     close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
     drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance;
-    w_strokes, w_beta: as in `Instance.with_weights`. Raises InputError for an unknown name or size,
+    stroke_weight, skew_weight: as in `Instance.with_weights`. Raises InputError for an unknown name or size,
     InstanceError for a weight that cannot be.
     """
     if name not in SURFACES:
@@ -243,7 +243,7 @@ def analytic(
         origin=(frame.x, frame.y),
     )
     return AnalyticInstance(
-        instance.with_weights(w_strokes, w_beta),
+        instance.with_weights(stroke_weight, skew_weight),
         u_angle,
         v_angle,
         normals=_towards_viewer(*tangents),

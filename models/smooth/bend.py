@@ -124,7 +124,7 @@ class _Bend:
         strokes = sparse.csr_array(
             (squared, (np.arange(len(carried)), carried)), shape=(len(carried), difference.shape[1])
         )
-        even, skew = np.sqrt(2 * harmonic), np.sqrt(start.instance.w_beta)
+        even, skew = np.sqrt(2 * harmonic), np.sqrt(start.instance.skew_coefficient)
         rows = [even * difference, strokes, skew / 2 * sparse.hstack([every, -every])]
         goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
         return cls(difference, offset, *_quadrants(start), sparse.vstack(rows).tocsr(), np.concatenate(goal))
@@ -207,4 +207,4 @@ def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
     off = wrap(instance.theta - lines, -HALF, np.pi)
     carrying = np.argmin(np.round(np.abs(off), 9), axis=0)
     angle = (lines + off)[carrying, np.arange(len(at))]
-    return at + instance.grid.size * carrying, angle, hold * instance.w_strokes * instance.w
+    return at + instance.grid.size * carrying, angle, hold * instance.stroke_coefficient * instance.w

@@ -65,7 +65,7 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
     once = sums(weight * root)
-    matrix = _beside(alike, once, instance.w_beta)
+    matrix = _beside(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
     x = factored(matrix)(right) if tolerance is None else locally(matrix, right, tolerance)
     return x[:size], x[size:]

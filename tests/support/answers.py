@@ -125,12 +125,12 @@ def problem(name):
     if name == "pair":
         pair = Instance(
             "pair", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.2, 1.2]),
-            np.array([1.0, 0.75]), w_strokes=1.5, w_beta=1e-3, gauge="strokes",
+            np.array([1.0, 0.75]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
         )  # fmt: skip
         return formulate(pair, "minlp-quartic")
     tiny = Instance(
         "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
-        np.array([1.0, 0.75, 0.5]), w_strokes=1.5, w_beta=1e-3, gauge="strokes",
+        np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
     )  # fmt: skip
     formulation = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[name]
     return formulate(tiny, formulation, p=np.array([0, 0, -1, 0]) if name == "qp" else None)

@@ -75,7 +75,12 @@ def make_instance(shape: str = "hole", gauge: str = "strokes", seed: int = 1, **
     pixels = pixels[chosen]
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
     return Instance(
-        "tiny", mask, pixels, theta, w, **{"w_strokes": 1.5, "w_beta": 1e-3, "gauge": gauge} | given
+        "tiny",
+        mask,
+        pixels,
+        theta,
+        w,
+        **{"stroke_coefficient": 1.5, "skew_coefficient": 1e-3, "gauge": gauge} | given,
     )
 
 

@@ -8,12 +8,14 @@ from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.search.box_qp import fitted
 
 
-def sketch(mask, theta, w_beta=1e-6, gauge="strokes", w=None):
+def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
     """An instance with strokes where the picture theta (radians) is a number."""
     theta = np.where(mask, theta, np.nan)
     at = np.argwhere(np.isfinite(theta))
     weight = np.ones(len(at)) if w is None else w
-    return Instance("sketch", mask, at, theta[tuple(at.T)], weight, w_beta=w_beta, gauge=gauge)
+    return Instance(
+        "sketch", mask, at, theta[tuple(at.T)], weight, skew_coefficient=skew_coefficient, gauge=gauge
+    )
 
 
 def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
@@ -23,7 +25,13 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
     at = np.argwhere(mask)
     at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(strokes)])]
     return Instance(
-        "random", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)), w_beta=1e-3, gauge=gauge
+        "random",
+        mask,
+        at,
+        rng.uniform(0, np.pi, len(at)),
+        1 - rng.random(len(at)),
+        skew_coefficient=1e-3,
+        gauge=gauge,
     )
 
 
@@ -70,7 +78,7 @@ def least_energy(instance, jumps):
     r = np.zeros((len(strokes), 2 * size))
     r[strokes, terms.pixel], r[strokes, size + terms.pixel] = 1, 1
     root = np.sqrt(terms.weight)
-    skew = np.sqrt(instance.w_beta) * np.eye(2 * size)[size:]
+    skew = np.sqrt(instance.skew_coefficient) * np.eye(2 * size)[size:]
     rows = np.concatenate([np.sqrt(2) * a, np.sqrt(2) * b, root[:, None] * r, skew])
     right = np.zeros((len(jumps), len(rows)))
     right[:, : len(pairs)] = -np.sqrt(2) * HALF * jumps

@@ -38,7 +38,7 @@ class Table:
         instance, h = self.field.instance, self.h
         k, q, allowed = self.labels[i]
         alpha, beta = np.meshgrid(*self.places(i), indexing="ij")
-        cost = instance.w_beta * (beta**2 - h * h / 4)
+        cost = instance.skew_coefficient * (beta**2 - h * h / 4)
         for at, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
             if at != i:
                 continue
@@ -50,7 +50,7 @@ class Table:
                 if turn != own:
                     best = np.minimum(best, (alpha + beta - theta - np.pi * turn) ** 2 - h * h / 2)
                 best = np.minimum(best, (alpha + HALF - beta - theta - np.pi * turn) ** 2 - h * h / 2)
-            cost = cost + instance.w_strokes * w * best
+            cost = cost + instance.stroke_coefficient * w * best
         return np.where(allowed, cost, np.inf)
 
     def pair(self, e):

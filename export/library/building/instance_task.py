@@ -188,7 +188,10 @@ def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
 
 def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
     """What is told of where an instance comes from."""
-    parameters: dict[str, Any] = {"w_strokes": instance.w_strokes, "w_beta": instance.w_beta}
+    parameters: dict[str, Any] = {
+        "w_strokes": instance.stroke_coefficient,
+        "w_beta": instance.skew_coefficient,
+    }
     if recipe.sketch.kind == "random":
         parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": STROKE_SHARE}
         parameters |= {"ragged_share": RAGGED_SHARE} if recipe.sketch.what == "ragged" else {}

@@ -32,7 +32,7 @@ def instance_from(recipe: InstanceRecipe) -> Instance:
     """
     make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
     try:
-        of_paper = {weight: getattr(Instance, weight) for weight in ("w_strokes", "w_beta")}
+        of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
         return replace(make(recipe), name=recipe.name, **of_paper)
     except NoStrokeError as error:
         raise NoStrokeError(f"{recipe.name}: {error}") from error

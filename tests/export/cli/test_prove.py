@@ -11,7 +11,7 @@ from crossfield.models.array_archive import pack_arrays
 from crossfield.models.field.file import read_field
 from crossfield.models.proof import check_certificate
 
-SKETCH = ["mouse", "--size", "8", "--w-strokes", "0.3"]
+SKETCH = ["mouse", "--size", "8", "--stroke-weight", "0.3"]
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_field_certificate_and_report_agree(folder):
 
 
 def test_a_proof_in_the_1_norm_is_of_the_optimum_of_the_milp(tmp_path, capsys):
-    sketch = ["mouse", "--size", "4", "--w-strokes", "0.2"]
+    sketch = ["mouse", "--size", "4", "--stroke-weight", "0.2"]
     given = ["prove", *sketch, "--norm", "1", "--time-limit", "100", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)

@@ -9,8 +9,8 @@ from crossfield.models.instance.instance import MOST_WEIGHT
 from crossfield.models.instance.weights import STROKE_WEIGHT
 from crossfield.models.sketch.samples import sample_svg
 
-GIVEN = ["--w-strokes", "10", "--w-beta", "1e-4"]
-WEIGHTS = {"w_strokes": 10.0, "w_beta": 1e-4}
+GIVEN = ["--stroke-weight", "10", "--skew-weight", "1e-4"]
+WEIGHTS = {"stroke_weight": 10.0, "skew_weight": 1e-4}
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def drawing(tmp_path):
 
 def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawing):
     """A file is weighed again: the rest of it, its name too, stays; a weight that is not given is kept."""
-    file = cf.write_instance(cf.sample("mouse", 8, w_beta=1e-3), tmp_path / "file.json")
+    file = cf.write_instance(cf.sample("mouse", 8, skew_weight=1e-3), tmp_path / "file.json")
     for what, size, wanted in (
         (drawing, ["--size", "8"], cf.read_sketch(drawing, size=8, **WEIGHTS)),
         ("mouse", ["--size", "8"], cf.sample("mouse", 8, **WEIGHTS)),
@@ -34,7 +34,7 @@ def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawin
         instance = cf.read_instance(made)
         assert instance.sha256 == wanted.sha256
         assert (instance.stroke_weight, instance.skew_weight) == (10.0, 1e-4)
-    kept = cf.sample("mouse", 8, w_beta=1e-3).with_weights(w_strokes=10)
+    kept = cf.sample("mouse", 8, skew_weight=1e-3).with_weights(stroke_weight=10)
     assert (kept.stroke_weight, kept.skew_weight) == (10.0, 1e-3)
     assert len({kept.sha256, instance.sha256, cf.read_instance(file).sha256}) == 3
 
@@ -49,7 +49,7 @@ def test_every_command_that_reads_a_sketch_takes_them(tmp_path, capsys):
     }
     for command, options in commands.items():
         assert invoke([command, *sketch, *options, "-o", str(tmp_path / command)]) == 0
-        assert "w_strokes 10, w_beta 0.0001" in capsys.readouterr().out
+        assert "stroke weight 10, skew weight 0.0001" in capsys.readouterr().out
     assert cf.read_instance(tmp_path / "export" / "skew.instance.json").sha256 == wanted
     for field in ("solve/skew.greedy.field.npz", "prove/skew.proof.field.npz"):
         assert cf.read_field(tmp_path / field).instance.sha256 == wanted
@@ -57,7 +57,7 @@ def test_every_command_that_reads_a_sketch_takes_them(tmp_path, capsys):
 
 def test_weights_that_cannot_be_are_refused(tmp_path, capsys, drawing):
     file = cf.write_instance(cf.sample("skew", 4), tmp_path / "skew.json")
-    for option, value in (("--w-strokes", "-1"), ("--w-beta", "nan"), ("--w-strokes", "1e7")):
+    for option, value in (("--stroke-weight", "-1"), ("--skew-weight", "nan"), ("--stroke-weight", "1e7")):
         name = option[2:].replace("-", "_")
         for what in ("skew", drawing, file):
             assert invoke(["export", str(what), option, value, "-o", str(tmp_path / "out")]) == 1
@@ -65,10 +65,10 @@ def test_weights_that_cannot_be_are_refused(tmp_path, capsys, drawing):
         with pytest.raises(InstanceError, match=f"{name} is"):
             cf.read_sketch(drawing, size=8, **{name: float(value)})
     assert not (tmp_path / "out").exists()
-    for given in ({"w_strokes": MOST_WEIGHT}, {"w_beta": MOST_WEIGHT}):
+    for given in ({"stroke_weight": MOST_WEIGHT}, {"skew_weight": MOST_WEIGHT}):
         with pytest.raises(InstanceError, match="must be between"):  # on so coarse a grid
             cf.sample("skew", 4, **given)
-        assert cf.sample("skew", 24, **given).w_strokes > 0
+        assert cf.sample("skew", 24, **given).stroke_coefficient > 0
 
 
 def test_a_weight_means_the_same_on_every_grid():
@@ -87,7 +87,9 @@ def test_a_weight_means_the_same_on_every_grid():
     energies = []
     for instance in (coarse.with_weights(3.0, 1e-2), fine.with_weights(3.0, 1e-2)):
         scale = 24 / max(instance.mask.shape)
-        assert (instance.w_strokes, instance.w_beta) == pytest.approx((3 * scale, 1e-2 * scale**2))
+        assert (instance.stroke_coefficient, instance.skew_coefficient) == pytest.approx(
+            (3 * scale, 1e-2 * scale**2)
+        )
         assert (instance.stroke_weight, instance.skew_weight) == (3.0, 1e-2)
         size = instance.grid.size
         alpha, pairs = np.full(size, 0.5), np.zeros(len(instance.grid.first), dtype=int)
@@ -100,19 +102,21 @@ def test_a_weight_means_the_same_on_every_grid():
 def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
     mask = np.ones((2, 30), dtype=bool)
     instance = cf.Instance("own", mask, np.array([[0, 0]]), np.zeros(1), np.ones(1))
-    assert (instance.w_strokes, instance.w_beta) == (1.0, 1e-6)
-    assert "w_strokes" not in instance.summary
+    assert (instance.stroke_coefficient, instance.skew_coefficient) == (1.0, 1e-6)
+    assert "stroke weight" not in instance.summary
 
 
 def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
     cf.write_field(cf.greedy(cf.sample("skew", 4)), tmp_path / "field.npz")
     start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
-    assert invoke(["solve", "skew", "--size", "4", "--w-strokes", "10", "-m", "search", *start]) == 1
+    assert invoke(["solve", "skew", "--size", "4", "--stroke-weight", "10", "-m", "search", *start]) == 1
     said = capsys.readouterr().err
-    assert "w_strokes 10" in said
+    assert "stroke weight 10" in said
     assert "size, gauge and weights" in said
 
 
 def test_the_summary_names_weights_that_are_not_the_defaults():
     assert "w_" not in cf.sample("skew", 4).summary
-    assert cf.sample("skew", 4, w_strokes=STROKE_WEIGHT, w_beta=1.0).summary.endswith(", w_beta 1")
+    assert cf.sample("skew", 4, stroke_weight=STROKE_WEIGHT, skew_weight=1.0).summary.endswith(
+        ", skew weight 1"
+    )

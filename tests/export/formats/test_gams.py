@@ -79,7 +79,7 @@ def make_instance(
     chosen[0, 0] = True
     pixels = np.argwhere(chosen)
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.1, 1, len(pixels))
-    return Instance("tiny", area, pixels, theta, w, w_beta=1e-3, gauge=gauge)
+    return Instance("tiny", area, pixels, theta, w, skew_coefficient=1e-3, gauge=gauge)
 
 
 def make_field(instance: Instance, seed: int = 5) -> CrossField:

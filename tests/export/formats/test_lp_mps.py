@@ -110,9 +110,9 @@ def test_a_weight_too_small_is_refused_and_what_was_there_stays(suffix: str, tmp
     path = tmp_path / f"model.{suffix}"
     write(problem_of("milp-mccormick gauge=strokes"), path)
     before = path.read_bytes()
-    for w_beta in (1e-10, 1e-14):  # the second one lies below the noise of what cancels
-        problem = make_problem("milp-mccormick", make_instance(w_beta=w_beta))
-        with pytest.raises(UnsupportedByFormatError, match=rf"{w_beta!r}.*w_beta"):
+    for skew_coefficient in (1e-10, 1e-14):  # the second one lies below the noise of what cancels
+        problem = make_problem("milp-mccormick", make_instance(skew_coefficient=skew_coefficient))
+        with pytest.raises(UnsupportedByFormatError, match=rf"{skew_coefficient!r}.*skew weight"):
             write(problem, path)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
@@ -120,7 +120,7 @@ def test_a_weight_too_small_is_refused_and_what_was_there_stays(suffix: str, tmp
 
 @both
 def test_no_weight_at_all_is_written(suffix: str, tmp_path: Path):
-    problem = make_problem("milp-mccormick", make_instance(w_beta=0))
+    problem = make_problem("milp-mccormick", make_instance(skew_coefficient=0))
     write(problem, tmp_path / f"model.{suffix}")
     model = by_highs(tmp_path / f"model.{suffix}")
     assert_same(model, of_problem(problem))

@@ -83,7 +83,9 @@ def feasible_points(problem: Problem) -> Points:
 def tiny() -> Instance:
     """Two pixels with strokes that no field follows without loss: the window is that of the box."""
     pixels = [[0, 0], [0, 1]]
-    return Instance("small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], w_beta=1e-2, gauge="box")
+    return Instance(
+        "small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], skew_coefficient=1e-2, gauge="box"
+    )
 
 
 # all of them
@@ -162,7 +164,7 @@ def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
 
 @pytest.mark.parametrize("name", MORE)
 def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
-    problem = make_problem("milp-mccormick", make_instance(w_beta=1e-12))
+    problem = make_problem("milp-mccormick", make_instance(skew_coefficient=1e-12))
     with pytest.raises(UnsupportedByFormatError, match="1e-12"):
         write(problem, tmp_path / f"model.{name}")
     assert list(tmp_path.iterdir()) == []
@@ -734,7 +736,9 @@ def test_baron_solves_its_file_to_the_optimum(formulation: str, tmp_path: Path):
 @pytest.mark.needs("baron")
 @pytest.mark.parametrize("formulation", ["miqcp-bilinear-l1", "milp-mccormick"])
 def test_baron_takes_linear_files_of_one_pixel(formulation: str, tmp_path: Path):
-    pixel = Instance("small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], w_beta=1e-2, gauge="box")
+    pixel = Instance(
+        "small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], skew_coefficient=1e-2, gauge="box"
+    )
     problem = make_problem(formulation, pixel)
     write(problem, tmp_path / "model.bar")
     solution = by_baron(tmp_path / "model.bar", problem)

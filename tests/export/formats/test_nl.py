@@ -211,7 +211,7 @@ def test_start_is_the_complete_point_of_a_field(tmp_path: Path):
 
 
 def test_a_weight_too_small_is_refused(tmp_path: Path):
-    problem = make_problem("milp-mccormick", make_instance(w_beta=1e-12))
+    problem = make_problem("milp-mccormick", make_instance(skew_coefficient=1e-12))
     with pytest.raises(UnsupportedByFormatError, match="1e-12"):
         write(problem, tmp_path / "model.nl")
     assert list(tmp_path.iterdir()) == []

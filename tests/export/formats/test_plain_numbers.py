@@ -30,8 +30,8 @@ def refusals(instance, folder):
     "given, better",
     [
         ({"theta": 2e-8, "w": 1e-3}, {"theta": 0.0, "w": 1e-3}),
-        ({"w_beta": 1e-11}, {"w_beta": 1e-8}),
-        ({"w_beta": 1e-11}, {"w_beta": 0.0}),
+        ({"skew_coefficient": 1e-11}, {"skew_coefficient": 1e-8}),
+        ({"skew_coefficient": 1e-11}, {"skew_coefficient": 0.0}),
     ],
 )
 def test_the_advice_of_a_writer_helps(given, better, tmp_path):
@@ -58,8 +58,8 @@ def test_messages_about_numbers_of_numpy_are_plain():
     instance = one_stroke()
     field = cf.greedy(instance)
     wrong = [
-        lambda: one_stroke(w_beta=np.float64(-1.0)),
-        lambda: one_stroke(w_strokes=np.float64("nan")),
+        lambda: one_stroke(skew_coefficient=np.float64(-1.0)),
+        lambda: one_stroke(stroke_coefficient=np.float64("nan")),
         lambda: one_stroke(theta=np.float64("inf")),
         lambda: one_stroke(w=np.float64(2.0)),
         lambda: cf.Instance("two", mask, np.array([[0, 7]]), [one], [one]),

@@ -16,7 +16,7 @@ from crossfield.models.search.starts import first_field
 @pytest.fixture(scope="module")
 def ring():
     """A sample whose greedy field is improved by other jumps: they are not the same data."""
-    instance = cf.sample("ring", 8, w_strokes=0.3, w_beta=1e-7)
+    instance = cf.sample("ring", 8, stroke_weight=0.3, skew_weight=1e-7)
     assert (cf.greedy(instance).p != first_field(instance).p).any()
     return instance
 

@@ -34,7 +34,7 @@ def skew(tmp_path_factory):
     """A folder with the MILP of a sample in LP, MPS and as an AMPL model, its instance and manifest."""
     folder = tmp_path_factory.mktemp("skew")
     formats = ["--format", "lp", "--format", "mps", "--format", "mod"]
-    weights = ["--w-strokes", "0.17", "--w-beta", "2.8e-8"]
+    weights = ["--stroke-weight", "0.17", "--skew-weight", "2.8e-8"]
     arguments = ["export", "skew", "--size", "4", "-f", MILP, *formats, *weights]
     assert invoke([*arguments, "-o", str(folder), "--quiet"]) == 0
     return folder

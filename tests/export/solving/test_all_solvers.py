@@ -19,7 +19,7 @@ ENOUGH = 1.0
 @pytest.fixture(scope="module")
 def best():
     """The optimum of an instance, as a field."""
-    return prove(make_instance("full", w_beta=1.0), norm=1, jobs=1).field
+    return prove(make_instance("full", skew_coefficient=1.0), norm=1, jobs=1).field
 
 
 def test_a_solver_that_is_given_the_optimum_has_no_worse_point(best):

@@ -51,7 +51,7 @@ def test_the_same_drawing_gives_the_same_report(tmp_path, capsys):
 
 def test_the_angles_are_those_of_fields_made_without_the_curve():
     """Each curve by hand: strokes of one number taken out, a greedy field, the nearer line."""
-    instance = cf.sample("mouse", 16, w_strokes=10.0)
+    instance = cf.sample("mouse", 16, stroke_weight=10.0)
     found = cf.evaluate(instance, sketch="mouse", methods=["greedy"], curves=2)
     assert found.document()["instance"]["stroke_weight"] == 10.0
     assert (found.drawn, cf.evaluate(instance, methods=["greedy"], curves=2).drawn) == (True, False)

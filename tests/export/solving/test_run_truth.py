@@ -31,13 +31,13 @@ def test_stages_are_all_the_time_whatever_is_rounded():
 
 @pytest.mark.slow
 def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
-    instance = cf.sample("mouse", 8, w_strokes=10)
+    instance = cf.sample("mouse", 8, stroke_weight=10)
     given = [
         "run",
         "mouse",
         "--size",
         "8",
-        "--w-strokes",
+        "--stroke-weight",
         "10",
         "--time-limit",
         "0.5",
@@ -51,7 +51,7 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
         "sha256": instance.sha256,
         "w_strokes": 30.0,
         "stroke_weight": 10.0,
-        "w_beta": instance.w_beta,
+        "w_beta": instance.skew_coefficient,
     }
     rows = {row["method"]: row for row in told["methods"]}
     assert rows["start"]["energy_2_norm"] == first_field(instance).energy(2).total

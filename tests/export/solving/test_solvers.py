@@ -39,17 +39,21 @@ SOLVED = {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
 TWO_NORM = ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact")
 
 
-def one_pixel(gauge, w_beta):
+def one_pixel(gauge, skew_coefficient):
     mask, theta = np.ones((1, 1), dtype=bool), np.array([2 * np.pi / 3])
-    return cf.Instance("pixel", mask, np.array([[0, 0]]), theta, np.ones(1), gauge=gauge, w_beta=w_beta)
+    return cf.Instance(
+        "pixel", mask, np.array([[0, 0]]), theta, np.ones(1), gauge=gauge, skew_coefficient=skew_coefficient
+    )
 
 
-def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, w_beta=1e-2):
+def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, skew_coefficient=1e-2):
     rng = np.random.default_rng(seed)
     mask = np.ones((height, width), dtype=bool)
     pixels = np.argwhere(rng.random(mask.shape) < strokes)
     theta, w = rng.uniform(0, np.pi, len(pixels)), rng.uniform(0.2, 1, len(pixels))
-    return cf.Instance(f"random_{seed}", mask, pixels, theta, w, gauge=gauge, w_beta=w_beta)
+    return cf.Instance(
+        f"random_{seed}", mask, pixels, theta, w, gauge=gauge, skew_coefficient=skew_coefficient
+    )
 
 
 def formulated(instance, name, *, relax=False):
@@ -71,11 +75,11 @@ def residual_rows(instance, p):
     for at, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
         r = np.zeros(2 * grid.size)
         r[at] = r[grid.size + at] = 1
-        rows, sides, weights = [*rows, r], [*sides, theta], [*weights, instance.w_strokes * w]
+        rows, sides, weights = [*rows, r], [*sides, theta], [*weights, instance.stroke_coefficient * w]
     for at in range(grid.size):
         r = np.zeros(2 * grid.size)
         r[grid.size + at] = 1
-        rows, sides, weights = [*rows, r], [*sides, 0.0], [*weights, instance.w_beta]
+        rows, sides, weights = [*rows, r], [*sides, 0.0], [*weights, instance.skew_coefficient]
     return np.array(rows), np.array(sides), np.array(weights)
 
 
@@ -120,14 +124,14 @@ def by_enumeration(instance, inner):
 def test_one_pixel_has_the_optimum_of_the_hand_calculation(solver, gauge):
     """Stroke at 120 degrees in the box: alpha = pi/2.
 
-    There beta minimises (pi/2 + beta - theta)^2 + w_beta beta^2.
+    There beta minimises (pi/2 + beta - theta)^2 + skew_coefficient beta^2.
     """
-    w_beta = 1e-2
-    problem = cf.formulate(one_pixel(gauge, w_beta), "qp-fixed", p=np.zeros(0, int))
+    skew_coefficient = 1e-2
+    problem = cf.formulate(one_pixel(gauge, skew_coefficient), "qp-fixed", p=np.zeros(0, int))
     solution = cf.solve(problem, solver)
     misfit = np.pi / 6
-    alpha, beta = (np.pi / 2, misfit / (1 + w_beta)) if gauge == "box" else (2 * np.pi / 3, 0.0)
-    least = misfit**2 * w_beta / (1 + w_beta) if gauge == "box" else 0.0
+    alpha, beta = (np.pi / 2, misfit / (1 + skew_coefficient)) if gauge == "box" else (2 * np.pi / 3, 0.0)
+    least = misfit**2 * skew_coefficient / (1 + skew_coefficient) if gauge == "box" else 0.0
     assert solution.status in SOLVED
     assert solution.objective == pytest.approx(least, abs=2e-8)
     assert solution.field.alpha[0] + solution.field.beta[0] == pytest.approx(alpha + beta, abs=1e-4)
@@ -155,7 +159,7 @@ def test_two_pixels_with_exchanged_lines_meet_with_jump_one(name, solver):
     b = 0.3
     mask, pixels = np.ones((1, 2), dtype=bool), np.array([[0, 0], [0, 1]])
     instance = cf.Instance(
-        "pair", mask, pixels, np.array([b, np.pi / 2 - b]), np.ones(2), gauge="box", w_beta=0
+        "pair", mask, pixels, np.array([b, np.pi / 2 - b]), np.ones(2), gauge="box", skew_coefficient=0
     )
     solution = cf.solve(cf.formulate(instance, name), solver)
     assert solution.objective == pytest.approx(0, abs=1e-6)

@@ -261,7 +261,8 @@ def test_blocks_leave_no_seam_in_any_format(name, writer, monkeypatch):
 @pytest.mark.parametrize("value", [9.9e-10, -1e-12, 5e-324, 1e15, -1e20, math.inf, math.nan])
 def test_extreme_coefficients_are_refused(value):
     with pytest.raises(
-        UnsupportedByFormatError, match=r"row family c14 has the coefficient .*: make .*w_strokes or w_beta"
+        UnsupportedByFormatError,
+        match=r"row family c14 has the coefficient .*: make .*stroke weight or the skew weight",
     ):
         check_coefficients(np.array([1.0, value]), "row family c14")
     with pytest.raises(UnsupportedByFormatError):
@@ -277,9 +278,9 @@ def test_ordinary_coefficients_pass():
 @for_each(
     "name, weights",
     [
-        ("milp-mccormick", {"w_beta": 5e-10}),
-        ("milp-mccormick", {"w_strokes": 1e-11}),
-        ("qp-fixed", {"w_strokes": 1e-11}),
+        ("milp-mccormick", {"skew_coefficient": 5e-10}),
+        ("milp-mccormick", {"stroke_coefficient": 1e-11}),
+        ("qp-fixed", {"stroke_coefficient": 1e-11}),
     ],
 )
 def test_extreme_weights_are_refused(name, weights, suffix, tmp_path):
@@ -289,7 +290,7 @@ def test_extreme_weights_are_refused(name, weights, suffix, tmp_path):
 
 
 def test_a_small_weight_that_is_added_to_others_is_no_coefficient(tmp_path):
-    write(make_problem("qp-fixed", make_instance(w_beta=5e-10)), tmp_path / "x.lp")
+    write(make_problem("qp-fixed", make_instance(skew_coefficient=5e-10)), tmp_path / "x.lp")
     assert " + 8.000000001 beta_00_01 ^2\n" in (tmp_path / "x.lp").read_text()
 
 

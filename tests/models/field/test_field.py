@@ -20,12 +20,18 @@ MOVES = {
 }
 
 
-def pixels(mask, theta, gauge="strokes", w_beta=1e-6):
+def pixels(mask, theta, gauge="strokes", skew_coefficient=1e-6):
     """An instance whose pixels [row, column] in theta (a dict, degrees) are strokes of weight 1."""
     places = sorted(theta)
     angles = np.radians([theta[place] for place in places])
     return Instance(
-        "hand", np.array(mask, bool), places, angles, np.ones(len(places)), gauge=gauge, w_beta=w_beta
+        "hand",
+        np.array(mask, bool),
+        places,
+        angles,
+        np.ones(len(places)),
+        gauge=gauge,
+        skew_coefficient=skew_coefficient,
     )
 
 
@@ -76,7 +82,9 @@ def test_odd_jump_changes_the_sign_of_the_first_beta():
 
 
 def test_weights_scale_the_stroke_and_the_skew_term():
-    instance = Instance("hand", [[True]], [[0, 0]], [1.0], [0.5], w_strokes=3.0, w_beta=2.0)
+    instance = Instance(
+        "hand", [[True]], [[0, 0]], [1.0], [0.5], stroke_coefficient=3.0, skew_coefficient=2.0
+    )
     energy = CrossField(instance, [0.7], [0.1], []).energy()
     assert (energy.smooth, energy.strokes, energy.beta) == pytest.approx((0, 3 * 0.5 * 0.04, 2 * 0.01))
 

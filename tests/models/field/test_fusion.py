@@ -39,7 +39,7 @@ def test_prices_beyond_32_bits_are_as_good_as_infinite():
     """Beside an energy of 7, strokes of the greatest weight that are half a radian off."""
     theta = np.full((8, 14), np.nan)
     theta[2:6, [1, 12]] = 0.3
-    good = greedy(replace(sketch(np.ones(theta.shape, bool), theta), w_strokes=MOST_WEIGHT))
+    good = greedy(replace(sketch(np.ones(theta.shape, bool), theta), stroke_coefficient=MOST_WEIGHT))
     bump = np.hypot(good.instance.grid.rows - 4, good.instance.grid.columns - 6.5) < 2
     off = np.zeros(len(bump))
     off[good.instance.stroke_index[-2:]] = 0.5

@@ -154,10 +154,16 @@ def test_two_pixels_by_hand():
 # optima
 
 
-def one_pixel(gauge, w_beta):
+def one_pixel(gauge, skew_coefficient):
     theta = np.array([2 * np.pi / 3])
     return Instance(
-        "one", np.ones((1, 1), bool), np.array([[0, 0]]), theta, np.ones(1), w_beta=w_beta, gauge=gauge
+        "one",
+        np.ones((1, 1), bool),
+        np.array([[0, 0]]),
+        theta,
+        np.ones(1),
+        skew_coefficient=skew_coefficient,
+        gauge=gauge,
     )
 
 
@@ -192,7 +198,7 @@ def test_two_pixels_solved():
 @pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
 def test_parallel_strokes_and_two_families_cost_nothing(degrees):
     """Strokes of one direction, or of two at any angle, are met by one constant cross;
-    the hint of skew costs w_beta.
+    the hint of skew costs skew_coefficient.
     """
     pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
     theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
@@ -209,7 +215,13 @@ def sketch(gauge="strokes", seed=4):
     pixels = np.array([[0, 0], [1, 2], [2, 1]])
     theta = rng.uniform(0, np.pi, 3)
     return Instance(
-        "sketch", np.ones((3, 3), bool), pixels, theta, rng.uniform(0.3, 1, 3), w_beta=1e-3, gauge=gauge
+        "sketch",
+        np.ones((3, 3), bool),
+        pixels,
+        theta,
+        rng.uniform(0.3, 1, 3),
+        skew_coefficient=1e-3,
+        gauge=gauge,
     )
 
 
@@ -234,7 +246,7 @@ def test_the_box_forces_skew_and_depends_on_the_axes():
     """Strokes at 120 degrees everywhere: free of cost, unless the box holds alpha below 90 degrees."""
     pixels = np.argwhere(np.ones((2, 2)))
     instance = Instance(
-        "steep", np.ones((2, 2), bool), pixels, np.full(4, np.radians(120)), np.ones(4), w_beta=1e-2
+        "steep", np.ones((2, 2), bool), pixels, np.full(4, np.radians(120)), np.ones(4), skew_coefficient=1e-2
     )
     assert optimum(instance) == pytest.approx(0, abs=1e-9)
     boxed = instance.with_gauge("box")
@@ -268,7 +280,7 @@ def corner(gauge):
         pixels,
         theta,
         np.array([1, 0.9, 0.6]),
-        w_beta=1e-2,
+        skew_coefficient=1e-2,
         gauge=gauge,
     )
 
@@ -295,10 +307,10 @@ def square_optimum(instance, p):
     for i, theta, w in zip(instance.stroke_index, instance.target, instance.w, strict=True):
         r = np.zeros(2 * count)
         r[i] = r[count + i] = 1
-        weight = np.sqrt(instance.w_strokes * w)
+        weight = np.sqrt(instance.stroke_coefficient * w)
         rows.append(weight * r)
         right.append(weight * theta)
-    rows += list(np.sqrt(instance.w_beta) * np.eye(2 * count)[count:])
+    rows += list(np.sqrt(instance.skew_coefficient) * np.eye(2 * count)[count:])
     right += [0.0] * count
     low = np.concatenate([instance.alpha_lower, np.full(count, -QUARTER)])
     high = np.concatenate([instance.alpha_upper, np.full(count, QUARTER)])
@@ -324,10 +336,10 @@ def absolute_optimum(instance, p):
         row[i] = row[count + i] = 1
         rows.append(row)
         right.append(theta)
-        cost.append(instance.w_strokes * w)
+        cost.append(instance.stroke_coefficient * w)
     rows += list(np.eye(2 * count)[count:])
     right += [0.0] * count
-    cost += [instance.w_beta] * count
+    cost += [instance.skew_coefficient] * count
     size = len(rows)
     bounds = [
         *zip(instance.alpha_lower, instance.alpha_upper, strict=True),

@@ -17,7 +17,7 @@ def smallest(name):
     """
     for size in range(5, 24):
         try:
-            instance = cf.sample(name, size, w_strokes=0.2)  # some 1 on these grids, as in the paper
+            instance = cf.sample(name, size, stroke_weight=0.2)  # some 1 on these grids, as in the paper
         except cf.CrossfieldError:  # the outline leaves no room on so coarse a grid
             continue
         if len(instance.theta) >= 3:

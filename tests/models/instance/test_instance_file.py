@@ -25,8 +25,8 @@ def instance():
         stroke_pixels=[[0, 0], [1, 1], [2, 2]],
         theta=[0.1, 1 / 3, 2.9],
         w=[1.0, 0.1, 2 / 3],
-        w_strokes=0.5,
-        w_beta=1e-7,
+        stroke_coefficient=0.5,
+        skew_coefficient=1e-7,
         gauge="box",
         source='a "quoted" sketch.svg, Größe',
         pixel_size=2.5,
@@ -52,7 +52,7 @@ def test_instance_comes_back_and_gives_the_same_bytes(instance, tmp_path, suffix
     first = write_instance(instance, tmp_path / f"one.{suffix}")
     back = read_instance(first)
     assert same_instance(instance, back)
-    for name in ("name", "gauge", "source", "w_strokes", "w_beta", "pixel_size", "origin"):
+    for name in ("name", "gauge", "source", "stroke_coefficient", "skew_coefficient", "pixel_size", "origin"):
         assert getattr(back, name) == getattr(instance, name)
     second = write_instance(back, tmp_path / f"two.{suffix}")
     assert first.read_bytes() == second.read_bytes()
@@ -69,7 +69,7 @@ def test_json_needs_only_name_mask_and_strokes(tmp_path):
     }
     path.write_text(json.dumps(document))
     instance = read_instance(path)
-    assert (instance.gauge, instance.w_strokes, instance.w_beta, instance.pixel_size) == (
+    assert (instance.gauge, instance.stroke_coefficient, instance.skew_coefficient, instance.pixel_size) == (
         "strokes",
         1,
         1e-6,
@@ -99,7 +99,7 @@ def without(key):
         (change("source", "\ud800"), "source holds"),
         (change("w_strokes", -1), "$.w_strokes: -1 is less than the minimum of 0"),
         (change("w_beta", "1"), "$.w_beta: '1' is not of type 'number'"),
-        (change("w_beta", float("nan")), "w_beta is nan"),
+        (change("w_beta", float("nan")), "skew_coefficient is nan"),
         (change("w_beta", 10**400), "beyond the range of doubles"),
         (change("pixel_size", 0), "$.pixel_size"),
         (change("pixel_size", True), "$.pixel_size"),

@@ -56,12 +56,14 @@ def test_the_mean_cost_of_a_rounded_cross_is_at_most_its_own():
     """Stroke and skew at random crosses of one pixel; thresholds of alpha and beta are independent."""
     rng = np.random.default_rng(1)
     for _ in range(40):
-        theta, slope, w_beta = (
+        theta, slope, skew_coefficient = (
             rng.uniform(0, np.pi),
             rng.choice([-1, 0, 1, rng.uniform(-1, 1)]),
             rng.uniform(),
         )
-        instance = Instance("one", np.ones((1, 1), bool), [[0, 0]], [theta], [1.0], w_beta=w_beta)
+        instance = Instance(
+            "one", np.ones((1, 1), bool), [[0, 0]], [theta], [1.0], skew_coefficient=skew_coefficient
+        )
         field = cf.CrossField(instance, [rng.uniform(0, 3)], [0.0], [])
         lattice = CommonLattice.near(field, np.array([slope]), int(rng.choice([2, 4, 16])))
         rows, columns = lattice.alpha_count[0], lattice.beta_count[0]
@@ -75,7 +77,7 @@ def test_the_mean_cost_of_a_rounded_cross_is_at_most_its_own():
         at, skew = alpha[0, 0] + lattice.h * x, beta[0, 0] + lattice.h * y
         turned = np.array([at + skew, at + HALF - skew]) - theta
         misfit = np.abs(turned - np.pi * np.round(turned / np.pi)).min(axis=0)
-        assert (mean <= misfit + w_beta * np.abs(skew) + 1e-12).all()
+        assert (mean <= misfit + skew_coefficient * np.abs(skew) + 1e-12).all()
 
 
 def test_any_multipliers_bound_the_energy_in_a_box():

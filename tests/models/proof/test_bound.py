@@ -28,7 +28,8 @@ def small(seed):
     at = np.argwhere(mask)[np.sort(rng.permutation(mask.sum())[: rng.integers(1, 1 + mask.sum())])]
     return Instance(
         "small", mask, at, rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at)),
-        w_beta=float(rng.choice([0, 1e-6, 1])), w_strokes=float(rng.choice([0.1, 1, 1000])),
+        skew_coefficient=float(rng.choice([0, 1e-6, 1])),
+        stroke_coefficient=float(rng.choice([0.1, 1, 1000])),
     )  # fmt: skip
 
 
@@ -38,7 +39,7 @@ def discrete(lattice):
     angles = [
         [a[s:e] for a in lattice.angles] for s, e in zip(lattice.start, lattice.start[1:], strict=False)
     ]
-    unary = [instance.w_beta * (beta**2 - h * h / 4) for _, beta in angles]
+    unary = [instance.skew_coefficient * (beta**2 - h * h / 4) for _, beta in angles]
     for pixel, theta, w in zip(instance.stroke_index, instance.theta, instance.w, strict=True):
         alpha, beta = angles[pixel]
         centre = lattice.alpha[pixel] + lattice.beta[pixel] - theta
@@ -49,7 +50,7 @@ def discrete(lattice):
             lost = np.where(steps == 0, 0, np.where(abs(steps) == 1, 1, 0.5)) if own else 0.5
             lines.append((alpha + beta - theta + turn) ** 2 - lost * h * h)
             lines.append((alpha + HALF - beta - theta + turn) ** 2 - h * h / 2)
-        unary[pixel] = unary[pixel] + instance.w_strokes * w * np.min(lines, axis=0)
+        unary[pixel] = unary[pixel] + instance.stroke_coefficient * w * np.min(lines, axis=0)
     pairs = []
     for i, j in zip(grid.first, grid.second, strict=True):
         (ai, bi), (aj, bj) = angles[i], angles[j]
@@ -97,7 +98,7 @@ def test_no_bound_exceeds_the_least_labelling_and_trees_reach_it():
             assert max(bounds) <= exact + scale
             assert (np.diff(bounds) >= -scale).all()
             assert dual.bound() <= exact
-            close = 1e-6 * (1 + energy + instance.w_strokes)  # the shares are as large as that
+            close = 1e-6 * (1 + energy + instance.stroke_coefficient)  # the shares are as large as that
             assert dual.bound() == pytest.approx(bounds[-1], abs=close)
             tree = len(instance.grid.first) < instance.grid.size
             if tree:
@@ -129,7 +130,7 @@ def test_threads_change_no_bit():
 
 @pytest.mark.slow
 def test_the_bound_of_mouse_is_that_of_the_prototype():
-    instance = cf.sample("mouse", 24, w_strokes=1.0, w_beta=1e-6)
+    instance = cf.sample("mouse", 24, stroke_weight=1.0, skew_weight=1e-6)
     field = cf.search(instance, rounds=8, jobs=2).field
     assert field.energy().total == pytest.approx(5.014402, abs=1e-6)
     with crew(2) as hands:

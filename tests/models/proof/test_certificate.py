@@ -124,10 +124,10 @@ def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path
 @pytest.mark.parametrize(
     "change",
     [
-        {"w_beta": 0.0},
-        {"w_beta": 1.0},
-        {"w_strokes": 0.1},
-        {"w_strokes": 1000.0},
+        {"skew_coefficient": 0.0},
+        {"skew_coefficient": 1.0},
+        {"stroke_coefficient": 0.1},
+        {"stroke_coefficient": 1000.0},
         {"gauge": "box"},
         {"mask": np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)},
         {"mask": np.array([[1, 0, 1], [1, 0, 1], [1, 0, 0]], bool)},
@@ -335,7 +335,7 @@ def test_a_proof_for_another_instance_is_refused(second, written, tmp_path):
     """The instance shown would be the other one, and the instance checked the one that was proven."""
     path, arrays = written(1)
     shown = json.loads(arrays["instance_head"].tobytes()) | {"w_beta": 0.5}
-    instance = replace(proven(1).field.instance, w_beta=0.5)
+    instance = replace(proven(1).field.instance, skew_coefficient=0.5)
     members = members_of(path.read_bytes())
     text = np.frombuffer(json.dumps(shown).encode(), np.uint8)
     other = tmp_path / "other.npz"
@@ -429,7 +429,11 @@ def free_energy(instance, alpha, beta):
     at = instance.stroke_index
     lines = np.stack([alpha + beta, alpha + np.pi / 2 - beta])[:, at] - instance.target
     away = np.min(np.abs(lines - np.pi * np.round(lines / np.pi)), axis=0)
-    return pairs.sum() + instance.w_strokes * (instance.w @ away**2) + instance.w_beta * (beta @ beta)
+    return (
+        pairs.sum()
+        + instance.stroke_coefficient * (instance.w @ away**2)
+        + instance.skew_coefficient * (beta @ beta)
+    )
 
 
 def test_whatever_the_messages_are_what_a_level_says_of_every_pixel_is_true(written):

@@ -11,7 +11,7 @@ from crossfield.models.search.search import search as search_patches
 
 def test_a_search_is_never_above_what_a_short_proof_finds():
     """Without a round of search: all fields of the bent cylinder that it starts from have the wrong jumps."""
-    instance = replace(cf.sample("cylinder_bend", 22), w_strokes=1.0, w_beta=1e-6)
+    instance = replace(cf.sample("cylinder_bend", 22), stroke_coefficient=1.0, skew_coefficient=1e-6)
     patches = search_patches(instance, rounds=0, jobs=1).field.energy().total
     one, two = (cf.search(instance, rounds=0, jobs=jobs).field for jobs in (1, 2))
     assert two.energy().total < 2.631 < 2.739 < patches

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.numeric
 
 def test_shares_that_are_carried_on_rise_faster():
     """Half as many passes lead further than passes alone."""
-    lattice = Lattice.whole(first_field(cf.sample("ring", 24, w_strokes=1.0)), 16)
+    lattice = Lattice.whole(first_field(cf.sample("ring", 24, stroke_weight=1.0)), 16)
     with crew(1) as hands:
         carried, plain = Dual(lattice, hands), Dual(lattice, hands)
         for _ in range(30):

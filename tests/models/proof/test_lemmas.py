@@ -68,8 +68,8 @@ def misfit(instance, alpha, beta):
     turns = np.arange(-4, 5)[:, None] * np.pi
     at = instance.stroke_index
     lines = np.concatenate([alpha[at] + beta[at] + turns, alpha[at] + HALF - beta[at] + turns])
-    cost = instance.w_beta * beta**2
-    cost[at] += instance.w_strokes * instance.w * np.min((lines - instance.target) ** 2, axis=0)
+    cost = instance.skew_coefficient * beta**2
+    cost[at] += instance.stroke_coefficient * instance.w * np.min((lines - instance.target) ** 2, axis=0)
     return cost
 
 

@@ -42,7 +42,7 @@ def weighted(seed, **weights):
 
 @pytest.mark.parametrize(
     "weights",
-    [{"w_beta": w} for w in (0.0, 1e-6, 1.0)] + [{"w_strokes": w} for w in (0.1, 1000.0)],
+    [{"skew_coefficient": w} for w in (0.0, 1e-6, 1.0)] + [{"stroke_coefficient": w} for w in (0.1, 1000.0)],
     ids=str,
 )
 @pytest.mark.slow
@@ -112,7 +112,7 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 
 def test_limits_end_a_proof_with_what_it_has():
-    instance = cf.sample("bottle", 12, w_strokes=0.5)
+    instance = cf.sample("bottle", 12, stroke_weight=0.5)
     told = []
     some = cf.prove(instance, gap=0.5, progress=lambda *what: told.append(what))
     assert some.ended == "gap"
@@ -141,7 +141,7 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
 @pytest.mark.slow
 def test_a_stroke_that_either_line_may_carry_leaves_no_gap():
     """At the end one box goes over an edge of its window, however fine the lattice."""
-    instance = weighted(3, w_strokes=0.1)
+    instance = weighted(3, stroke_coefficient=0.1)
     proof = cf.prove(instance, jobs=1)
     assert proof.status == "optimal"
     assert proof.forced == len(instance.grid.first)

@@ -21,14 +21,14 @@ pytestmark = pytest.mark.numeric
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def random_instance(seed, shape=None, gauge="box", w_beta=1e-3):
+def random_instance(seed, shape=None, gauge="box", skew_coefficient=1e-3):
     rng = np.random.default_rng(seed)
     mask = rng.random(rng.integers(1, 8, 2)) < 0.8 if shape is None else np.ones(shape, bool)
     mask[0, 0] = True
     at = np.argwhere(mask)
     at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(max(1, len(at) // 2))])]
     theta, w = rng.uniform(0, np.pi, len(at)), 1 - rng.random(len(at))
-    return Instance("random", mask, at, theta, w, w_beta=w_beta, gauge=gauge)
+    return Instance("random", mask, at, theta, w, skew_coefficient=skew_coefficient, gauge=gauge)
 
 
 def random_field(instance, seed):
@@ -44,9 +44,9 @@ def gradient(field):
     instance, grid = field.instance, field.instance.grid
     a, b = 4 * field.residual_a, 4 * field.residual_b
     r = np.zeros(grid.size)
-    r[instance.stroke_index] = 2 * instance.w_strokes * instance.w * field.residual_r
+    r[instance.stroke_index] = 2 * instance.stroke_coefficient * instance.w * field.residual_r
     sign = (-1.0) ** field.p
-    of_alpha, of_beta = r.copy(), r + 2 * instance.w_beta * field.beta
+    of_alpha, of_beta = r.copy(), r + 2 * instance.skew_coefficient * field.beta
     np.add.at(of_alpha, grid.first, a)
     np.add.at(of_alpha, grid.second, -a)
     np.add.at(of_beta, grid.first, sign * b)
@@ -65,7 +65,7 @@ def assert_optimal(field):
     assert (x <= upper).all()
     slope = gradient(field)
     moves = np.where(slope > 0, x > lower, x < upper)
-    scale = 1 + HALF * 4 * np.abs(field.p).max(initial=0) + np.pi * instance.w_strokes
+    scale = 1 + HALF * 4 * np.abs(field.p).max(initial=0) + np.pi * instance.stroke_coefficient
     assert np.abs(slope[moves]).max(initial=0) < 1e-9 * scale
     return int(np.sum(~moves))
 
@@ -92,10 +92,16 @@ def test_random_jumps_are_fitted_to_the_optimum(seed, gauge):
     assert best.energy().total <= field.energy().total
 
 
-@given(seed=SEEDS, w_beta=st.sampled_from([0, 1e-6, 1]), w_strokes=st.sampled_from([0, 1e-6, 1, 100]))
+@given(
+    seed=SEEDS,
+    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
+    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100]),
+)
 @settings(deadline=None)
-def test_any_weights_will_do(seed, w_beta, w_strokes):
-    instance = replace(random_instance(seed), w_beta=w_beta, w_strokes=w_strokes)
+def test_any_weights_will_do(seed, skew_coefficient, stroke_coefficient):
+    instance = replace(
+        random_instance(seed), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
+    )
     assert_optimal(fitted(random_field(instance, seed)))
 
 
@@ -128,12 +134,12 @@ def test_same_energy_as_bounded_dense_least_squares(seed):
 def residuals(instance, x, p):
     """All residuals times the roots of their weights."""
     field = CrossField(instance, *np.split(x, 2), p)
-    root = np.sqrt(instance.w_strokes * instance.w)
+    root = np.sqrt(instance.stroke_coefficient * instance.w)
     parts = (
         np.sqrt(2) * field.residual_a,
         np.sqrt(2) * field.residual_b,
         root * field.residual_r,
-        np.sqrt(instance.w_beta) * field.beta,
+        np.sqrt(instance.skew_coefficient) * field.beta,
     )
     return np.concatenate(parts)
 
@@ -162,14 +168,16 @@ def test_same_optimum_as_ipopt_on_the_file(name, size):
 def test_one_pixel_in_the_box_of_the_paper():
     instance = Instance("one", [[True]], [[0, 0]], [2 * np.pi / 3], [1.0], gauge="box")
     field = fitted(CrossField(instance, [0.1], [0.2], []))
-    # beta = (theta - alpha) / (1 + w_beta), and alpha leans on its bound.
+    # beta = (theta - alpha) / (1 + skew_coefficient), and alpha leans on its bound.
     assert field.alpha.tolist() == [HALF]
     assert field.beta == pytest.approx([np.pi / 6 / (1 + 1e-6)], rel=1e-12)
 
 
 def test_pair_with_a_jump_between_two_strokes():
     # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
-    instance = Instance("two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], w_beta=0)
+    instance = Instance(
+        "two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], skew_coefficient=0
+    )
     field = fitted(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
     assert field.energy().total == pytest.approx(0, abs=1e-18)
     assert field.alpha + field.beta == pytest.approx([0.3, 0.3 + HALF])
@@ -178,7 +186,7 @@ def test_pair_with_a_jump_between_two_strokes():
 def test_angles_stay_where_the_energy_does_not_say():
     mask = np.ones((3, 9), bool)
     mask[:, 4] = False
-    instance = Instance("parts", mask, [[0, 0]], [0.7], [1.0], w_beta=0)
+    instance = Instance("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
     rng = np.random.default_rng(0)
     given = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
     field = fitted(given)
@@ -208,7 +216,7 @@ def test_optimum_without_jumps_is_that_of_the_transposed_sketch():
     mask = np.ones((7, 9), bool)
     at = np.argwhere(mask)[::5]
     theta = np.random.default_rng(1).uniform(-QUARTER, 3 * QUARTER, len(at))
-    instance = Instance("any", mask, at, theta, np.ones(len(at)), w_beta=1e-3, gauge="box")
+    instance = Instance("any", mask, at, theta, np.ones(len(at)), skew_coefficient=1e-3, gauge="box")
     energies = []
     for each in (instance, instance.transposed()):
         zero = np.zeros(each.grid.size)
@@ -232,10 +240,12 @@ def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
     assert again.beta.tobytes() == found.beta.tobytes()
 
 
-@for_each("w_strokes", [0, 1])
-@for_each("w_beta", [0, 1e-6])
-def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(w_beta, w_strokes):
-    instance = replace(random_instance(7, (5, 5)), w_beta=w_beta, w_strokes=w_strokes)
+@for_each("stroke_coefficient", [0, 1])
+@for_each("skew_coefficient", [0, 1e-6])
+def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(skew_coefficient, stroke_coefficient):
+    instance = replace(
+        random_instance(7, (5, 5)), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
+    )
     assert_optimal(pinned(random_field(instance, 7)))
 
 

@@ -60,17 +60,17 @@ def test_parallel_strokes_give_a_constant_field(solve, degrees):
     assert np.abs(field.beta).max() < 1e-3
 
 
-@for_each("w_beta", [0, 1e-9, 1e-6])
+@for_each("skew_coefficient", [0, 1e-9, 1e-6])
 @for_each("first", [0, 77, 130])
 @for_each("between", [15, 30, 44, 50, 60, 90, 100, 130, 155])
-def test_two_families_give_a_constant_skewed_field(first, between, w_beta):
+def test_two_families_give_a_constant_skewed_field(first, between, skew_coefficient):
     theta = np.full((7, 7), np.nan)
     theta[2, :] = np.radians(first)
     theta[3:, 4] = np.radians(first + between)
-    field = first_field(sketch(np.ones((7, 7), bool), theta, w_beta))
-    # Both norms vanish with w_beta; the constant field of these lines is the bound for the 2-norm.
-    assert field.energy(2).total < 1e-12 + 49 * w_beta * QUARTER**2
-    assert field.energy(1).total < 1e-6 + 200 * w_beta
+    field = first_field(sketch(np.ones((7, 7), bool), theta, skew_coefficient))
+    # Both norms vanish with skew_coefficient; the constant field of these lines is the bound for the 2-norm.
+    assert field.energy(2).total < 1e-12 + 49 * skew_coefficient * QUARTER**2
+    assert field.energy(1).total < 1e-6 + 200 * skew_coefficient
     assert np.degrees(field.angle_between) == pytest.approx(min(between, 180 - between), abs=0.01)
 
 
@@ -164,10 +164,16 @@ def test_answers_are_inside_all_bounds(solve, seed, gauge):
     assert np.isfinite(field.energy().total)
 
 
-@given(seed=SEEDS, w_beta=st.sampled_from([0, 1e-6, 1]), w_strokes=st.sampled_from([0, 1e-6, 1, 100]))
+@given(
+    seed=SEEDS,
+    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
+    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100]),
+)
 @settings(deadline=None)
-def test_any_weights_will_do(seed, w_beta, w_strokes):
-    instance = replace(random_instance(seed), w_beta=w_beta, w_strokes=w_strokes)
+def test_any_weights_will_do(seed, skew_coefficient, stroke_coefficient):
+    instance = replace(
+        random_instance(seed), skew_coefficient=skew_coefficient, stroke_coefficient=stroke_coefficient
+    )
     assert_feasible(greedy(instance))
     assert_feasible(power_field(instance))
 
@@ -241,7 +247,7 @@ def test_mostly_equal_to_the_optimum_over_all_jumps():
         rng = np.random.default_rng(seed)
         theta = np.full((3, 3), np.nan)
         theta.flat[rng.permutation([0, 1, 2, 3, 5, 6, 7, 8])[:3]] = rng.uniform(0, np.pi, 3)
-        instance = sketch(ring, theta, w_beta=1e-3)
+        instance = sketch(ring, theta, skew_coefficient=1e-3)
         ratio.append(greedy(instance).energy().total / exact(instance))
     ratio = np.array(ratio)
     assert (ratio > 1 - 1e-6).all()
@@ -253,7 +259,7 @@ def test_three_blocks_against_all_jumps():
     theta[0, 0], theta[2, 2] = 0.2, 1.4
     mask = np.ones((3, 3), bool)
     mask[0, 2] = False
-    instance = sketch(mask, theta, w_beta=1e-3)
+    instance = sketch(mask, theta, skew_coefficient=1e-3)
     assert greedy(instance).energy().total == pytest.approx(exact(instance), rel=1e-6)
 
 
@@ -293,10 +299,10 @@ def test_dense_least_squares_agree_with_the_energy_of_a_field():
     assert least <= min(field.energy().total for field in fields)
 
 
-@pytest.mark.parametrize("w_beta", [0.0, 1e-6, 1e6])
-def test_the_greatest_weights_are_solved(w_beta):
+@pytest.mark.parametrize("skew_coefficient", [0.0, 1e-6, 1e6])
+def test_the_greatest_weights_are_solved(skew_coefficient):
     for instance in (sample("mouse", 8), Instance("one", [[True]], [[0, 0]], [2.0], [1.0])):
-        heavy = replace(instance, w_strokes=1e6, w_beta=w_beta)
+        heavy = replace(instance, stroke_coefficient=1e6, skew_coefficient=skew_coefficient)
         for field in (greedy(heavy), power_field(heavy), search(heavy, rounds=1).field):
             assert np.isfinite(field.energy().total)
         assert np.abs(greedy(heavy).residual_r).max() < 1e-3

@@ -50,8 +50,8 @@ def odd_instance(seed):
         at,
         rng.uniform(0, np.pi) + spread * rng.random(len(at)),
         10.0 ** rng.uniform(rng.choice([-12, -3, 0]), 0, len(at)),
-        w_strokes=float(rng.choice(WEIGHTS)),
-        w_beta=float(rng.choice(WEIGHTS)),
+        stroke_coefficient=float(rng.choice(WEIGHTS)),
+        skew_coefficient=float(rng.choice(WEIGHTS)),
         gauge=str(rng.choice(GAUGES)),
     )
 

@@ -50,7 +50,7 @@ def gentle(seed):
     rng = np.random.default_rng(seed)
     theta = np.where(rng.random((4, 5)) < 0.4, 1.0 + 0.2 * rng.random((4, 5)), np.nan)
     theta[0, 0] = 1.0
-    return sketch(np.ones((4, 5), bool), theta, w_beta=0.1)
+    return sketch(np.ones((4, 5), bool), theta, skew_coefficient=0.1)
 
 
 @given(seed=SEEDS)
@@ -204,7 +204,7 @@ def test_search_ends_by_itself_when_nothing_is_found():
     found = cf.search(instance)
     assert found.ended == "patience"
     # Crosses of one skew cost nothing but that: 25 pixels, beta^2 = 0.18.
-    assert found.field.energy().total < 5 * instance.w_beta
+    assert found.field.energy().total < 5 * instance.skew_coefficient
 
 
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
@@ -315,7 +315,7 @@ def test_a_constant_field_stays_constant_on_finer_grids():
     coarse = halved(fine)
     assert coarse.mask.shape == (5, 4)
     field = prolonged(first_field(coarse), fine)
-    assert field.energy().total < fine.grid.size * fine.w_beta
+    assert field.energy().total < fine.grid.size * fine.skew_coefficient
     assert not len(field.singularities.index)
 
 
@@ -337,13 +337,13 @@ def test_crossing_strokes_leave_no_coarse_stroke():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("w_beta", [0.0, 1e-6])
-def test_parts_without_strokes_and_free_skews_do_no_harm(w_beta):
+@pytest.mark.parametrize("skew_coefficient", [0.0, 1e-6])
+def test_parts_without_strokes_and_free_skews_do_no_harm(skew_coefficient):
     mask = np.ones((6, 11), bool)
     mask[:, 5] = False
     theta = np.full(mask.shape, np.nan)
     theta[:, 1], theta[2, 2:5], theta[4, 3] = 0.3, 1.2, 2.5
-    found = cf.search(sketch(mask, theta, w_beta=w_beta), rounds=4).field
+    found = cf.search(sketch(mask, theta, skew_coefficient=skew_coefficient), rounds=4).field
     assert found.energy().total <= first_field(found.instance).energy().total + 1e-9
     assert found.image(found.pixel_energy)[:, 6:] == pytest.approx(np.zeros((6, 5)), abs=1e-12)
 

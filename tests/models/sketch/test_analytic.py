@@ -163,7 +163,7 @@ def extrapolated(instance, rounds=30):
             (np.r_[root, root], (np.r_[np.arange(s), np.arange(s)], np.r_[at, n + at])), (s, 2 * n)
         )
         k = coo_matrix(
-            (np.full(n, np.sqrt(instance.w_beta / 2)), (np.arange(n), n + np.arange(n))), (n, 2 * n)
+            (np.full(n, np.sqrt(instance.skew_coefficient / 2)), (np.arange(n), n + np.arange(n))), (n, 2 * n)
         )
         system = vstack([a, b, r, k]).tocsc()
         right = np.r_[-np.pi / 2 * p, np.zeros(m), root * instance.theta, np.zeros(n)]

@@ -50,15 +50,17 @@ def bend_energy(field, hold=HOLD):
                     total += (np.cos(v) * ux + np.sin(v) * uy) ** 2 / 4
                     total += (np.cos(u) * vx + np.sin(u) * vy) ** 2 / 4
     pairs = [du**2 + dv**2 for (_, side), (du, dv) in at.items() if side in {"right", "up"}]
-    strokes = instance.w_strokes * np.sum(instance.w * field.stroke_deviation**2)
-    return total + 2 * HARMONIC * sum(pairs) + hold * strokes + instance.w_beta * np.sum(field.beta**2)
+    strokes = instance.stroke_coefficient * np.sum(instance.w * field.stroke_deviation**2)
+    return (
+        total + 2 * HARMONIC * sum(pairs) + hold * strokes + instance.skew_coefficient * np.sum(field.beta**2)
+    )
 
 
 @for_each("degrees", [(0, 90), (20, 110), (100, 40), (135, 100), (179, 60)])
 def test_constant_crosses_stay(degrees):
     theta = np.full((6, 7), np.nan)
     theta[:, 1], theta[:, 5] = np.radians(degrees)
-    instance = replace(sketch(np.ones((6, 7), bool), theta), w_beta=0)
+    instance = replace(sketch(np.ones((6, 7), bool), theta), skew_coefficient=0)
     angles = [np.full(42, np.radians(angle)) for angle in degrees]
     field = bend_field(cf.CrossField.from_lines(instance, *angles))
     assert field.cross_error(*angles) == pytest.approx(np.zeros(42), abs=1e-9)
@@ -71,7 +73,7 @@ def test_the_energy_falls_and_the_singularities_stay(name):
 
     The greedy field of light strokes lies far from strokes that are then held harder.
     """
-    start, hold = cf.greedy(replace(cf.sample(name, 16), w_strokes=1)), 1.5
+    start, hold = cf.greedy(replace(cf.sample(name, 16), stroke_coefficient=1)), 1.5
     field = bend_field(start, harmonic=HARMONIC, hold=hold)
     assert bend_energy(field, hold) < 0.8 * bend_energy(start, hold)
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
@@ -104,12 +106,16 @@ def test_labels_do_not_matter():
 @given(
     seed=st.integers(0, 2**32 - 1),
     gauge=st.sampled_from(["strokes", "box"]),
-    w_beta=st.sampled_from([0, 1e-6, 1]),
-    w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
+    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
+    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
 )
 @settings(max_examples=30, deadline=None)
-def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
-    instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
+def test_any_weights_will_do(seed, gauge, skew_coefficient, stroke_coefficient):
+    instance = replace(
+        random_instance(seed, gauge=gauge),
+        skew_coefficient=skew_coefficient,
+        stroke_coefficient=stroke_coefficient,
+    )
     field = bend_field(polyvector_field(instance))
     assert (field.alpha >= instance.alpha_lower).all()
     assert (field.alpha <= instance.alpha_upper).all()
@@ -151,7 +157,7 @@ def test_a_heavier_hold_keeps_the_strokes():
 
 
 def test_a_heavy_weight_of_skew_makes_right_angles():
-    instance = cf.sample("mouse", 16, w_beta=1e4)
+    instance = cf.sample("mouse", 16, skew_weight=1e4)
     assert line_difference(*lines(bend_field(cf.greedy(instance)))) == pytest.approx(HALF, abs=1e-2)
 
 

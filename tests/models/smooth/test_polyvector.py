@@ -37,7 +37,7 @@ def test_parallel_strokes_give_right_angles_along_them(degrees):
 def test_two_families_at_any_angle_are_exact(degrees):
     theta = np.full((8, 8), np.nan)
     theta[:, 1], theta[:, 5] = np.radians(100), np.radians(100 - degrees)
-    field = polyvector_field(sketch(np.ones((8, 8), bool), theta, w_beta=0))
+    field = polyvector_field(sketch(np.ones((8, 8), bool), theta, skew_coefficient=0))
     assert field.energy().total < 1e-9
     assert field.cross_error(
         np.full(64, np.radians(100)), np.full(64, np.radians(100 - degrees))
@@ -58,12 +58,16 @@ def test_the_field_moves_with_the_sketch(name):
 @given(
     seed=SEEDS,
     gauge=st.sampled_from(["strokes", "box"]),
-    w_beta=st.sampled_from([0, 1e-6, 1]),
-    w_strokes=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
+    skew_coefficient=st.sampled_from([0, 1e-6, 1]),
+    stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100, 1e6]),
 )
 @settings(deadline=None)
-def test_any_weights_will_do(seed, gauge, w_beta, w_strokes):
-    instance = replace(random_instance(seed, gauge=gauge), w_beta=w_beta, w_strokes=w_strokes)
+def test_any_weights_will_do(seed, gauge, skew_coefficient, stroke_coefficient):
+    instance = replace(
+        random_instance(seed, gauge=gauge),
+        skew_coefficient=skew_coefficient,
+        stroke_coefficient=stroke_coefficient,
+    )
     field = polyvector_field(instance)
     assert (field.alpha >= instance.alpha_lower).all()
     assert (field.alpha <= instance.alpha_upper).all()
@@ -119,7 +123,9 @@ def test_the_search_begins_where_the_polyvector_field_leads():
 def test_one_pixel_under_the_heaviest_strokes_is_solved():
     """Its system has one equation for two unknowns, which a heavy weight must not drown the pull of."""
     for theta in np.linspace(0, 3.1, 40):
-        one = Instance("one", [[True]], [[0, 0]], [theta], [1.0], w_strokes=1e6, w_beta=0.0)
+        one = Instance(
+            "one", [[True]], [[0, 0]], [theta], [1.0], stroke_coefficient=1e6, skew_coefficient=0.0
+        )
         for hold in HOLDS:
             found = polyvector_field(one, hold=hold)
             assert found.stroke_deviation.max() < 1e-6
