@@ -34,7 +34,6 @@ def modules() -> list[Path]:
 
 
 @cache
-@cache
 def said(path: Path) -> str:
     """Comments and docstrings of a module; all of a page or layout."""
     text = path.read_text(encoding="utf-8")

@@ -188,6 +188,7 @@ def test_the_recommendation_follows_the_rows(study):
     assert study.practice_page.recommendation(nothing) == ["The ways to a field are not measured yet."]
 
 
+@pytest.mark.slow
 def test_every_planned_run_is_another_one_and_the_instances_are_the_same_again(study):
     runs = [run for stage in study.plan.stages(study.plan.QUICK, None) for run in stage.runs]
     assert len({run.key for run in runs}) == len(runs) > 200
@@ -200,6 +201,7 @@ def test_every_planned_run_is_another_one_and_the_instances_are_the_same_again(s
     assert found == [instances.made(name, 4).sha256 for name in names]
 
 
+@pytest.mark.slow
 def test_the_page_is_made_from_the_rows_beside_it(study):
     """Rows that a study has added since come after those."""
     page, kept = (DOCS / "study.md").read_text(), study.page.read(DATA)
