@@ -79,11 +79,14 @@ def pytest_collection_modifyitems(config, items):
         if item.get_closest_marker("needs"):
             item.add_marker("oracles")
     slow = sum("slow" in item.keywords for item in items)
+    long = {item.path for item in items if "slow" in item.keywords}
     result = yield
     reasons = [_absent(item) for item in items]
     config.hook.pytest_deselected(items=[item for item, reason in zip(items, reasons, strict=True) if reason])
     items[:] = [item for item, reason in zip(items, reasons, strict=True) if not reason]
     config.stash[LEFT_OUT] = dict(Counter(filter(None, reasons)))
+    # Workers take whole files in this order; long files at the end would keep one of them busy alone.
+    items.sort(key=lambda item: item.path not in long)
     if slow and config.option.markexpr == "not slow" and not config.option.keyword:
         config.stash[LEFT_OUT]["slow; run them with -m slow"] = slow
     return result
