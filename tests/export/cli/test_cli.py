@@ -350,7 +350,7 @@ def test_what_should_not_happen_is_one_line_too(tmp_path, instance_file):
     )
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.count("\n") == 1
-    assert "please report it: ZeroDivisionError" in done.stderr
+    assert "internal error, please report it: ZeroDivisionError" in done.stderr
 
 
 # Quiet, JSON, tables, progress

@@ -2,12 +2,13 @@
 
 import re
 import typing
+from dataclasses import fields
 
 import pytest
 import typer
-from crossfield.export.cli import options
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.cli.help_texts import NAMES, Command, filled
+from crossfield.export.cli.sketch_options import SketchOptions
 from crossfield.export.formats.registry import FORMATS
 from crossfield.models.formulations.declaration import FACETS
 from crossfield.models.instance.instance import GAUGES
@@ -90,16 +91,18 @@ def test_every_table_in_a_help_is_named_there():
     assert filled("{size}, at most") == f"{DEFAULT_SIZE}, at most"
 
 
-def test_choices_are_those_of_the_models_and_of_the_formats():
-    chosen = {
-        options.GaugeName: GAUGES,
-        options.Facet: FACETS,
-        options.GamsLayout: FORMATS["gms"].dialects,
-        options.NlForm: FORMATS["nl"].dialects,
-    }
-    for option, table in chosen.items():
-        (literal, _) = typing.get_args(typing.get_args(option)[0])
-        assert typing.get_args(literal) == tuple(table)
+def test_choices_are_those_of_the_models_and_of_the_formats(text):
+    shown = words(text("export"))
+    for table in (GAUGES, FACETS, FORMATS["gms"].dialects, FORMATS["nl"].dialects):
+        assert re.search(rf"[<\[]{re.escape('|'.join(table))}[>\]]", shown), table
+
+
+def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
+    names = [f"--{field.name.replace('_', '-')}" for field in fields(SketchOptions)]
+    for command in ("run", "instance", "export", "solve", "prove", "evaluate", "shade"):
+        shown = re.findall(r"--[a-z-]+", text(command))
+        begin = shown.index(names[0])
+        assert [name for name in shown[begin:] if name in names] == names, command
 
 
 def test_commands_are_listed_in_the_order_of_their_use():

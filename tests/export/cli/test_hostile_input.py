@@ -1,4 +1,4 @@
-"""Inputs made to cost time, memory or trust: each is read or refused, at no more than its size asks for."""
+"""Malicious and damaged inputs: each is read or refused in time and memory in proportion to its size."""
 
 import io
 import json
@@ -453,8 +453,9 @@ def test_output_degrades_where_the_terminal_has_no_unicode(tmp_path):
     (tmp_path / "Skizze – 図.svg").write_text(SVG.format(STROKES))
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     program = (
-        "from crossfield.export.cli.output import degrade, say, complain, show_table\n"
-        "degrade(); say('12.3°'); complain('12.3°'); show_table('°', ('|β|',), [['1.4°']])"
+        "from crossfield.export.cli.output import escape_unencodable, print_line, print_notice, show_table\n"
+        "escape_unencodable(); print_line('12.3°'); print_notice('12.3°')\n"
+        "show_table('°', ('|β|',), [['1.4°']])"
     )
     done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, env=environment)
     assert done.returncode == 0
@@ -466,7 +467,7 @@ def test_output_degrades_where_the_terminal_has_no_unicode(tmp_path):
         done = subprocess.run(
             [*command, "-o", tmp_path / output], check=False, capture_output=True, env=environment
         )
-        assert (done.returncode, b"should not happen" in done.stderr) == (code, False)
+        assert (done.returncode, b"internal error" in done.stderr) == (code, False)
         assert done.stdout + done.stderr
 
 
