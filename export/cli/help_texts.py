@@ -66,6 +66,8 @@ class Command(TyperCommand):
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
+        if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed
+            return
         self.help = escape(self.help or "")
         for parameter in self.params:
             if text := getattr(parameter, "help", None):

@@ -71,10 +71,11 @@ def test_the_help_names_what_the_tables_have_within_80_columns(text):
             assert missing == [], (command, table)
 
 
-def test_brackets_in_a_help_are_shown(text):
-    """Rich takes `[word]` for markup unless it is escaped."""
+@pytest.mark.parametrize("markup", ["rich", None])
+def test_brackets_in_a_help_are_shown(text, markup):
+    """Rich parses `[word]` as markup unless it is escaped; other modes print the escape."""
     assert "the table [release] of its specification" in words(text("library release"))
-    toy = typer.Typer()
+    toy = typer.Typer(rich_markup_mode=markup)
 
     @toy.command(cls=Command)
     def toy_command(option: typing.Annotated[str, typer.Option(help="A [bold] word.")] = "x") -> None:
