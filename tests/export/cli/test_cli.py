@@ -123,13 +123,13 @@ RUN_FILES = {
 def two_parts(tmp_path_factory):
     """Folder of a run on a sketch whose mask has two parts, and its exit code, output and errors.
 
-    On six pixels and with a small weight the MILP and the proof end long before the time limit.
+    On eight pixels and with a small weight the MILP is solved long before the time limit.
     """
     folder = tmp_path_factory.mktemp("run")
     sketch, mask = Image.new("L", (60, 40), 255), Image.new("L", (60, 40), 0)
     for line in ((5, 5, 55, 35), (5, 35, 55, 5), (8, 3, 8, 37)):
         ImageDraw.Draw(sketch).line(line, fill=0, width=3)
-    for box in ((0, 0, 20, 39), (40, 0, 59, 39)):
+    for box in ((0, 0, 19, 19), (40, 20, 59, 39)):
         ImageDraw.Draw(mask).rectangle(box, fill=255)
     sketch.save(folder / "cross.png")
     mask.save(folder / "mask.png")
