@@ -31,6 +31,7 @@ from .options import (
     FormulationOptions,
     Gap,
     Gzip,
+    Input,
     Jobs,
     Json,
     Kind,
@@ -47,7 +48,6 @@ from .options import (
     Title,
     Tolerance,
     Underlay,
-    What,
 )
 from .output import (
     INTERRUPTED,
@@ -103,7 +103,7 @@ def root(
 
 @command("run")
 def run_command(
-    what: What,
+    source: Input,
     output: Folder,
     *,
     sketch: SketchOptions,
@@ -126,7 +126,7 @@ def run_command(
     limits = Limits(time_limit, gap, threads)
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(what, quiet=printing.quiet)
+        instance = sketch.instance(source, quiet=printing.quiet)
     if not (printing.quiet or printing.as_json):
         print_line(plan(limits))
     with progress(quiet=printing.quiet) as show:
@@ -136,7 +136,7 @@ def run_command(
             limits=limits,
             options={"facet": facet},
             dialects=dialects.chosen(),
-            drawing=drawing_of(what),
+            drawing=drawing_of(source),
             jobs=jobs,
             progress=show,
         )
@@ -146,7 +146,7 @@ def run_command(
 
 
 @command("instance")
-def instance_command(what: What, output: Output, *, sketch: SketchOptions, quiet: Quiet = False) -> None:
+def instance_command(source: Input, output: Output, *, sketch: SketchOptions, quiet: Quiet = False) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
 
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
@@ -158,7 +158,7 @@ def instance_command(what: What, output: Output, *, sketch: SketchOptions, quiet
     require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(what, quiet=quiet)
+        instance = sketch.instance(source, quiet=quiet)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     if not quiet:
         print_line(f"{output}: {instance.summary}")
@@ -166,7 +166,7 @@ def instance_command(what: What, output: Output, *, sketch: SketchOptions, quiet
 
 @command("export")
 def export_command(
-    what: What,
+    source: Input,
     output: Folder,
     *,
     formulation: FormulationNames = None,
@@ -193,7 +193,7 @@ def export_command(
     formats = known(file_format or list(DEFAULTS), FORMATS, "format")
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(what, quiet=printing.quiet)
+        instance = sketch.instance(source, quiet=printing.quiet)
         field, proof = read_start(start, instance), None
         if tightened is not None:
             show("checking the certificate")
@@ -262,7 +262,7 @@ def read_command(
 
 @command("draw")
 def draw_command(
-    what: FieldOrInstance,
+    source: FieldOrInstance,
     output: Output,
     *,
     on: On = None,
@@ -280,7 +280,7 @@ def draw_command(
     require_suffix(output, tuple(SUFFIXES))
     with progress(quiet=quiet) as show:
         show("reading")
-        subject = field_or_instance(what, on)
+        subject = field_or_instance(source, on)
         show("drawing")
         draw(subject, output, kind=kind, over=underlay, title=title)
     if not quiet:

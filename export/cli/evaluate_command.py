@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .inputs import known
-from .options import Curves, MethodNames, PrintOptions, ReportFolder, SecondsPerField, What
+from .options import Curves, Input, MethodNames, PrintOptions, ReportFolder, SecondsPerField
 from .output import print_line, print_notice, progress, show_table
 from .sketch_options import SketchOptions
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def evaluate_command(
-    what: What,
+    source: Input,
     output: ReportFolder = None,
     *,
     method: MethodNames = None,
@@ -38,8 +38,8 @@ def evaluate_command(
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         found = evaluate(
-            sketch.instance(what, quiet=printing.quiet),
-            sketch=what,
+            sketch.instance(source, quiet=printing.quiet),
+            sketch=source,
             curvature=sketch.curvature or (),
             view=sketch.view,
             methods=methods,

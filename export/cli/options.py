@@ -40,11 +40,11 @@ def _between(least: int, what: str) -> Callable[[int], int]:
 
 # Input and output
 
-What = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_KINDS_OF_SKETCH}")]
-WhatIfAny = Annotated[
+Input = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_KINDS_OF_SKETCH}")]
+OptionalInput = Annotated[
     str | None, typer.Argument(metavar="[SKETCH|SAMPLE|INSTANCE]", help=f"One of: {_KINDS_OF_SKETCH}")
 ]
-FieldOrWhat = Annotated[
+FieldOrInput = Annotated[
     str,
     typer.Argument(
         metavar="FIELD|SKETCH|SAMPLE|INSTANCE",

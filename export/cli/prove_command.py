@@ -10,7 +10,7 @@ import typer
 
 from ...models.errors import SolverError
 from .inputs import read_start
-from .options import Check, Norm, PrintOptions, ProofFolder, ProofGap, SecondsOfProof, Start, WhatIfAny
+from .options import Check, Norm, OptionalInput, PrintOptions, ProofFolder, ProofGap, SecondsOfProof, Start
 from .output import print_line, print_notice, progress, show_facts
 from .sketch_options import SketchOptions
 
@@ -25,7 +25,7 @@ UNPROVEN: Final = "unproven"
 
 
 def prove_command(
-    what: WhatIfAny = None,
+    source: OptionalInput = None,
     output: ProofFolder = None,
     *,
     norm: Norm = 2,
@@ -42,18 +42,18 @@ def prove_command(
     Ctrl-C ends the search or the check, and keeps all that is proven so far.
     """
     if check is not None:
-        if what is not None or output is not None:
+        if source is not None or output is not None:
             raise typer.BadParameter("give --check FILE alone: the certificate contains the instance")
         _check(check, printing)
         return
-    if what is None or output is None:
+    if source is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.processes.deadline import Deadline
     from ...models.proof.prove import prove
 
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(what, quiet=printing.quiet)
+        instance = sketch.instance(source, quiet=printing.quiet)
         deadline = Deadline.after(time_limit)
         proof = prove(
             instance,

@@ -10,7 +10,7 @@ from ...models.errors import InputError, shortened
 from ...models.processes.progress import Progress
 from .inputs import SAVED, drawing_of, field_or_instance, known
 from .options import (
-    FieldOrWhat,
+    FieldOrInput,
     Flip,
     Folder,
     Hints,
@@ -37,7 +37,7 @@ FIELD: Final = "field.npz"
 
 
 def shade_command(
-    what: FieldOrWhat,
+    source: FieldOrInput,
     output: Folder,
     *,
     flip: Flip = False,
@@ -64,16 +64,16 @@ def shade_command(
     hints, lamp = hints_of(hint), light_of(light)
     with progress(quiet=printing.quiet) as show:
         show("reading")
-        field, candidate = _saved(what, on), None
+        field, candidate = _saved(source, on), None
         if field is None:
-            instance = sketch.instance(what, quiet=printing.quiet)
+            instance = sketch.instance(source, quiet=printing.quiet)
             candidate = _made(instance, method, output, time_limit, show)
-            field, underlay = candidate.field, underlay or drawing_of(what)
+            field, underlay = candidate.field, underlay or drawing_of(source)
         elif sketch.given or method is not None:
             raise InputError(
                 "is a field, which has its own grid, strokes and weights; omit --method and the options that"
                 " read a sketch",
-                file=what,
+                file=source,
             )
         found = surface(field, hints, flip=flip, progress=show)
         about = _about(candidate, hints, lamp, flip=flip)
@@ -86,11 +86,11 @@ def shade_command(
         print_notice("interrupted; the surface is that of the best field so far")
 
 
-def _saved(what: str, on: Path | None) -> CrossField | None:
+def _saved(source: str, on: Path | None) -> CrossField | None:
     """Field in a file; None for a sketch, sample or instance. Raises InputError."""
     from ...models.field.field import CrossField
 
-    path = Path(what)
+    path = Path(source)
     if on is None and not (path.is_file() and path.suffix.lower() in SAVED):
         return None
     found = field_or_instance(path, on)

@@ -15,13 +15,13 @@ from .options import (
     FormulationName,
     FormulationOptions,
     Gap,
+    Input,
     MethodName,
     PrintOptions,
     SecondsInAll,
     SolverName,
     Start,
     Threads,
-    What,
 )
 from .output import print_line, print_notice, progress, show_facts
 from .sketch_options import SketchOptions
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def solve_command(
-    what: What,
+    source: Input,
     output: Folder,
     *,
     formulation: FormulationName = None,
@@ -60,7 +60,7 @@ def solve_command(
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
     with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        instance = sketch.instance(what, quiet=printing.quiet)
+        instance = sketch.instance(source, quiet=printing.quiet)
         request = Request(
             instance,
             output,
