@@ -1,6 +1,5 @@
 """The commands.
 
-The verbs, their options and tables, progress and one-line errors. A verb calls one function of another folder
-and shows what comes back.
-Nothing imports from here.
+Commands, their options and tables, progress and one-line errors. Each command calls one function of another
+folder and prints the result. No other folder imports this one.
 """

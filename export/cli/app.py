@@ -1,8 +1,8 @@
-"""The command line: the verbs of the package, with progress, tables, exit codes and one-line errors.
+"""The command line: all commands, exit codes and one-line errors.
 
-Exit codes: 0 fine, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far, and
-a run with a report of what there is: that is fine too, and said on standard error. Where there is nothing to
-keep, the exit code is 1. Heavy libraries are imported inside the commands.
+Exit codes: 0 success, 1 the request failed, 2 wrong usage. Ctrl-C ends a search with the best field so far,
+and a run with a report of the fields so far: exit code 0, with a notice on standard error. If there is no
+result to keep, the exit code is 1. Heavy libraries are imported inside the commands.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -19,55 +18,44 @@ import typer
 from ...models.errors import CrossfieldError, InputError, shortened
 from .evaluate_command import evaluate_command
 from .help_texts import Command
-from .inputs import (
-    SAVED,
-    choice_of,
-    drawing_of,
-    field_or_instance,
-    formulations_of,
-    known,
-    load,
-    options_of,
-    require_suffix,
-)
+from .inputs import SAVED, drawing_of, field_or_instance, formulations_of, known, read_start, require_suffix
 from .library_command import library
+from .option_groups import with_option_groups
 from .options import (
-    BetaNorm,
-    Curvature,
+    DialectOptions,
     Facet,
+    FieldOrInstance,
     Folder,
-    Formats,
-    GamsLayout,
+    FormatNames,
+    FormulationNames,
+    FormulationOptions,
     Gap,
-    GaugeName,
+    Gzip,
+    Input,
     Jobs,
     Json,
-    Mask,
-    Names,
-    NlForm,
+    Kind,
+    Manifest,
     On,
-    Outline,
     Output,
-    Over,
+    PrintOptions,
     Quiet,
-    Relax,
-    SecondsEach,
-    Size,
-    SkewWeight,
+    SecondsPerMethod,
+    SolutionFile,
     Start,
-    StrokeNorm,
-    StrokeWeight,
     Threads,
-    View,
-    What,
+    Tightened,
+    Title,
+    Tolerance,
+    Underlay,
 )
 from .output import (
     INTERRUPTED,
-    complain,
-    degrade,
+    escape_unencodable,
+    print_json,
+    print_line,
+    print_notice,
     progress,
-    say,
-    say_json,
     show_lists,
     show_manifests,
     show_report,
@@ -75,22 +63,26 @@ from .output import (
 )
 from .prove_command import prove_command
 from .shade_command import shade_command
-from .solve_command import solve_command, tell_solution
+from .sketch_options import SketchOptions
+from .solve_command import print_solution, solve_command
 from .verify_command import verify_command
 
 app = typer.Typer(
     name="crossfield",
-    help="Turn a concept sketch into an optimization problem in files for any solver, and a solver's answer"
-    " into a cross field: two line directions at every pixel.",
+    help="Write a concept sketch as optimization problems for any solver, and turn a solver's answer into a"
+    " cross field: two line directions at every pixel.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-command = partial(app.command, cls=Command)
+_STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
 
-_STOPPED: Final = 130  # how typer leaves after a Ctrl-C that no command caught
+
+def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorator that adds a function as a command of this name."""
+    return lambda function: app.command(name, cls=Command)(with_option_groups(function))
 
 
 @app.callback(invoke_without_command=True)
@@ -101,98 +93,64 @@ def root(
     ] = False,
     version: Annotated[bool, typer.Option("--version", help="Show the version.", is_eager=True)] = False,
 ) -> None:
-    """Options before the command; `invoke` looks at --debug."""
+    """Options before the command; `invoke` reads --debug."""
     if version:
         from importlib.metadata import version as installed
 
-        say(f"crossfield {installed('crossfield')}")
+        print_line(f"crossfield {installed('crossfield')}")
         raise typer.Exit
 
 
 @command("run")
 def run_command(
-    sketch: What,
+    source: Input,
     output: Folder,
     *,
-    size: Size = None,
-    mask: Mask = None,
-    silhouette: Outline = "none",
-    curvature: Curvature = None,
-    view: View = None,
-    gauge: GaugeName = None,
-    stroke_weight: StrokeWeight = None,
-    skew_weight: SkewWeight = None,
+    sketch: SketchOptions,
     facet: Facet = None,
-    time_limit: SecondsEach = 60.0,
+    time_limit: SecondsPerMethod = 60.0,
     gap: Gap = 1e-6,
     threads: Threads = 0,
     jobs: Jobs = 1,
-    gams_layout: GamsLayout = None,
-    nl_form: NlForm = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    dialects: DialectOptions,
+    printing: PrintOptions,
 ) -> None:
-    """Do everything for one sketch: write all solver files, try methods, keep a field, draw it.
+    """Do all steps for one sketch: write the solver files, try the methods, keep a field and draw it.
 
-    The methods are {methods}. The bend field is kept, and that of least 2-norm energy beside it.
-    report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
+    The methods are {methods}. The field of bend is kept; the field of minimum 2-norm energy is written too.
+    report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
     """
     from ..solving.limits import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            choice,
-            stroke_weight=stroke_weight,
-            skew_weight=skew_weight,
-            quiet=quiet,
-        )
-    if not (quiet or as_json):
-        say(plan(limits))
-    with progress(quiet=quiet) as show:
+        instance = sketch.instance(source, quiet=printing.quiet)
+    if not (printing.quiet or printing.as_json):
+        print_line(plan(limits))
+    with progress(quiet=printing.quiet) as show:
         report = run(
             instance,
             output,
             limits=limits,
             options={"facet": facet},
-            dialects=_dialects(gams_layout, nl_form),
-            drawing=drawing_of(sketch),
+            dialects=dialects.chosen(),
+            drawing=drawing_of(source),
             jobs=jobs,
             progress=show,
         )
-    if as_json:
-        say_json(report.document())
-    elif not quiet:
-        show_report(report, output)
+    printing.show(report.document(), lambda: show_report(report, output))
     if report.interrupted:
-        complain(f"interrupted: {report.interrupted}; the report says what there is")
+        print_notice(f"interrupted: {report.interrupted}; report.json lists the results so far")
 
 
 @command("instance")
-def instance_command(
-    sketch: What,
-    output: Output,
-    *,
-    size: Size = None,
-    mask: Mask = None,
-    silhouette: Outline = "none",
-    curvature: Curvature = None,
-    view: View = None,
-    gauge: GaugeName = None,
-    stroke_weight: StrokeWeight = None,
-    skew_weight: SkewWeight = None,
-    quiet: Quiet = False,
-) -> None:
+def instance_command(source: Input, output: Output, *, sketch: SketchOptions, quiet: Quiet = False) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
 
-    To a .png its mask is written, white where the field is wanted: to be painted, and given back by --mask.
+    With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
+    program and pass it to --mask.
     """
     from ...models.instance.file import write_instance
     from ..pictures.mask import write_mask
@@ -200,64 +158,32 @@ def instance_command(
     require_suffix(output, (".json", ".npz", ".png"))
     with progress(quiet=quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            choice,
-            stroke_weight=stroke_weight,
-            skew_weight=skew_weight,
-            quiet=quiet,
-        )
+        instance = sketch.instance(source, quiet=quiet)
         (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
     if not quiet:
-        say(f"{output}: {instance.summary}")
+        print_line(f"{output}: {instance.summary}")
 
 
 @command("export")
 def export_command(
-    instance: What,
+    source: Input,
     output: Folder,
     *,
-    formulation: Names = None,
-    file_format: Formats = None,
-    size: Size = None,
-    mask: Mask = None,
-    silhouette: Outline = "none",
-    curvature: Curvature = None,
-    view: View = None,
-    gauge: GaugeName = None,
-    stroke_weight: StrokeWeight = None,
-    skew_weight: SkewWeight = None,
-    facet: Facet = None,
-    stroke_norm: StrokeNorm = None,
-    beta_norm: BetaNorm = None,
-    relax: Relax = False,
+    formulation: FormulationNames = None,
+    file_format: FormatNames = None,
+    sketch: SketchOptions,
+    formulating: FormulationOptions,
     start: Start = None,
-    tightened: Annotated[
-        Path | None,
-        typer.Option(
-            "--tightened",
-            metavar="PROOF",
-            help="Certificate (.npz) on the same instance: windows of alpha and beta and ranges of jumps are"
-            " narrowed to what it leaves; qp-fixed takes its jumps. It is checked first.",
-        ),
-    ] = None,
-    gams_layout: GamsLayout = None,
-    nl_form: NlForm = None,
-    compress: Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")] = False,
+    tightened: Tightened = None,
+    dialects: DialectOptions,
+    compress: Gzip = False,
     jobs: Jobs = 1,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
 
-    Beside the files of each formulation lies its manifest (.manifest.json), which `crossfield read` needs to
-    read a solver's answer.
+    Each formulation also has a manifest (.manifest.json), which `crossfield read` needs.
     """
-    from ...models.field.file import read_field
     from ...models.proof.certificate import read_certificate
     from ...models.proof.tightening import windows_left
     from ..bundle.manifest import write_all
@@ -265,42 +191,29 @@ def export_command(
 
     formulations = formulations_of(formulation)
     formats = known(file_format or list(DEFAULTS), FORMATS, "format")
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        loaded = load(
-            instance,
-            size,
-            mask,
-            gauge,
-            choice,
-            stroke_weight=stroke_weight,
-            skew_weight=skew_weight,
-            quiet=quiet,
-        )
-        field = None if start is None else read_field(start, on=loaded)
-        proof = None
+        instance = sketch.instance(source, quiet=printing.quiet)
+        field, proof = read_start(start, instance), None
         if tightened is not None:
             show("checking the certificate")
-            proof = read_certificate(tightened, on=loaded)
+            proof = read_certificate(tightened, on=instance)
         manifests = write_all(
-            loaded,
+            instance,
             output,
             formulations,
             formats,
             start=field,
             jumps_of=None if proof is None else proof.field,
             windows=None if proof is None else windows_left(proof),
-            options=options_of(facet, stroke_norm, beta_norm, relax=relax),
-            dialects=_dialects(gams_layout, nl_form),
+            options=formulating.chosen(),
+            dialects=dialects.chosen(),
             compress=compress,
             jobs=jobs,
             progress=show,
         )
-    if as_json:
-        say_json([manifest.document for manifest in manifests])
-    elif not quiet:
-        show_manifests(manifests, output)
+    documents = [manifest.document for manifest in manifests]
+    printing.show(documents, lambda: show_manifests(manifests, output))
 
 
 command("solve")(solve_command)
@@ -310,40 +223,17 @@ command("evaluate")(evaluate_command)
 
 @command("read")
 def read_command(
-    solution: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SOLUTION",
-            help="A solution file of {answers}, plain or .gz; which of them is seen from its content.",
-        ),
-    ],
-    manifest: Annotated[
-        Path,
-        typer.Option(
-            "--manifest",
-            metavar="FILE",
-            help="The .manifest.json that `crossfield export` wrote beside the file that was solved.",
-        ),
-    ],
+    solution: SolutionFile,
+    manifest: Manifest,
     output: Output,
     *,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            "--tolerance",
-            metavar="X",
-            min=0,
-            help="How far the answer may break a row or a bound, and how far, relatively, its objective"
-            " may be off, before it is refused.",
-        ),
-    ] = 1e-5,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    tolerance: Tolerance = 1e-5,
+    printing: PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
 
-    Objective and violations are computed again from the instance. Where they contradict what the file claims,
-    or the solver says that its values are no answer, no field is written and the exit code is 1.
+    Objective and violations are computed again from the instance. If they contradict the file, or if the file
+    contains no valid answer, no field is written and the exit code is 1.
     """
     from ...models.errors import SolutionError
     from ...models.field.file import write_field
@@ -351,18 +241,19 @@ def read_command(
     from ..solutions.solution import read_solution
 
     require_suffix(output, SAVED)
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the solution")
         described = read_manifest(manifest)
         problem = described.problem()
         found = read_solution(solution, problem, held=described.held(problem), tolerance=tolerance)
         if found.point is None:
             raise InputError(
-                f"holds no point: {found.status}; {found.message or 'the solver says no more'}", file=solution
+                f"holds no point: {found.status}; {found.message or 'the solver gives no reason'}",
+                file=solution,
             )
         if not found.doubt:
             write_field(found.field, output)
-    tell_solution(found, None if found.doubt else output, quiet=quiet, as_json=as_json)
+    print_solution(found, output, printing)
     if found.doubt:
         raise SolutionError(
             f"{found.doubt}; no field was written (--tolerance X allows for more)", file=solution
@@ -371,43 +262,29 @@ def read_command(
 
 @command("draw")
 def draw_command(
-    what: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FIELD|INSTANCE", help="File of a field (.npz, .json, .rawfield) or an instance."
-        ),
-    ],
+    source: FieldOrInstance,
     output: Output,
     *,
     on: On = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            metavar="NAME",
-            help="{pictures}; by default layers for a field as SVG or --over a drawing, else what the file"
-            " holds.",
-        ),
-    ] = None,
-    over: Over = None,
-    title: Annotated[str | None, typer.Option("--title", help="A line above the picture.")] = None,
+    kind: Kind = None,
+    underlay: Underlay = None,
+    title: Title = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw a field or an instance as PNG, SVG or PDF.
 
-    A field as SVG has a layer for each of its parts, in the coordinates of the drawing: opened on top of it,
-    it fits.
+    A field as SVG has one layer for each of its parts, in the coordinates of the drawing.
     """
     from ..pictures.draw import SUFFIXES, draw
 
     require_suffix(output, tuple(SUFFIXES))
     with progress(quiet=quiet) as show:
         show("reading")
-        subject = field_or_instance(what, on)
+        subject = field_or_instance(source, on)
         show("drawing")
-        draw(subject, output, kind=kind, over=over, title=title)
+        draw(subject, output, kind=kind, over=underlay, title=title)
     if not quiet:
-        say(str(output))
+        print_line(str(output))
 
 
 command("shade")(shade_command)
@@ -416,12 +293,12 @@ command("verify")(verify_command)
 
 @command("list")
 def list_command(*, as_json: Json = False) -> None:
-    """List formulations, formats, solvers and methods, and which go together."""
+    """List formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
     found = tables()
     if as_json:
-        say_json({name: rows for name, (_, rows) in found.items()})
+        print_json({name: rows for name, (_, rows) in found.items()})
     else:
         show_lists(found)
 
@@ -433,7 +310,7 @@ def samples_command(*, as_json: Json = False) -> None:
 
     rows = sample_rows()
     if as_json:
-        say_json(rows)
+        print_json(rows)
     else:
         show_samples(rows)
 
@@ -442,33 +319,33 @@ app.add_typer(library, name="library")
 
 
 def main() -> NoReturn:
-    """Run the command line and leave with its exit code; SIGTERM leaves nothing half done either."""
-    degrade()
-    logging.getLogger("PIL").addHandler(logging.NullHandler())  # an error is one line, and that is ours
+    """Run the command line and exit with its exit code; SIGTERM too removes files that are not complete."""
+    escape_unencodable()
+    logging.getLogger("PIL").addHandler(logging.NullHandler())  # every error is one line, printed by `invoke`
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(invoke(sys.argv[1:]))
 
 
 def invoke(arguments: list[str]) -> int:
-    """The exit code of a command line: 0 fine, 1 the request failed, 2 wrong usage; an error is one line.
+    """Run a command line and return its exit code: 0 success, 1 the request failed, 2 wrong usage.
 
-    With --debug the error itself is raised.
+    An error is printed as one line; with --debug it is raised.
     """
     try:
         app(arguments, prog_name="crossfield")
     except SystemExit as stop:
         if stop.code != _STOPPED:
             return int(stop.code or 0)
-        complain(INTERRUPTED)
+        print_notice(INTERRUPTED)
     except Exception as error:
         if "--debug" in arguments:
             raise
-        complain(_line(error))
+        print_notice(_line(error))
     return 1
 
 
 def _line(error: Exception) -> str:
-    """What is said of an error."""
+    """One line about an error."""
     if isinstance(error, CrossfieldError):
         return str(error)
     if isinstance(error, MemoryError):
@@ -477,8 +354,4 @@ def _line(error: Exception) -> str:
         what = (error.strerror or str(error)).lower()
         return f"{error.filename or 'a file'}: {what}; check the path and the free space"
     what = f"{type(error).__name__}: {shortened(error)}"
-    return f"this should not happen, please report it: {what} (crossfield --debug ... shows where)"
-
-
-def _dialects(gams_layout: str | None, nl_form: str | None) -> dict[str, str]:
-    return {name: value for name, value in (("gms", gams_layout), ("nl", nl_form)) if value}
+    return f"internal error, please report it: {what} (crossfield --debug ... shows the traceback)"

@@ -1,119 +1,60 @@
-"""The command `evaluate`: each curve of a drawing is hidden in turn, and the methods are asked for it."""
+"""The command `evaluate`: the error of methods on curves of a drawing that are hidden from them."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from .inputs import choice_of, known, load
-from .options import (
-    Curvature,
-    GaugeName,
-    Json,
-    Mask,
-    Outline,
-    Quiet,
-    Size,
-    SkewWeight,
-    StrokeWeight,
-    View,
-    What,
-)
-from .output import complain, progress, say, say_json, show_table
+from .inputs import known
+from .options import Curves, Input, MethodNames, PrintOptions, ReportFolder, SecondsPerField
+from .output import print_line, print_notice, progress, show_table
+from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
     from ..solving.evaluate import Evaluation
 
 
 def evaluate_command(
-    sketch: What,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for NAME.evaluation.json; else none."),
-    ] = None,
+    source: Input,
+    output: ReportFolder = None,
     *,
-    method: Annotated[
-        list[str] | None,
-        typer.Option(
-            "-m",
-            "--method",
-            metavar="NAME",
-            help="{methods}; {default methods} by default, may be repeated.",
-        ),
-    ] = None,
-    curves: Annotated[
-        int,
-        typer.Option("--curves", min=1, metavar="N", help="How many curves are hidden, the longest ones."),
-    ] = 8,
-    size: Size = None,
-    mask: Mask = None,
-    silhouette: Outline = "none",
-    curvature: Curvature = None,
-    view: View = None,
-    gauge: GaugeName = None,
-    stroke_weight: StrokeWeight = None,
-    skew_weight: SkewWeight = None,
-    time_limit: Annotated[
-        float,
-        typer.Option(
-            "--time-limit",
-            min=0.1,
-            metavar="SECONDS",
-            help="Seconds for each field of a method that searches: one for each hidden curve.",
-        ),
-    ] = 5.0,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    method: MethodNames = None,
+    curves: Curves = 8,
+    sketch: SketchOptions,
+    time_limit: SecondsPerField = 5.0,
+    printing: PrintOptions,
 ) -> None:
-    """Measure methods by curves that they were not shown: hide each curve of a drawing in turn.
+    """Measure methods on hidden curves: each curve of a drawing is hidden in turn.
 
-    The measure is the mean angle between a hidden curve and the nearer line of the field that was made from
-    the rest; crosses at random have 22.5 degrees. Ctrl-C keeps the curves done so far.
+    The measure is the mean angle between the hidden curve and the nearer line of the field computed from
+    the other curves. Random crosses have 22.5 degrees. Ctrl-C keeps the curves done so far.
     """
     from ..solving.evaluate import DEFAULT_METHODS, evaluate
     from ..solving.limits import Limits
     from ..solving.methods import METHODS
 
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        instance = load(
-            sketch,
-            size,
-            mask,
-            gauge,
-            choice,
-            stroke_weight=stroke_weight,
-            skew_weight=skew_weight,
-            quiet=quiet,
-        )
         found = evaluate(
-            instance,
-            sketch=sketch,
-            curvature=curvature or (),
-            view=view,
+            sketch.instance(source, quiet=printing.quiet),
+            sketch=source,
+            curvature=sketch.curvature or (),
+            view=sketch.view,
             methods=methods,
             curves=curves,
             limits=Limits(time_limit),
             progress=lambda line: show(f"{line}; Ctrl-C keeps the curves done"),
         )
     target = None if output is None else _write(found, output)
-    if as_json:
-        say_json(found.document())
-    elif not quiet:
-        _show(found)
-        if target is not None:
-            say(f"report: {target}")
+    printing.show(found.document(), lambda: _show(found, target))
     if found.interrupted:
-        complain("interrupted; the curves done so far were kept")
+        print_notice("interrupted; the curves done so far were kept")
 
 
 def _write(found: Evaluation, folder: Path) -> Path:
-    """The file that the evaluation now is in."""
+    """Write the evaluation to the folder; return the file."""
     from ...models.storage import make_folder, write_bytes
 
     target = make_folder(folder) / f"{found.instance.name}.evaluation.json"
@@ -121,8 +62,8 @@ def _write(found: Evaluation, folder: Path) -> Path:
     return target
 
 
-def _show(found: Evaluation) -> None:
-    """Print the angles, a row for each hidden curve, and below their mean, median and standard error."""
+def _show(found: Evaluation, target: Path | None) -> None:
+    """Print the angles, one row per hidden curve, with mean, median and standard error below."""
     rows = [
         [str(each.curve), str(each.pixels), *(_degrees(each.degrees.get(name)) for name in found.methods)]
         for each in found.curves
@@ -134,11 +75,13 @@ def _show(found: Evaluation) -> None:
     columns = ("hidden curve", "pixels", *found.methods)
     show_table(found.instance.summary, columns, rows, numbers=columns[1:])
     if not found.drawn:
-        say("nothing says what the curves are: they are chains of stroke pixels")
-    say("degrees between a hidden curve and the nearer line of the field; 22.5 at random")
+        print_line("the input has no curves: chains of stroke pixels are hidden instead")
+    print_line("degrees between a hidden curve and the nearer line of the field; 22.5 at random")
     for curve in found.curves:
         for name, reason in curve.failures.items():
-            complain(f"curve {curve.curve}, {name}: {reason}")
+            print_notice(f"curve {curve.curve}, {name}: {reason}")
+    if target is not None:
+        print_line(f"report: {target}")
 
 
 def _degrees(angle: float | None) -> str:

@@ -1,4 +1,4 @@
-"""Help that names what the tables have; a table is imported when a help that names it is shown."""
+"""Help texts with names from the tables, which are imported when a help text that needs them is shown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 def _of(
     module: str, table: str, chosen: Callable[[Any], Iterable[str]] = list
 ) -> Callable[[], Iterable[str]]:
-    """The names in a table of a module, or what is chosen of it, imported when they are asked for."""
+    """Function that imports a module and returns the names in one of its tables, or a choice of them."""
     return lambda: chosen(getattr(import_module(module, __package__), table))
 
 
@@ -34,7 +34,7 @@ NAMES: Final = {
     ),
     "run statuses": _of("..library.ledger.ledger", "RunStatus", get_args),
     "programs": _of("..solvers_table", "PROGRAMS"),
-    "answers": _of(  # a description begins with the program
+    "answers": _of(  # a description begins with the name of the program
         "..solutions.readers.registry",
         "READERS",
         lambda readers: dict.fromkeys(re.split(r"[ ,]", reader.description)[0] for reader in readers),
@@ -53,29 +53,31 @@ NAMES: Final = {
     ),
     "rungs": _of("..library.plan.spec", "RUNGS"),
 }
-"""What stands in braces in a help, and where its names come from."""
+"""Words in braces in help texts, and the function that returns the names for each."""
 
 
 def filled(text: str) -> str:
-    """The text with the names of each table that stands in braces."""
+    """The text with each word in braces replaced by the names of its table."""
     return re.sub(r"\{([a-z ]+)\}", lambda match: ", ".join(NAMES[match[1]]()), text)
 
 
 class Command(TyperCommand):
-    """A command whose help is filled from the tables when it is shown; brackets in it are no markup."""
+    """Command whose help is filled from the tables when it is shown; brackets are printed as they are."""
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
+        if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed
+            return
         self.help = escape(self.help or "")
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
                 parameter.help = escape(text)  # type: ignore[attr-defined]
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Fill the help of the command and of its parameters, then show it."""
+        """Fill the help texts of the command and of its parameters, then show them."""
         self.help = re.sub(
             r"(?<!\n)\n(?!\n)", " ", filled(self.help or "")
-        )  # lines of a docstring are no paragraphs
+        )  # a line break in a docstring begins no paragraph
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
                 parameter.help = filled(text)  # type: ignore[attr-defined]

@@ -10,7 +10,10 @@ import typer
 
 from .help_texts import Command
 from .options import Folder, Json, Processes, Quiet, Seconds
-from .output import complain, progress, say, say_json
+from .output import print_json as say_json
+from .output import print_line as say
+from .output import print_notice as complain
+from .output import progress
 
 library = typer.Typer(
     help="Build, check, solve and show a library: instances in every formulation, with best known points.",

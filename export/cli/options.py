@@ -1,191 +1,86 @@
-"""Arguments and options that several commands share; their help is filled from the tables in braces."""
+"""Arguments and options of the commands; names in braces are filled from the tables when help is shown."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
 import typer
 
 from ...models.errors import InputError
 from ...models.processes.side_by_side import MOST, checked
+from .output import print_json
+
+_KINDS_OF_SKETCH: Final = (
+    "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or an instance file"
+    " (.json, .npz)."
+)
+
+_folder = partial(typer.Option, "-o", "--output", metavar="DIR")
+_method = partial(typer.Option, "-m", "--method", metavar="NAME")
+_formulation = partial(typer.Option, "-f", "--formulation", metavar="NAME")
+_time_limit = partial(typer.Option, "--time-limit", min=0.1, metavar="SECONDS")
+_gap = partial(typer.Option, "--gap", min=0.0)
 
 
-def _permitted(count: int, what: str, least: int) -> int:
-    """The number, if so many threads or processes may be asked for."""
-    try:
-        return checked(count, what, least=least)
-    except InputError as error:
-        raise typer.BadParameter(str(error)) from error
+def _between(least: int, what: str) -> Callable[[int], int]:
+    """Check of a number of threads or processes, which raises BadParameter."""
+
+    def check(count: int) -> int:
+        try:
+            return checked(count, what, least=least)
+        except InputError as error:
+            raise typer.BadParameter(str(error)) from error
+
+    return check
 
 
-def _jobs(count: int) -> int:
-    return _permitted(count, "jobs", 1)
+# Input and output
 
-
-def _threads(count: int) -> int:
-    return _permitted(count, "threads", 0)
-
-
-What = Annotated[
+Input = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|INSTANCE", help=f"One of: {_KINDS_OF_SKETCH}")]
+OptionalInput = Annotated[
+    str | None, typer.Argument(metavar="[SKETCH|SAMPLE|INSTANCE]", help=f"One of: {_KINDS_OF_SKETCH}")
+]
+FieldOrInput = Annotated[
     str,
     typer.Argument(
-        metavar="SKETCH|SAMPLE|INSTANCE",
-        help="A drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or a file of"
-        " `instance`.",
+        metavar="FIELD|SKETCH|SAMPLE|INSTANCE",
+        help=f"A field (.npz, .json, .rawfield); or the input for a new field: {_KINDS_OF_SKETCH}",
     ),
 ]
-Folder = Annotated[
+FieldOrInstance = Annotated[
     Path,
-    typer.Option("-o", "--output", metavar="DIR", help="Folder for the files; made when it is not there."),
+    typer.Argument(
+        metavar="FIELD|INSTANCE", help="File of a field (.npz, .json, .rawfield) or of an instance."
+    ),
 ]
+SolutionFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SOLUTION",
+        help="Solution file of {answers}, plain or .gz; the kind is detected from the content.",
+    ),
+]
+Exported = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield export` wrote.")]
+Folder = Annotated[Path, _folder(help="Folder for the files; created if it does not exist.")]
+ProofFolder = Annotated[Path | None, _folder(help="Folder for field, certificate and report.")]
+ReportFolder = Annotated[Path | None, _folder(help="Folder for NAME.evaluation.json; none by default.")]
 Output = Annotated[
-    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix says what kind.")
+    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix selects the format.")
+]
+Manifest = Annotated[
+    Path,
+    typer.Option(
+        "--manifest",
+        metavar="FILE",
+        help="The .manifest.json file that `crossfield export` wrote next to the solved file.",
+    ),
 ]
 On = Annotated[
-    Path | None,
-    typer.Option("--on", metavar="INSTANCE", help="The instance (.npz, .json) of a .rawfield."),
-]
-Over = Annotated[
-    str | None,
-    typer.Option(
-        "--over",
-        metavar="DRAWING|SAMPLE",
-        help="Drawing or sample that the instance was read from; its strokes are drawn too. A .curves file is"
-        " seen as the instance records it.",
-    ),
-]
-Size = Annotated[
-    int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
-]
-Mask = Annotated[
-    Path | None,
-    typer.Option(
-        "--mask", metavar="FILE", help="Picture as large as the sketch, white where the field is wanted."
-    ),
-]
-Outline = Annotated[
-    Literal["none", "outer"],
-    typer.Option(
-        "--silhouette",
-        help="What runs along the outline of the drawing carries no direction (outer), or all curvature lines"
-        " do (none).",
-    ),
-]
-Curvature = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--curvature",
-        metavar="LABEL",
-        help="Strokes that are curvature lines, such as colour=red, class=flow, id=group2, layer=Flow (SVG)"
-        " or cluster=3 (.scap); the others cut the field. May be repeated; red ones among others by default.",
-    ),
-]
-View = Annotated[
-    str | None,
-    typer.Option(
-        "--view",
-        metavar="VIEW",
-        help="From where a .curves file is seen: front, side, top, or azimuth and elevation in degrees as in"
-        " 30,25; by default where the strokes reach farthest.",
-    ),
-]
-GaugeName = Annotated[
-    Literal["strokes", "box"] | None,
-    typer.Option(
-        "--gauge",
-        help="The 90 degrees in which the angle alpha may lie: round the stroke in each pixel (strokes,"
-        " exact), or 0 to 90 as the paper prints it (box).",
-    ),
-]
-StrokeWeight = Annotated[
-    float | None,
-    typer.Option(
-        "--stroke-weight",
-        metavar="X",
-        help="Weight of the distance from the strokes, 0 to {most weight}, the same on every grid; by default"
-        " {stroke weight}, or that of the instance file.",
-    ),
-]
-SkewWeight = Annotated[
-    float | None,
-    typer.Option(
-        "--skew-weight",
-        metavar="X",
-        help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default {skew weight},"
-        " or that of the instance file.",
-    ),
-]
-Facet = Annotated[
-    Literal["hull", "printed"] | None,
-    typer.Option("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),
-]
-StrokeNorm = Annotated[
-    int | None,
-    typer.Option(
-        "--stroke-norm",
-        min=1,
-        max=2,
-        help="Distance from the strokes in absolute values (1) or squares (2), where a formulation leaves it"
-        " open.",
-    ),
-]
-BetaNorm = Annotated[
-    int | None,
-    typer.Option(
-        "--beta-norm",
-        min=1,
-        max=2,
-        help="Skew beta in absolute values (1) or squares (2), where a formulation leaves it open.",
-    ),
-]
-Relax = Annotated[
-    bool, typer.Option("--relax", help="Let integers take any value within their bounds: a lower bound.")
-]
-Seconds = Annotated[
-    float, typer.Option("--time-limit", min=0.1, metavar="SECONDS", help="Seconds for each solve.")
-]
-SecondsInAll = Annotated[
-    float,
-    typer.Option(
-        "--time-limit",
-        min=0.1,
-        metavar="SECONDS",
-        help="Seconds in all, reading and writing files included; methods that do not search end earlier."
-        " power, polyvector and bend complete their first factorisation in any case.",
-    ),
-]
-SecondsEach = Annotated[
-    float,
-    typer.Option(
-        "--time-limit",
-        min=0.1,
-        metavar="SECONDS",
-        help="Seconds for each method that searches; what that makes in all is said before the first begins.",
-    ),
-]
-Gap = Annotated[
-    float,
-    typer.Option(
-        "--gap",
-        min=0.0,
-        help="Relative distance between best point and proven bound at which a solver may stop.",
-    ),
-]
-Jobs = Annotated[
-    int,
-    typer.Option("--jobs", callback=_jobs, help=f"How many solver files are written at once; 1 to {MOST}."),
-]
-Processes = Annotated[
-    int, typer.Option("--jobs", callback=_jobs, help=f"How many processes work at once; 1 to {MOST}.")
-]
-Threads = Annotated[
-    int,
-    typer.Option(
-        "--threads",
-        callback=_threads,
-        help=f"Cores that HiGHS and search use at once; 1 to {MOST}, or 0: as many as they choose.",
-    ),
+    Path | None, typer.Option("--on", metavar="INSTANCE", help="Instance (.npz, .json) of a .rawfield.")
 ]
 Start = Annotated[
     Path | None,
@@ -193,33 +88,290 @@ Start = Annotated[
         "--start",
         metavar="FIELD",
         help="Field (.npz, .json, .rawfield) on the same instance to start from; "
-        "its jumps are the data of qp-fixed.",
+        "qp-fixed takes its jumps as data.",
     ),
 ]
-GamsLayout = Annotated[
-    Literal["indexed", "scalar"] | None,
+Tightened = Annotated[
+    Path | None,
     typer.Option(
-        "--gams-layout",
-        help="GAMS files with sets and equations over them (indexed), or row by row as in MINLPLib (scalar).",
+        "--tightened",
+        metavar="PROOF",
+        help="Certificate (.npz) on the same instance, which is checked first. The bounds of alpha, beta and"
+        " the jumps are reduced to the proven ranges; qp-fixed takes its jumps.",
     ),
 ]
-NlForm = Annotated[
-    Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
+Check = Annotated[
+    Path | None,
+    typer.Option("--check", metavar="FILE", help="Only check this certificate and print what it proves."),
 ]
-Names = Annotated[
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+@dataclass(frozen=True)
+class PrintOptions:
+    """Options for the result on standard output."""
+
+    quiet: Quiet = False
+    as_json: Json = False
+
+    def show(self, document: object, show: Callable[[], None]) -> None:
+        """Print the document as JSON, call the function that shows it, or do nothing if quiet."""
+        if self.as_json:
+            print_json(document)
+        elif not self.quiet:
+            show()
+
+
+# Formulations and formats
+
+Facet = Annotated[
+    Literal["hull", "printed"] | None,
+    typer.Option("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),
+]
+
+
+@dataclass(frozen=True)
+class FormulationOptions:
+    """Options of the formulations."""
+
+    facet: Facet = None
+    stroke_norm: Annotated[
+        int | None,
+        typer.Option(
+            "--stroke-norm",
+            min=1,
+            max=2,
+            help="Distance from the strokes in absolute values (1) or squares (2), where a formulation offers"
+            " both.",
+        ),
+    ] = None
+    beta_norm: Annotated[
+        int | None,
+        typer.Option(
+            "--beta-norm",
+            min=1,
+            max=2,
+            help="Skew beta in absolute values (1) or squares (2), where a formulation offers both.",
+        ),
+    ] = None
+    relax: Annotated[
+        bool,
+        typer.Option(
+            "--relax", help="Let integers take any value within their bounds, which gives a lower bound."
+        ),
+    ] = False
+
+    def chosen(self) -> dict[str, Any]:
+        """Value of each option by its name in Python; None if it is not given."""
+        return {
+            "facet": self.facet,
+            "stroke_norm": self.stroke_norm,
+            "beta_norm": self.beta_norm,
+            "relax": self.relax or None,
+        }
+
+
+@dataclass(frozen=True)
+class DialectOptions:
+    """Options of the formats that have several dialects."""
+
+    gams_layout: Annotated[
+        Literal["indexed", "scalar"] | None,
+        typer.Option(
+            "--gams-layout",
+            help="GAMS files with equations over sets (indexed), or with one equation per row, as in MINLPLib"
+            " (scalar).",
+        ),
+    ] = None
+    nl_form: Annotated[
+        Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
+    ] = None
+
+    def chosen(self) -> dict[str, str]:
+        """Dialect of each format for which one is given."""
+        return {name: value for name, value in (("gms", self.gams_layout), ("nl", self.nl_form)) if value}
+
+
+FormulationName = Annotated[
+    str | None, _formulation(help="Solve this formulation: {formulations}; in short {short names}.")
+]
+FormulationNames = Annotated[
     list[str] | None,
-    typer.Option(
-        "-f",
-        "--formulation",
-        metavar="NAME",
-        help="{formulations}; in short {short names}; all by default, may be repeated.",
-    ),
+    _formulation(help="{formulations}; in short {short names}; all by default, may be repeated."),
 ]
-Formats = Annotated[
+FormatNames = Annotated[
     list[str] | None,
     typer.Option(
         "-F", "--format", metavar="NAME", help="{formats}; {default formats} by default, may be repeated."
     ),
 ]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")]
+
+# Methods, solvers and their limits
+
+MethodName = Annotated[
+    str | None,
+    _method(help="Compute the field with this method: {methods}; `crossfield list` describes them."),
+]
+ShadedMethod = Annotated[
+    str | None, _method(help="Method that computes the field: {methods}; {kept method} by default.")
+]
+MethodNames = Annotated[
+    list[str] | None, _method(help="{methods}; {default methods} by default, may be repeated.")
+]
+SolverName = Annotated[
+    str | None,
+    typer.Option(
+        "--solver",
+        metavar="NAME",
+        help="{all solvers}; by default one of {bundled solvers} that suits the formulation.",
+    ),
+]
+ProgramNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-p",
+        "--program",
+        metavar="NAME",
+        help="{programs}; by default all that are installed, may be repeated.",
+    ),
+]
+Seconds = Annotated[float, _time_limit(help="Seconds for each solve.")]
+SecondsInAll = Annotated[
+    float,
+    _time_limit(
+        help="Seconds in total, including reading and writing files; methods that do not search end earlier."
+        " power, polyvector and bend always complete their first factorisation."
+    ),
+]
+SecondsPerMethod = Annotated[
+    float,
+    _time_limit(
+        help="Seconds for each method that searches; the total is printed before the first one begins."
+    ),
+]
+SecondsPerField = Annotated[
+    float, _time_limit(help="Seconds for each field of a method that searches: one field per hidden curve.")
+]
+SecondsOfProof = Annotated[
+    float,
+    _time_limit(
+        help="Seconds for the proof and for its certificate, which is written and checked. They count from"
+        " when the sketch has been read."
+    ),
+]
+Gap = Annotated[
+    float, _gap(help="Relative distance between best point and proven bound at which a solver may stop.")
+]
+ProofGap = Annotated[
+    float,
+    _gap(
+        help="Relative distance between energy and bound at which the proof stops; 0 asks for a proven"
+        " optimum."
+    ),
+]
+Norm = Annotated[
+    int,
+    typer.Option(
+        "--norm",
+        min=1,
+        max=2,
+        help="Norm of the energy; a proof in the 1-norm, which milp-mccormick minimises, has no certificate.",
+    ),
+]
+Tolerance = Annotated[
+    float,
+    typer.Option(
+        "--tolerance",
+        metavar="X",
+        min=0,
+        help="Largest accepted violation of a row or a bound, and largest accepted relative error of the"
+        " objective.",
+    ),
+]
+Curves = Annotated[
+    int, typer.Option("--curves", min=1, metavar="N", help="Number of hidden curves, the longest first.")
+]
+Solve = Annotated[bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")]
+Jobs = Annotated[
+    int,
+    typer.Option(
+        "--jobs",
+        callback=_between(1, "jobs"),
+        help=f"Number of solver files that are written in parallel; 1 to {MOST}.",
+    ),
+]
+Processes = Annotated[
+    int,
+    typer.Option(
+        "--jobs",
+        callback=_between(1, "jobs"),
+        help=f"Number of processes that work in parallel; 1 to {MOST}.",
+    ),
+]
+Threads = Annotated[
+    int,
+    typer.Option(
+        "--threads",
+        callback=_between(0, "threads"),
+        help=f"Threads of HiGHS and of the search; 1 to {MOST}, or 0: they choose.",
+    ),
+]
+
+# Pictures and surfaces
+
+Kind = Annotated[
+    str | None,
+    typer.Option(
+        "--kind",
+        metavar="NAME",
+        help="{pictures}; by default layers for a field as SVG or with --underlay, otherwise what the file"
+        " contains.",
+    ),
+]
+Underlay = Annotated[
+    str | None,
+    typer.Option(
+        "--underlay",
+        metavar="DRAWING|SAMPLE",
+        help="Drawing or sample from which the instance was read, to show its strokes. A .curves file is"
+        " shown from the view that the instance records.",
+    ),
+]
+Title = Annotated[str | None, typer.Option("--title", help="Line of text above the picture.")]
+Flip = Annotated[
+    bool,
+    typer.Option(
+        "--flip", help="Turn the surface inside out: bumps become hollows. Hints, if any, take precedence."
+    ),
+]
+Hints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hint",
+        metavar="ROW,COLUMN,SLANT,TILT",
+        help="Normal of the surface at a pixel (0,0 is upper left), in degrees: the slant between normal and"
+        " viewing direction, 0 to 90, and the tilt, the direction of the normal on the drawing,"
+        " counter-clockwise from the right. May be repeated.",
+    ),
+]
+Lamp = Annotated[
+    str | None,
+    typer.Option(
+        "--light",
+        metavar="AZIMUTH,ELEVATION",
+        help="Direction of the light in degrees: counter-clockwise from the right, and 0 to 90 above the"
+        " plane of the drawing; {light} by default.",
+    ),
+]
+Scale = Annotated[
+    int | None,
+    typer.Option(
+        "--scale",
+        min=1,
+        metavar="N",
+        help="Picture pixels per pixel of the grid; by default 1 in the normal map, and in other pictures"
+        " enough for about {picture side} on the longer side.",
+    ),
+]

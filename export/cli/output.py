@@ -1,4 +1,4 @@
-"""What the command line shows: progress, tables that fit 80 columns, JSON, and one-line messages."""
+"""Output of the commands: progress, tables that fit 80 columns, JSON, and one-line messages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import typer
 
 from ...models.errors import CrossfieldError, printable
 from ...models.processes.progress import Progress, silent
-from .telling import telling
+from .progress_lines import progress_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,26 +23,24 @@ if TYPE_CHECKING:
     from ...models.instance.instance import Instance
     from ...models.surface.surface import Surface
     from ..bundle.manifest import Manifest
-    from ..solutions.solution import Solution
     from ..solving.run import Report
 
 WIDTH: Final = 80
-"""Columns that tables are made for; a wider terminal is used where it helps."""
+"""Columns of the tables where the output is no terminal."""
 
-
-INTERRUPTED: Final = "interrupted; files that stand are whole"
+INTERRUPTED: Final = "interrupted; all written files are complete"
 
 
 class InterruptedRunError(CrossfieldError):
-    """Ctrl-C where there is no best point so far to be kept."""
+    """Ctrl-C before there is a result to keep."""
 
 
 @contextmanager
 def progress(*, quiet: bool) -> Iterator[Progress]:
-    """A function that shows what is being done, on standard error, unless it shall be quiet.
+    """Function that shows the current step on standard error, unless quiet.
 
-    On a terminal beside a spinner and the time, elsewhere in a line every few seconds. Raises
-    InterruptedRunError for a Ctrl-C that nobody caught.
+    A terminal shows it next to a spinner and the time; elsewhere it is a line every few seconds. Raises
+    InterruptedRunError for Ctrl-C, unless the work itself handles it.
     """
     from rich.console import Console
 
@@ -52,7 +50,7 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
     elif console.is_terminal:
         shown = _spinning(console)
     else:
-        shown = telling(lambda line: typer.echo(printable(line), err=True))
+        shown = progress_lines(lambda line: typer.echo(printable(line), err=True))
     try:
         with shown as show:
             yield show
@@ -62,7 +60,7 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
 
 @contextmanager
 def _spinning(console: Console) -> Iterator[Progress]:
-    """A function that shows what is being done beside a spinner and the time."""
+    """Function that shows the current step next to a spinner and the time."""
     from rich import progress as rich
 
     columns = (
@@ -75,33 +73,33 @@ def _spinning(console: Console) -> Iterator[Progress]:
         yield lambda text: bar.update(task, description=text)
 
 
-def degrade() -> None:
-    """Have standard output and error write what their encoding does not have as escapes, rather than fail."""
+def escape_unencodable() -> None:
+    """Write characters that the encoding of the terminal lacks as escapes, rather than fail."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print a line on standard output."""
     typer.echo(text)
 
 
-def say_json(value: object) -> None:
+def print_json(value: object) -> None:
     """Print a value as JSON on standard output."""
     typer.echo(json.dumps(value, indent=1, allow_nan=False))
 
 
-def complain(text: str) -> None:
+def print_notice(text: str) -> None:
     """Print one line on standard error."""
     typer.echo(f"crossfield: {printable(text)}", err=True)
 
 
-def warn_of(instance: Instance, *, quiet: bool) -> None:
-    """Print the warnings of the drawing's reader on standard error, a line each, unless it shall be quiet."""
+def print_warnings(instance: Instance, *, quiet: bool) -> None:
+    """Print the warnings of the drawing's reader on standard error, one per line, unless quiet."""
     reading = None if quiet else instance.reading
     for text in reading.warnings if reading else ():
-        complain(f"warning: {instance.source}: {text}")
+        print_notice(f"warning: {instance.source}: {text}")
 
 
 def show_table(
@@ -112,7 +110,7 @@ def show_table(
     numbers: Sequence[str] = (),
     header: bool = True,
 ) -> None:
-    """Print a title and a table; the columns in `numbers` are set flush right."""
+    """Print a title and a table; the columns in `numbers` are right-aligned."""
     from rich import box
     from rich.console import Console
     from rich.markup import escape
@@ -158,44 +156,44 @@ def show_report(report: Report, folder: Path) -> None:
         mark = "*" if candidate is report.kept else ""
         rows.append([candidate.method + mark, *numbers, _status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
-    say(_LEGEND)
+    print_line(_LEGEND)
     for candidate in report.candidates:
-        if candidate.solution and (told := _bound(report.facts(candidate))):
-            say(f"  {candidate.method} {told}")
+        if candidate.solution and (answer := _bound(report.facts(candidate))):
+            print_line(f"  {candidate.method} {answer}")
     kept, best = report.facts(report.kept), report.facts(report.best)
-    say(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
+    print_line(f"* kept: {folder / 'field.npz'} (.json, .rawfield)")
     quantile = f"{kept['stroke_deviation_90_percent_degrees']:.1f}°"
     far = f"{kept['strokes_beyond_10_degrees']:.0%}"
-    say(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
+    print_line(f"  90% of its stroke pixels are at most {quantile} off, and {far} more than 10°")
     words = ", proven optimal" if best.get("proven_optimal") else ""
-    say(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
-    _say_proven(report, best)
+    print_line(f"  least 2-norm energy{words}: {report.best.method}, {folder / 'lowest.npz'}")
+    _print_proof(report, best)
     if report.interrupted in ("", "surface"):
-        say(f"  pictures: {folder / 'overview.png'} and others beside it")
-        say(f"  layers that fit on the drawing: {folder / 'overlay.svg'}")
+        print_line(f"  pictures: {folder / 'overview.png'} and others in the same folder")
+        print_line(f"  layers in the coordinates of the drawing: {folder / 'overlay.svg'}")
     if report.surface is not None:
         doubts = "; ".join(report.surface.doubts)
         shaded = f"shaded surface: {folder / 'shaded.png'}"
-        say(_wrapped(f"no shaded surface: {doubts}" if doubts else shaded))
-    say(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
+        print_line(_wrapped(f"no shaded surface: {doubts}" if doubts else shaded))
+    print_line(f"  {report.files} solver files: {folder / 'models'}; all facts: {folder / 'report.json'}")
     stages = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in report.stages.items())
-    say(_wrapped(f"{report.seconds:.1f} s: {stages}"))
+    print_line(_wrapped(f"{report.seconds:.1f} s: {stages}"))
     for candidate in report.candidates:
         if candidate.interrupted:
-            complain(f"{candidate.method}: interrupted; its best field so far was kept")
+            print_notice(f"{candidate.method}: interrupted; its best field so far was kept")
     for method, reason in report.failures.items():
-        complain(f"{method}: {reason}")
+        print_notice(f"{method}: {reason}")
 
 
-def _say_proven(report: Report, best: dict[str, Any]) -> None:
-    """Print the bound, or that nothing was proven although a method tried."""
+def _print_proof(report: Report, best: dict[str, Any]) -> None:
+    """Print the bound, or that a method failed to prove one."""
     from ..solving.proven import NOTHING
 
     if report.proven:
         bound = f"{best['bound_2_norm']:.10g}"
-        say(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
+        print_line(f"  no field has less than {bound}; certificate: {report.proven.certificate}")
     elif any(candidate.proof for candidate in report.candidates):
-        say(_wrapped(NOTHING))
+        print_line(_wrapped(NOTHING))
 
 
 def _wrapped(text: str) -> str:
@@ -207,20 +205,20 @@ def _gap(facts: dict[str, Any]) -> str:
 
 
 def _status(facts: dict[str, Any]) -> str:
-    """What a solver says of its answer, or that it gave back its start without a proof that this is best."""
+    """Status of a solver's answer, or that it is the start, without a proof that the start is optimal."""
     status = str(facts.get("status", ""))
-    return "start returned" if _gave_back(facts) else status
+    return "start returned" if _returned_start(facts) else status
 
 
-def _gave_back(facts: dict[str, Any]) -> bool:
+def _returned_start(facts: dict[str, Any]) -> bool:
     return bool(facts.get("start_returned")) and not str(facts["status"]).startswith("optimal")
 
 
 def _bound(facts: dict[str, Any]) -> str:
-    """How far a solver's answer is from its bound; empty where that is nothing, or there is none to miss."""
+    """Gap between a solver's answer and its bound; empty if it is closed, or if there is no bound."""
     if str(facts["status"]).startswith("optimal"):
         return ""
-    how = "gave back its start" if _gave_back(facts) else ""
+    how = "returned its start" if _returned_start(facts) else ""
     if facts["gap"] is None:
         return how and f"{how}, without a bound"
     words = f"objective {facts['objective_recomputed']:.4g}, bound {facts['dual_bound']:.4g}"
@@ -228,7 +226,7 @@ def _bound(facts: dict[str, Any]) -> str:
 
 
 def show_manifests(manifests: list[Manifest], folder: Path) -> None:
-    """Print what an export wrote, and what it refused."""
+    """Print the files of an export, and the reasons for files that were refused."""
     documents = [manifest.document for manifest in manifests]
     names = list(dict.fromkeys(name for document in documents for name in _sizes(document)))
     columns = ("formulation", "class", "columns", "rows", *(f"{name}, kB" for name in names))
@@ -241,12 +239,12 @@ def show_manifests(manifests: list[Manifest], folder: Path) -> None:
     show_table(manifests[0].instance().summary, columns, rows, numbers=columns[2:])
     for document in documents:
         for reason in document["refused"].values():
-            say(f"not written: {reason}")
-    say(f"files: {folder}")
+            print_line(f"not written: {reason}")
+    print_line(f"files: {folder}")
 
 
 def _sizes(document: dict[str, Any]) -> dict[str, int]:
-    """Bytes of the model file of each format."""
+    """Size in bytes of the model file in each format."""
     lists = (".row", ".col", ".row.gz", ".col.gz")
     return {file["format"]: file["bytes"] for file in document["files"] if not file["name"].endswith(lists)}
 
@@ -265,29 +263,24 @@ _ONLY_IF_ANY: Final = (
 )
 
 
-def show_solution(solution: Solution, facts: dict[str, Any], field: Path | None) -> None:
-    """Print what a solution claims beside what was recomputed, and where its field lies, if written."""
-    show_facts(solution.problem.instance.summary, facts)
-    if solution.point is not None and field is not None:
-        say(f"field: {field}")
-
-
 _SENTENCES: Final = ("doubts", "freedom")
 
 
 def show_surface(surface: Surface, folder: Path) -> None:
-    """Print how well a surface fits, what it leaves open, why it may be wrong, and where its files are."""
+    """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
     from ..surfaces.report import surface_facts
 
     facts = surface_facts(surface)
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})
     for text in surface.freedom:
-        say(_wrapped(f"open: {text}"))
+        print_line(_wrapped(f"undetermined: {text}"))
     if surface.freedom:
-        say(_wrapped("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT says how it lies at a pixel"))
+        print_line(
+            _wrapped("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT gives the normal at a pixel")
+        )
     for doubt in surface.doubts:
-        complain(f"in doubt: {doubt}")
-    say(f"pictures, heights, mesh: {folder}")
+        print_notice(f"in doubt: {doubt}")
+    print_line(f"pictures, heights, mesh: {folder}")
 
 
 def show_facts(title: str, facts: dict[str, Any]) -> None:
@@ -306,31 +299,33 @@ def _text(value: object) -> str:
 
 
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
-    """Print the tables of formulations, formats, solvers and readers, and which go together."""
+    """Print the tables of formulations, formats, solvers, methods and readers, and their combinations."""
     formulations = tables["formulations"][1]
     columns = ("name", "short", "paper", "class", "summary")
     show_table("formulations", columns, _cells(formulations, columns))
     formats, solvers = tables["formats"], tables["solvers"]
     names = [row["name"] for row in formats[1]]
     carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]
-    show_table("which format carries what (--json: what instead)", ("formulation", *names), carried)
+    show_table("formulations in each format (--json: alternatives)", ("formulation", *names), carried)
     marked = [
         [row[solvers[0][0]], *("yes" if row[name] == "yes" else "-" for name in solvers[0][1:])]
         for row in solvers[1]
     ]
     externals = tables["externals"]
-    show_table("which solver solves what here (--json: why not)", solvers[0], marked)
+    show_table("formulations that each bundled solver solves (--json: reasons)", solvers[0], marked)
     takes = [
         [name, ", ".join(row["formulation"] for row in externals[1] if row[name] == "yes")]
         for name in externals[0][1:]
     ]
     show_table(
-        "which solver proves optima from our files (--json: why not others)", ("solver", "takes"), takes
+        "formulations whose optimum each solver proves from our files (--json: reasons)",
+        ("solver", "formulations"),
+        takes,
     )
     show_table("formats", formats[0], _cells(formats[1], formats[0]))
     methods, readers = tables["methods"], tables["readers"]
-    show_table("methods: ways to a field (solve --method)", methods[0], _cells(methods[1], methods[0]))
-    show_table("solution files that are read", readers[0], _cells(readers[1], readers[0]))
+    show_table("methods (solve --method)", methods[0], _cells(methods[1], methods[0]))
+    show_table("readers of solution files", readers[0], _cells(readers[1], readers[0]))
 
 
 def _cells(rows: list[dict[str, Any]], columns: Sequence[str]) -> list[list[str]]:

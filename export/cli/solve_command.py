@@ -1,38 +1,30 @@
-"""The command `solve`: a field by one of the methods, or one formulation handed to a local solver."""
+"""The command `solve`: a field by one of the methods, or one formulation solved by a local solver."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
-from .inputs import choice_of, formulations_of, known, load, options_of
+from .inputs import formulations_of, known, read_start
 from .options import (
-    BetaNorm,
-    Curvature,
-    Facet,
     Folder,
+    FormulationName,
+    FormulationOptions,
     Gap,
-    GaugeName,
-    Json,
-    Mask,
-    Outline,
-    Quiet,
-    Relax,
+    Input,
+    MethodName,
+    PrintOptions,
     SecondsInAll,
-    Size,
-    SkewWeight,
+    SolverName,
     Start,
-    StrokeNorm,
-    StrokeWeight,
     Threads,
-    View,
-    What,
 )
-from .output import complain, progress, say, say_json, show_facts, show_solution
+from .output import print_line, print_notice, progress, show_facts
+from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
     from ..solutions.solution import Solution
@@ -41,97 +33,51 @@ if TYPE_CHECKING:
 
 
 def solve_command(
-    instance: What,
+    source: Input,
     output: Folder,
     *,
-    formulation: Annotated[
-        str | None,
-        typer.Option(
-            "-f",
-            "--formulation",
-            metavar="NAME",
-            help="Hand this formulation to a solver: {formulations}; in short {short names}.",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "-m",
-            "--method",
-            metavar="NAME",
-            help="Find a field in this way: {methods}; `crossfield list` describes them.",
-        ),
-    ] = None,
-    solver: Annotated[
-        str | None,
-        typer.Option(
-            "--solver",
-            metavar="NAME",
-            help="{all solvers}; by default one of {bundled solvers} that suits the formulation.",
-        ),
-    ] = None,
-    size: Size = None,
-    mask: Mask = None,
-    silhouette: Outline = "none",
-    curvature: Curvature = None,
-    view: View = None,
-    gauge: GaugeName = None,
-    stroke_weight: StrokeWeight = None,
-    skew_weight: SkewWeight = None,
-    facet: Facet = None,
-    stroke_norm: StrokeNorm = None,
-    beta_norm: BetaNorm = None,
-    relax: Relax = False,
+    formulation: FormulationName = None,
+    method: MethodName = None,
+    solver: SolverName = None,
+    sketch: SketchOptions,
+    formulating: FormulationOptions,
     start: Start = None,
     time_limit: SecondsInAll = 60.0,
     gap: Gap = 1e-6,
     threads: Threads = 0,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    printing: PrintOptions,
 ) -> None:
-    """Find a field, by a method (-m) or by a solver for one formulation (-f).
+    """Compute a field by a method (-m), or solve one formulation with a solver (-f).
 
-    The field, and what the solver read and wrote, is left in the folder. Both begin at a field
-    that is found in some seconds, unless --start gives another.
-    Ctrl-C ends the search and keeps the best so far.
+    The folder receives the field and all files that the solver reads and writes. Both ways start from a fast
+    approximate field, unless --start gives another. Ctrl-C ends the search and keeps the best field so far.
     """
-    deadline = Deadline.after(time_limit)  # the time that the libraries take to load is part of it
-    from ...models.field.file import read_field
+    deadline = Deadline.after(time_limit)  # the time to load libraries counts
     from ..solving.limits import Limits
     from ..solving.methods import Request
 
     if (formulation is None) == (method is None):
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         show("reading the sketch")
-        choice = choice_of(silhouette, curvature, view)
-        loaded = load(
-            instance,
-            size,
-            mask,
-            gauge,
-            choice,
-            stroke_weight=stroke_weight,
-            skew_weight=skew_weight,
-            quiet=quiet,
-        )
+        instance = sketch.instance(source, quiet=printing.quiet)
         request = Request(
-            loaded,
+            instance,
             output,
-            options=options_of(facet, stroke_norm, beta_norm, relax=relax),
-            start=None if start is None else read_field(start, on=loaded),
+            options=formulating.chosen(),
+            start=read_start(start, instance),
             progress=show,
             limits=Limits(time_limit, gap, threads).until(deadline),
         )
         if method is not None:
-            _check_method(method, solver, relax=relax)
+            _check_method(method, solver, relax=formulating.relax)
             candidate, proven, target = _by_method(method, request, deadline)
         else:
             solution, target = _by_solver(str(formulation), solver, request)
     if method is not None:
-        _tell_candidate(candidate, proven, target, quiet=quiet, as_json=as_json)
+        _print_candidate(candidate, proven, target, printing)
         return
-    tell_solution(solution, None if solution.doubt else target, quiet=quiet, as_json=as_json)
+    print_solution(solution, target, printing)
     if solution.point is None:
         words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
         raise InputError(
@@ -143,21 +89,21 @@ def solve_command(
 
 
 def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
-    """Refuse an unknown method, and what goes with formulations alone."""
+    """Raise an error for an unknown method, or for an option of formulations."""
     from ...models.formulations.catalogue import FORMULATIONS, short_names
     from ..solving.methods import METHODS
 
     if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
-        raise typer.BadParameter(f"{name} is a formulation, no method; write -f {name}")
+        raise typer.BadParameter(f"{name} is a formulation, not a method; write -f {name}")
     known([name], METHODS, "method")
     if relax:
-        raise typer.BadParameter("--relax goes with --formulation, not with a method")
+        raise typer.BadParameter("--relax needs --formulation; methods do not take it")
     if solver is not None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
 def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candidate, Proven | None, Path]:
-    """The last field of a method, what is proven of it, and the file it now is in, a certificate beside."""
+    """Final field of a method, its proof if any, and the file to which the field was written."""
     from ...models.field.file import write_field
     from ...models.storage import make_folder
     from ..solving.methods import METHODS
@@ -171,7 +117,7 @@ def _by_method(name: str, request: Request, deadline: Deadline) -> tuple[Candida
 
 
 def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solution, Path]:
-    """The solution of one formulation, and the file of its field, which is there if it has a point."""
+    """Solution of one formulation, and the path of its field, which exists if the solution has a point."""
     from ...models.field.file import write_field
     from ...models.formulations.problem import formulate
     from ..bundle.manifest import fixed_jumps
@@ -187,14 +133,14 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
     solution = solve(problem, solver, request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None or solution.doubt:
-        target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one
+        target.unlink(missing_ok=True)  # a field of an earlier call is not the result of this one
     else:
         write_field(solution.field, target)
     return solution, target
 
 
-def _tell_candidate(
-    candidate: Candidate, proven: Proven | None, field: Path, *, quiet: bool, as_json: bool
+def _print_candidate(
+    candidate: Candidate, proven: Proven | None, field: Path, printing: PrintOptions
 ) -> None:
     """Print the facts of a method's field and the path of its file."""
     from ..solving.proven import NOTHING
@@ -202,27 +148,32 @@ def _tell_candidate(
     facts = candidate.facts()
     if proven:
         facts |= proven.facts(facts["energy_2_norm"])
-    if as_json:
-        say_json(facts)
-    elif not quiet:
+
+    def show() -> None:
         show_facts(candidate.field.instance.summary, facts)
-        say(f"field: {field}")
+        print_line(f"field: {field}")
         if proven:
-            say(f"certificate: {proven.certificate}")
+            print_line(f"certificate: {proven.certificate}")
+
+    printing.show(facts, show)
     if candidate.proof is not None and proven is None:
-        complain(NOTHING)
+        print_notice(NOTHING)
     if candidate.interrupted:
-        complain("interrupted; the best field so far was kept")
+        print_notice("interrupted; the best field so far was kept")
 
 
-def tell_solution(solution: Solution, field: Path | None, *, quiet: bool, as_json: bool) -> None:
-    """Print the facts of a solution; field: the file in which its field lies, None when there is none."""
+def print_solution(solution: Solution, field: Path, printing: PrintOptions) -> None:
+    """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
     from ..solving.run import facts_with_energies
 
     facts = facts_with_energies(solution)
-    if as_json:
-        say_json(facts)
-    elif not quiet:
-        show_solution(solution, facts, field)
+    written = solution.point is not None and not solution.doubt
+
+    def show() -> None:
+        show_facts(solution.problem.instance.summary, facts)
+        if written:
+            print_line(f"field: {field}")
+
+    printing.show(facts, show)
     if solution.interrupted:
-        complain("interrupted; the best point so far was kept" if field else "interrupted")
+        print_notice("interrupted; the best point so far was kept" if written else "interrupted")

@@ -1,4 +1,4 @@
-"""The tables of formulations, formats, solvers and readers, and which go together: for commands and docs."""
+"""Tables of formulations, formats, solvers, methods and readers, for the commands and the docs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
 
 
 def tables() -> Tables:
-    """For each table its columns and its rows, computed from the code, never typed."""
+    """Columns and rows of each table, computed from the code."""
     return {
         "formulations": (
             ("name", "short", "paper", "class", "summary", *FORMATS),
@@ -46,7 +46,7 @@ def tables() -> Tables:
 
 
 def sample_rows() -> list[Row]:
-    """Name, kind, grid, stroke share and one line of each built-in sample on a grid of the default size."""
+    """Name, kind, grid, share of stroke pixels and description of each sample, at the default size."""
     rows = []
     for entry in samples():
         instance = sample(entry.name)
@@ -64,7 +64,7 @@ def sample_rows() -> list[Row]:
 
 
 def smallest_problems() -> list[Problem]:
-    """Every formulation on the instance of two pixels."""
+    """Every formulation on an instance of two pixels."""
     return [smallest(declare(name)) for name in FORMULATIONS]
 
 

@@ -1,61 +1,46 @@
-"""The command `verify`: exported files handed to every solver that is here."""
+"""The command `verify`: exported files, read and solved by every installed solver."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from .inputs import known
-from .options import Json, Quiet, Seconds
-from .output import complain, progress, say, say_json, show_table
+from .options import Exported, PrintOptions, ProgramNames, Seconds, Solve
+from .output import print_line, print_notice, progress, show_table
 
 if TYPE_CHECKING:
     from ..verify.verify import Verification
 
 
 def verify_command(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield export` wrote.")],
+    folder: Exported,
     *,
-    solve: Annotated[
-        bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")
-    ] = False,
+    solve: Solve = False,
     time_limit: Seconds = 10.0,
-    program: Annotated[
-        list[str] | None,
-        typer.Option(
-            "-p",
-            "--program",
-            metavar="NAME",
-            help="{programs}; all that are installed by default, may be repeated.",
-        ),
-    ] = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
+    program: ProgramNames = None,
+    printing: PrintOptions,
 ) -> None:
-    """Hand every exported file to every solver that is installed, and compare what it reads with the problem.
+    """Read every exported file with every installed solver, and compare the result with the problem.
 
-    All results go to verify.json in the folder. The exit code is 1 when something differs.
+    verify.json in the folder contains all results. The exit code is 1 if any of them differs.
     """
     from ..solvers_table import PROGRAMS
     from ..verify.verify import verify
 
     programs = known(program, PROGRAMS, "program")
-    with progress(quiet=quiet) as show:
+    with progress(quiet=printing.quiet) as show:
         found = verify(folder, seconds=time_limit if solve else None, programs=programs, progress=show)
-    if as_json:
-        say_json(found.document())
-    elif not quiet:
-        _show(found)
+    printing.show(found.document(), lambda: _show(found))
     for check in found.bad:
-        complain(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
+        print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
     if not found.ok:
         raise typer.Exit(1)
 
 
 def _show(found: Verification) -> None:
-    """Print how many files each program read and solved, how that ended, and what is absent."""
+    """Print the number of files by program, step and verdict, and the absent programs."""
     verdicts = list(dict.fromkeys(check.verdict for check in found.checks))
     columns = ("program", "step", *map(str, verdicts))
     rows = []
@@ -64,5 +49,5 @@ def _show(found: Verification) -> None:
         rows.append([program, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
     show_table(f"files in {found.folder}", columns, rows, numbers=columns[2:])
     for name, how in found.absent.items():
-        say(f"absent: {name}; {how}")
-    say(f"reasons and numbers: {found.folder / 'verify.json'}")
+        print_line(f"absent: {name}; {how}")
+    print_line(f"reasons and numbers: {found.folder / 'verify.json'}")

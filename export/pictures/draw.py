@@ -76,7 +76,7 @@ KINDS: Final = {
         bar=50.0,
         legend=True,
     ),
-    LAYERS: Kind("the field in the coordinates of its drawing, over it where --over names it", ()),
+    LAYERS: Kind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
 }
 """Every kind of picture of instances and fields, by the name under which it is asked for."""
 

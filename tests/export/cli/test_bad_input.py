@@ -1,4 +1,4 @@
-"""Bad input of every kind, on the command line: exit code 1, one line that says where and what, no files."""
+"""Bad input on the command line: exit code 1, one line that names file and reason, and no new files."""
 
 import json
 import math
@@ -29,12 +29,12 @@ def listing(folder):
 
 
 PLAN = re.compile(r"\Aat most .+ s: .+; files and pictures on top\n\Z")
-"""What `run` says once the sketch is read."""
+"""Line that `run` prints after reading the sketch."""
 
 
 @pytest.fixture
 def refused(tmp_path, capsys):
-    """Runs a command line that must fail, and gives its one line of complaint."""
+    """Function that runs a command line that must fail, and returns its one line of error."""
 
     def run(*arguments):
         before = listing(tmp_path)
@@ -59,7 +59,7 @@ def instance():
 
 @pytest.fixture
 def exported(tmp_path, instance):
-    """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest; the instance elsewhere."""
+    """Folder with an instance, `milp-mccormick` as .nl and .mps, and the manifest."""
     cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", ["nl", "mps"])
     return tmp_path / "set"
 
@@ -177,7 +177,7 @@ def test_a_black_mask_and_a_mask_for_a_sample_are_refused(tmp_path, refused):
     assert "leave --mask out" in refused("run", "mouse", "--mask", black, "-o", tmp_path / "out")
 
 
-def test_a_mask_of_several_parts_is_allowed_and_said(tmp_path, capsys):
+def test_a_mask_of_several_parts_is_allowed(tmp_path, capsys):
     picture(tmp_path / "sketch.png")
     mask = mask_picture(tmp_path / "mask.png", (0, 0, 20, 39), (40, 0, 59, 39))
     arguments = [
@@ -257,7 +257,7 @@ def test_an_instance_has_its_own_grid(tmp_path, refused, instance):
     )
 
 
-def test_what_is_not_there_is_refused_with_a_hint(tmp_path, refused):
+def test_missing_files_are_refused_with_a_hint(tmp_path, refused):
     assert "crossfield samples" in refused("run", tmp_path / "missing.svg", "-o", tmp_path / "out")
     assert "is not a file" in refused("run", tmp_path, "-o", tmp_path / "out")
     assert "no such file" in refused("draw", tmp_path / "field.npz", "-o", tmp_path / "out.png")
@@ -299,7 +299,7 @@ def test_unknown_names_are_refused_before_a_byte_is_written(tmp_path, refused, i
     assert reason in refused(command, tmp_path / "tiny.json", *options, "-o", tmp_path / "out")
 
 
-def test_what_a_format_cannot_carry_is_said_and_recorded(tmp_path, instance, capsys):
+def test_a_refused_format_is_reported_and_recorded(tmp_path, instance, capsys):
     cf.write_instance(instance, tmp_path / "tiny.json")
     out = tmp_path / "out"
     assert (
@@ -355,7 +355,7 @@ def test_a_start_on_another_instance_is_refused(tmp_path, refused, instance):
 
 @pytest.fixture
 def good_solution(tmp_path, exported, manifest, instance):
-    """Text of a HiGHS solution file for the exported problem, made by HiGHS."""
+    """Solution file that HiGHS wrote for the exported problem."""
     import highspy
 
     highs = highspy.Highs()
@@ -424,7 +424,7 @@ def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, 
     assert "another instance" in refused(*read(good_solution, other_manifest, tmp_path / "field.npz"))
 
 
-def test_a_manifest_beside_another_instance_is_refused(
+def test_a_manifest_next_to_another_instance_is_refused(
     tmp_path, refused, instance, exported, good_solution, manifest
 ):
     turned = instance.turned()
@@ -480,7 +480,7 @@ def test_an_infeasible_sol_file_is_refused(tmp_path, refused, instance, manifest
 
 
 def in_child(*arguments, prelude=""):
-    """A command line in a child process, after some lines of Python."""
+    """Run a command line in a child process, after some lines of Python."""
     code = (
         f"import sys\n{prelude}\nfrom crossfield.export.cli.app import invoke\nsys.exit(invoke(sys.argv[1:]))"
     )
@@ -514,7 +514,7 @@ def test_a_missing_solver_is_named(tmp_path, instance, package, formulation):
 
 
 @pytest.mark.slow
-def test_without_one_solver_another_that_takes_the_class_is_used(tmp_path, instance):
+def test_another_solver_for_the_class_replaces_a_missing_one(tmp_path, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
     arguments = ("solve", tmp_path / "tiny.json", "-f", "milp-mccormick", "--json", "-o", tmp_path / "out")
     done = in_child(*arguments, prelude="sys.modules['highspy'] = None")
@@ -523,7 +523,7 @@ def test_without_one_solver_another_that_takes_the_class_is_used(tmp_path, insta
 
 
 @pytest.mark.slow
-def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
+def test_a_run_without_solvers_still_computes_a_field(tmp_path, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
     prelude = "sys.modules['highspy'] = sys.modules['casadi'] = None"
     done = in_child(
@@ -601,7 +601,7 @@ SLOW = ("solve", "run", "draw pdf", "draw", "export")
 @pytest.mark.parametrize(
     "case", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in DISK]
 )
-def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
+def test_only_complete_files_remain_on_a_full_disk(tmp_path, monkeypatch, case):
     arguments, output, limit = DISK[case]
     monkeypatch.chdir(tmp_path)
     cf.write_field(cf.greedy(cf.sample("mouse", 8)), "field.npz")
@@ -614,7 +614,7 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
     assert not [path for path in left if path.suffix == ".part"]
     if not Path(output).is_dir():
         assert left == []
-    for path in left:  # what is there is whole: an instance, or text that ends where it should
+    for path in left:  # the files are complete: instances, or model files
         if path.suffix == ".json":
             json.loads(path.read_text())
         elif path.suffix == ".nl":
@@ -623,7 +623,7 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
 
 
 @pytest.mark.slow
-def test_a_file_that_was_there_survives_a_full_disk(tmp_path, monkeypatch):
+def test_an_existing_file_survives_a_full_disk(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     cf.write_instance(cf.sample("skew", 8), "out.json")
     before = Path("out.json").read_bytes()
@@ -634,7 +634,7 @@ def test_a_file_that_was_there_survives_a_full_disk(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_full_device_is_said(tmp_path):
+def test_a_full_device_is_reported(tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("there is no /dev/full")
     with Path("/dev/full").open("wb") as full:

@@ -1,34 +1,43 @@
-"""The help of the commands: its names are those of the tables, and it fits a terminal of 80 columns."""
+"""Help of the commands: it lists the names of the tables and fits a terminal of 80 columns."""
 
 import re
-import typing
+from dataclasses import fields
+from typing import Annotated, get_args
 
 import pytest
 import typer
-from crossfield.export.cli import options
 from crossfield.export.cli.app import app, invoke
-from crossfield.export.cli.help_texts import NAMES, Command, filled
+from crossfield.export.cli.help_texts import Command
+from crossfield.export.cli.sketch_options import SketchOptions
 from crossfield.export.formats.registry import FORMATS
+from crossfield.export.library.ledger.ledger import RunStatus
+from crossfield.export.library.plan.spec import RUNGS
+from crossfield.export.pictures.draw import KINDS
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS
+from crossfield.export.solving.methods import METHODS
+from crossfield.models.formulations.catalogue import FORMULATIONS, short_names
 from crossfield.models.formulations.declaration import FACETS
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.sketch.read import DEFAULT_SIZE
+from crossfield.models.sketch.samples import SAMPLES
 from typer.testing import CliRunner
 
 NAMED = {
-    "run": ["samples", "size", "methods"],
-    "instance": ["samples", "size", "most weight", "stroke weight", "skew weight"],
-    "export": ["samples", "size", "formulations", "short names", "formats", "default formats"],
-    "solve": ["samples", "size", "formulations", "short names", "methods", "all solvers", "bundled solvers"],
-    "prove": ["samples", "size"],
-    "evaluate": ["samples", "size", "methods", "default methods"],
-    "read": ["answers"],
-    "draw": ["pictures"],
-    "shade": ["samples", "size", "methods", "kept method", "picture side", "light"],
-    "verify": ["programs"],
-    "library solve": ["all solvers", "rungs"],
-    "library submit-run": ["logs", "run statuses"],
-    "library submit-point": ["answers"],
+    "run": [SAMPLES, METHODS],
+    "instance": [SAMPLES],
+    "export": [SAMPLES, FORMULATIONS, short_names(), FORMATS],
+    "solve": [SAMPLES, FORMULATIONS, short_names(), METHODS, SOLVERS],
+    "prove": [SAMPLES],
+    "evaluate": [SAMPLES, METHODS],
+    "read": [],
+    "draw": [KINDS],
+    "shade": [SAMPLES, METHODS],
+    "verify": [PROGRAMS],
+    "library solve": [SOLVERS, RUNGS],
+    "library submit-run": [get_args(RunStatus)],
+    "library submit-point": [],
 }
+"""Tables whose names the help of a command lists."""
 OTHERS = (
     "",
     "list",
@@ -43,7 +52,7 @@ OTHERS = (
 
 @pytest.fixture
 def text(monkeypatch, capsys):
-    """The help of a command at 80 columns, as lines and as words in a row."""
+    """Function that returns the help of a command on a terminal of 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("TERM", "dumb")
 
@@ -55,28 +64,34 @@ def text(monkeypatch, capsys):
 
 
 def words(shown):
-    """The words of a help without its frames, names broken at hyphens put together."""
+    """Words of a help text without its frames; names that are broken at hyphens are joined."""
     cells = [re.sub(r"[│╭╮╰╯─]", " ", line) for line in shown.splitlines()]
     return re.sub(r"(?<=\w-) (?=\w)", "", " ".join(" ".join(cells).split()))
 
 
-def test_the_help_names_what_the_tables_have_within_80_columns(text):
+def test_the_help_lists_the_names_of_the_tables_within_80_columns(text):
     for command in (*NAMED, *OTHERS):
         shown = text(command)
         assert max(map(len, shown.splitlines())) <= 80, command
         assert not re.search(r"\{[a-z ]+\}", shown), command
         for table in NAMED.get(command, ()):
-            missing = [name for name in NAMES[table]() if not re.search(rf"\b{name}\b", words(shown))]
-            assert missing == [], (command, table)
+            missing = [name for name in table if not re.search(rf"\b{name}\b", words(shown))]
+            assert missing == [], command
 
 
-def test_brackets_in_a_help_are_shown(text):
-    """Rich takes `[word]` for markup unless it is escaped."""
+def test_h_is_short_for_help(text, capsys):
+    assert invoke(["solve", "-h"]) == 0
+    assert capsys.readouterr().out == text("solve")
+
+
+@pytest.mark.parametrize("markup", ["rich", None])
+def test_brackets_in_a_help_are_shown(text, markup):
+    """Rich parses `[word]` as markup unless it is escaped; other modes print the escape."""
     assert "the table [release] of its specification" in words(text("library release"))
-    toy = typer.Typer()
+    toy = typer.Typer(rich_markup_mode=markup)
 
     @toy.command(cls=Command)
-    def toy_command(option: typing.Annotated[str, typer.Option(help="A [bold] word.")] = "x") -> None:
+    def toy_command(option: Annotated[str, typer.Option(help="A [bold] word.")] = "x") -> None:
         """Show [red] and {size} twice."""
 
     for _ in range(2):
@@ -85,31 +100,28 @@ def test_brackets_in_a_help_are_shown(text):
         assert "A [bold] word." in shown
 
 
-def test_every_table_in_a_help_is_named_there():
-    assert set(NAMES) == {table for tables in NAMED.values() for table in tables}
-    assert filled("{size}, at most") == f"{DEFAULT_SIZE}, at most"
+def test_choices_are_those_of_the_models_and_of_the_formats(text):
+    shown = words(text("export"))
+    for table in (GAUGES, FACETS, FORMATS["gms"].dialects, FORMATS["nl"].dialects):
+        assert re.search(rf"[<\[]{re.escape('|'.join(table))}[>\]]", shown), table
 
 
-def test_choices_are_those_of_the_models_and_of_the_formats():
-    chosen = {
-        options.GaugeName: GAUGES,
-        options.Facet: FACETS,
-        options.GamsLayout: FORMATS["gms"].dialects,
-        options.NlForm: FORMATS["nl"].dialects,
-    }
-    for option, table in chosen.items():
-        (literal, _) = typing.get_args(typing.get_args(option)[0])
-        assert typing.get_args(literal) == tuple(table)
+def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
+    names = [f"--{field.name.replace('_', '-')}" for field in fields(SketchOptions)]
+    for command in ("run", "instance", "export", "solve", "prove", "evaluate", "shade"):
+        shown = re.findall(r"--[a-z-]+", text(command))
+        begin = shown.index(names[0])
+        assert [name for name in shown[begin:] if name in names] == names, command
 
 
-def test_commands_are_listed_in_the_order_of_their_use():
+def test_the_help_lists_the_commands_in_the_order_of_use():
     assert list(typer.main.get_command(app).commands) == [
         "run", "instance", "export", "solve", "prove", "evaluate", "read", "draw", "shade", "verify",
         "list", "samples", "library",
     ]  # fmt: skip
 
 
-def test_the_default_size_stands_once(tmp_path, capsys):
+def test_files_and_samples_have_the_same_default_size(tmp_path, capsys):
     import crossfield as cf
 
     drawing = tmp_path / "a.svg"

@@ -1,4 +1,4 @@
-"""Inputs made to cost time, memory or trust: each is read or refused, at no more than its size asks for."""
+"""Malicious and damaged inputs: each is read or refused in time and memory in proportion to its size."""
 
 import io
 import json
@@ -66,7 +66,7 @@ COSTLY_SVG = {
 
 
 def member(archive, name, shape, kind, length):
-    """A member of an archive that holds so many zeros."""
+    """Add a member of so many zero bytes to an archive."""
     entry = zipfile.ZipInfo(f"{name}.npy")
     entry.compress_type = zipfile.ZIP_DEFLATED
     with archive.open(entry, "w") as stream:
@@ -90,7 +90,7 @@ def archive_with(name, shape, kind, length):
 
 
 def png(side):
-    """A white picture with a thick black line, 3 bytes a pixel, a few hundred times smaller when packed."""
+    """White picture with a thick black line, 3 bytes per pixel, a few hundred times smaller as a file."""
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -129,33 +129,33 @@ resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 for path in sys.argv[1:]:
     try:
         (cf.read_instance if path.endswith(("npz", "json")) else lambda p: cf.read_sketch(p, size=24))(path)
-        said = ""
+        message = ""
     except cf.CrossfieldError as error:
-        said = str(error)
-    print(json.dumps([path, said, peak()]), flush=True)
+        message = str(error)
+    print(json.dumps([path, message, peak()]), flush=True)
 """
 
 
 def read_by_child(*paths):
-    """What a process says of each file that has 60 s of processor time for them all, and its memory in MB."""
+    """Error message and memory in MB per file, from one process with 60 s of processor time for all files."""
     done = subprocess.run(
         [sys.executable, "-c", READER, *map(str, paths)], check=False, capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (0, "")
     found = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(found) == len(paths)
-    return {Path(path).name: (said, memory) for path, said, memory in found}
+    return {Path(path).name: (message, memory) for path, message, memory in found}
 
 
 @pytest.mark.slow
-def test_drawings_that_ask_for_much_work_do_not_get_it(tmp_path):
-    """Before, most of them took minutes, 200,000 blanks in a style sheet 207 s."""
+def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
+    """Without the limits most of them take minutes."""
     paths = []
     for number, data in enumerate(COSTLY_SVG.values()):
         paths.append(tmp_path / f"{number}.svg")
         paths[-1].write_bytes(data)
-    found = [said for said, _ in read_by_child(*paths).values()]
-    refused = {name: said for name, said in zip(COSTLY_SVG, found, strict=True) if said}
+    found = [message for message, _ in read_by_child(*paths).values()]
+    refused = {name: message for name, message in zip(COSTLY_SVG, found, strict=True) if message}
     assert set(refused) == {
         "rules of one class",
         "a point list without blanks",
@@ -169,7 +169,7 @@ def test_drawings_that_ask_for_much_work_do_not_get_it(tmp_path):
 
 @pytest.mark.slow
 def test_small_files_do_not_take_much_memory(tmp_path):
-    """Before: 3046, 1559, 772 and 1094 MB. The picture comes last: memory is that of the whole process."""
+    """The picture comes last, because the memory is measured for the whole process."""
     files = {
         "extra.npz": archive_with("extra", (1 << 29,), "|u1", 1 << 29),
         "mask.npz": archive_with("mask", (20_000, 40_000), "|b1", 800 << 20),
@@ -180,17 +180,19 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)
     found = read_by_child(*(tmp_path / name for name in files))
-    said = {name: words for name, (words, _) in found.items()}
-    assert said["big.png"] == ""
-    assert "holds an array 'extra' that does not belong in it" in said["extra.npz"]
-    assert "array 'mask' has shape (20000, 40000); expected 2 dimensions of at most 9999" in said["mask.npz"]
-    assert "lists 300000 stroke pixels, but its mask has 4 pixels" in said["strokes.json"]
-    assert f"more than {input_limits.MAX_LINES} lines" in said["many.scap"]
+    messages = {name: words for name, (words, _) in found.items()}
+    assert messages["big.png"] == ""
+    assert "holds an array 'extra' that does not belong in it" in messages["extra.npz"]
+    assert (
+        "array 'mask' has shape (20000, 40000); expected 2 dimensions of at most 9999" in messages["mask.npz"]
+    )
+    assert "lists 300000 stroke pixels, but its mask has 4 pixels" in messages["strokes.json"]
+    assert f"more than {input_limits.MAX_LINES} lines" in messages["many.scap"]
     assert found["many.scap"][1] < 350
     assert found["big.png"][1] < 450
 
 
-def test_limits_of_drawings_are_told(monkeypatch):
+def test_errors_name_the_limits_of_drawings(monkeypatch):
     """Each with a small limit in place of the real one."""
     from crossfield.models.sketch import path_data, style_sheet, svg
 
@@ -279,7 +281,7 @@ def test_floating_point_pictures_without_numbers_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("step", [40, pytest.param(5, marks=pytest.mark.slow)])
-def test_damaged_tiffs_are_refused_and_nothing_else_is_said(tmp_path, capfd, step):
+def test_damaged_tiffs_are_refused_without_other_output(tmp_path, capfd, step):
     values = np.full((40, 60), 255, dtype=np.uint8)
     values[20:23] = 0
     refused = 0
@@ -329,7 +331,7 @@ def test_compressed_tiffs_read_as_uncompressed_ones_do(tmp_path):
         assert packed.mask.shape[0] > packed.mask.shape[1]
 
 
-def test_what_pillow_logs_is_no_second_line(tmp_path):
+def test_logs_of_pillow_are_not_printed(tmp_path):
     Image.new("RGB", (6, 4)).save(tmp_path / "a.tiff")
     data = (tmp_path / "a.tiff").read_bytes()
     samples = struct.pack("<HHIH", 277, 3, 1, 3)
@@ -353,7 +355,7 @@ HEADERS = {
 
 @pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS)
 def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
-    """With warnings left to the caller, a warning would be an error here and another message."""
+    """Warnings are errors in tests, so a warning would change the message."""
     buffer = io.BytesIO()
     packed = f"{header}\n".encode()
     with zipfile.ZipFile(buffer, "w") as archive:
@@ -364,7 +366,7 @@ def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
 
 
 def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
-    """Their filters belong to all threads; this mapping is asked for its items in the middle of the work."""
+    """All threads share the filters; this mapping records them while the archive is read."""
 
     class Watched(dict):
         def items(self):
@@ -379,8 +381,7 @@ def test_warnings_of_other_threads_are_no_errors_while_an_archive_is_read():
     assert found == [before]
 
 
-def test_pictures_are_the_same_in_bands(tmp_path, monkeypatch):
-    """However many rows are looked at together."""
+def test_pictures_are_the_same_for_any_number_of_rows_per_band(tmp_path, monkeypatch):
     from crossfield.models.sketch import bitmap
 
     rng = np.random.default_rng(3)
@@ -422,7 +423,7 @@ def test_texts_from_files_are_safe_in_messages(tmp_path):
     assert str(InputError(printable(strange))) == printable(strange)
 
 
-def test_a_damaged_archive_is_told_in_short(tmp_path):
+def test_the_error_for_a_damaged_archive_is_short(tmp_path):
     arrays = io.BytesIO(
         pack_arrays({name: array for name, array in arrays_of(instance()).items() if name != "w"})
     )
@@ -448,13 +449,14 @@ def test_fields_of_numbers_that_are_no_angles_are_refused(tmp_path):
             cf.read_field(tmp_path / "b.json")
 
 
-def test_output_degrades_where_the_terminal_has_no_unicode(tmp_path):
-    """The report of a run has a sign for degrees, drawings may have any name."""
+def test_output_is_escaped_on_a_terminal_without_unicode(tmp_path):
+    """Reports contain a degree sign, and drawings may have any name."""
     (tmp_path / "Skizze – 図.svg").write_text(SVG.format(STROKES))
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     program = (
-        "from crossfield.export.cli.output import degrade, say, complain, show_table\n"
-        "degrade(); say('12.3°'); complain('12.3°'); show_table('°', ('|β|',), [['1.4°']])"
+        "from crossfield.export.cli.output import escape_unencodable, print_line, print_notice, show_table\n"
+        "escape_unencodable(); print_line('12.3°'); print_notice('12.3°')\n"
+        "show_table('°', ('|β|',), [['1.4°']])"
     )
     done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, env=environment)
     assert done.returncode == 0
@@ -466,7 +468,7 @@ def test_output_degrades_where_the_terminal_has_no_unicode(tmp_path):
         done = subprocess.run(
             [*command, "-o", tmp_path / output], check=False, capture_output=True, env=environment
         )
-        assert (done.returncode, b"should not happen" in done.stderr) == (code, False)
+        assert (done.returncode, b"internal error" in done.stderr) == (code, False)
         assert done.stdout + done.stderr
 
 
@@ -496,9 +498,9 @@ with replacing(Path(sys.argv[1])) as stream:
 """
 
 
-def test_what_a_killed_process_has_left_is_removed_by_the_next_and_nothing_else(tmp_path):
+def test_only_files_of_killed_processes_are_removed(tmp_path):
     if os.name == "nt":
-        pytest.skip("Windows does not say whether a process lives")
+        pytest.skip("Windows does not report whether a process is alive")
     target = tmp_path / "a.json"
     target.write_text("whole")
     (tmp_path / ".a.json.mine.part").write_text("of somebody else")
@@ -509,7 +511,9 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next_and_nothing_else(
         [sys.executable, "-c", KILLED, target, "waits"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as other:
         assert other.stdout.readline() == b"writing\n"
-        assert len(list(tmp_path.iterdir())) == 4  # the one of the dead is gone, that of the living has come
+        assert (
+            len(list(tmp_path.iterdir())) == 4
+        )  # the file of the dead process was removed, a file of the running one was added
         assert invoke(["instance", "mouse", "--size", "6", "-q", "-o", str(target)]) == 0
         assert target.read_bytes() != b"half"
         other.communicate()

@@ -16,7 +16,7 @@ SKETCH = ["mouse", "--size", "8", "--stroke-weight", "0.3"]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """What `prove` has written for a sample of some pixels, and what it has printed."""
+    """Folder that `prove` wrote for a small sample, and its report."""
     folder = tmp_path_factory.mktemp("proof")
     command = ["prove", *SKETCH, "-o", str(folder), "--time-limit", "100", "-q"]
     assert invoke(command) == 0
@@ -77,9 +77,9 @@ def test_certificates_are_checked(folder, capsys, tmp_path):
     wrong = tmp_path / "wrong.npz"
     wrong.write_bytes(pack_arrays(arrays))
     assert invoke(["prove", "--check", str(wrong)]) == 1
-    said = capsys.readouterr().err
-    assert "wrong.npz: is refused as a certificate: energy is claimed as" in said
-    assert said.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert "wrong.npz: is refused as a certificate: energy is claimed as" in printed
+    assert printed.count("\n") == 1
 
 
 def test_tightened_files_of_a_proof(folder, tmp_path):

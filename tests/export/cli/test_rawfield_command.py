@@ -1,4 +1,4 @@
-"""Fields by other programs on the command line: drawn, and started from."""
+"""Fields by other programs on the command line, for pictures and as starts."""
 
 import crossfield as cf
 import pytest
@@ -7,7 +7,7 @@ from crossfield.export.cli.app import invoke
 
 @pytest.fixture
 def theirs(tmp_path):
-    """A raw field and its instance; in it the field is greedy's."""
+    """Files of a raw field, the greedy field, and of its instance."""
     instance = cf.sample("bottle", 10)
     cf.write_instance(instance, tmp_path / "bottle.json")
     return cf.write_field(cf.greedy(instance), tmp_path / "theirs.rawfield"), tmp_path / "bottle.json"
@@ -22,7 +22,7 @@ def test_a_raw_field_is_drawn_on_its_instance(theirs, tmp_path):
 
 def test_a_raw_field_alone_is_refused_with_the_remedy(theirs, tmp_path, capsys):
     assert invoke(["draw", str(theirs[0]), "-o", str(tmp_path / "field.svg")]) == 1
-    assert "holds no instance; give the one it is on by --on" in capsys.readouterr().err
+    assert "holds no instance; give its instance with --on" in capsys.readouterr().err
 
 
 def test_a_field_of_another_instance_is_refused(theirs, tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""The command `shade`: what it takes, what it leaves, and what it refuses."""
+"""The command `shade`: its inputs, its files and its errors."""
 
 import json
 
@@ -18,11 +18,11 @@ def field():
 
 @pytest.fixture
 def saved(field, tmp_path):
-    """That field in a file."""
+    """Path of a file with that field."""
     return str(cf.write_field(field, tmp_path / "saved.npz"))
 
 
-def told(folder):
+def report(folder):
     return json.loads((folder / "surface.json").read_text())
 
 
@@ -31,11 +31,11 @@ def test_a_sample_gets_its_field_and_its_surface(tmp_path, capsys):
     assert invoke(given) == 0
     out = capsys.readouterr().out
     assert "mouse: 12 x 11" in out
-    assert "open: inside out it has the same crosses" in out
+    assert "undetermined: inside out it has the same crosses" in out
     assert "--flip" in out
     assert str(tmp_path / "out") in out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "field.npz"}
-    assert told(tmp_path / "out")["method"] == "bend"
+    assert report(tmp_path / "out")["method"] == "bend"
     field = cf.read_field(tmp_path / "out" / "field.npz")
     found = cf.surface(field)
     heights = np.load(tmp_path / "out" / "heights.npy")
@@ -49,17 +49,27 @@ def test_a_saved_field_is_flipped_hinted_and_lit(saved, tmp_path, capsys):
     plain, turned = tmp_path / "plain", tmp_path / "turned"
     assert invoke(["shade", saved, "--scale", "3", "-q", "-o", str(plain)]) == 0
     assert capsys.readouterr().out == ""
-    given = ["--flip", "--hint", "5,6,20,90", "--hint", "2,8,30.5,-45", "--light", "0,30", "--over", "mouse"]
+    given = [
+        "--flip",
+        "--hint",
+        "5,6,20,90",
+        "--hint",
+        "2,8,30.5,-45",
+        "--light",
+        "0,30",
+        "--underlay",
+        "mouse",
+    ]
     assert invoke(["shade", saved, *given, "--scale", "3", "--json", "-o", str(turned)]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert told(turned) == said | {"files": FILES}
-    assert said["method"] is None
-    assert said["flipped"] is True
-    assert said["hints"] == [
+    printed = json.loads(capsys.readouterr().out)
+    assert report(turned) == printed | {"files": FILES}
+    assert printed["method"] is None
+    assert printed["flipped"] is True
+    assert printed["hints"] == [
         {"row": 5, "column": 6, "slant": 20.0, "tilt": 90.0},
         {"row": 2, "column": 8, "slant": 30.5, "tilt": -45.0},
     ]
-    assert said["light"] == {"azimuth": 0.0, "elevation": 30.0}
+    assert printed["light"] == {"azimuth": 0.0, "elevation": 30.0}
     with Image.open(plain / "overlay.png") as one, Image.open(turned / "overlay.png") as other:
         assert one.size == other.size == (36, 33)
     assert "field.npz" not in {path.name for path in plain.iterdir()}
@@ -74,14 +84,14 @@ def test_a_rawfield_and_an_instance_are_taken(field, tmp_path):
     assert invoke(raw) == 0
     made = ["shade", instance, "--method", "greedy", *given, str(tmp_path / "made")]
     assert invoke(made) == 0
-    assert told(tmp_path / "made")["method"] == "greedy"
-    assert told(tmp_path / "raw")["instance"] == told(tmp_path / "made")["instance"]
+    assert report(tmp_path / "made")["method"] == "greedy"
+    assert report(tmp_path / "raw")["instance"] == report(tmp_path / "made")["instance"]
 
 
 REFUSED = [
     (["--hint", "1,2,3"], "give numbers as in 12,30,45,90"),
     (["--hint", "1,2,3,x"], "give numbers as in 12,30,45,90"),
-    (["--hint", "1.5,2,3,4"], "row and column are whole numbers"),
+    (["--hint", "1.5,2,3,4"], "row and column must be whole numbers"),
     (["--hint", "1,2,nan,4"], "give numbers as in 12,30,45,90"),
     (["--hint", "0,0,30,90"], "mask"),
     (["--hint", "5,5,95,90"], "90"),
@@ -90,11 +100,11 @@ REFUSED = [
     (["--scale", "100000"], "choose another scale"),
     (["--size", "12"], "is a field, which has its own grid"),
     (["--method", "greedy"], "is a field, which has its own grid"),
-    (["--over", "nothing.svg"], "cannot be read"),
+    (["--underlay", "nothing.svg"], "cannot be read"),
 ]
 
 
-def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_written(saved, tmp_path, capsys):
+def test_bad_options_are_refused_in_one_line_and_no_file_is_written(saved, tmp_path, capsys):
     for given, reason in REFUSED:
         assert invoke(["shade", saved, "-q", "-o", str(tmp_path / "out"), *given]) == 1, given
         line = capsys.readouterr().err
@@ -107,4 +117,4 @@ def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_written(saved, tmp
     assert "there is no method 'wings'" in capsys.readouterr().err
     (tmp_path / "bad.npz").write_bytes(b"no archive")
     assert invoke(["shade", str(tmp_path / "bad.npz"), "-o", str(tmp_path / "out")]) == 1
-    assert "is no field" in capsys.readouterr().err
+    assert "is neither a field" in capsys.readouterr().err

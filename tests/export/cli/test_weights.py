@@ -1,4 +1,4 @@
-"""The weights of strokes and skew, given wherever a sketch is read: to the commands and in Python."""
+"""The weights of strokes and skew, in every command that reads a sketch, and in Python."""
 
 import crossfield as cf
 import numpy as np
@@ -21,7 +21,7 @@ def drawing(tmp_path):
 
 
 def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path, drawing):
-    """A file is weighed again: the rest of it, its name too, stays; a weight that is not given is kept."""
+    """An instance file keeps its other properties, and each weight that is not given."""
     file = cf.write_instance(cf.sample("mouse", 8, skew_weight=1e-3), tmp_path / "file.json")
     for what, size, wanted in (
         (drawing, ["--size", "8"], cf.read_sketch(drawing, size=8, **WEIGHTS)),
@@ -55,7 +55,7 @@ def test_every_command_that_reads_a_sketch_takes_them(tmp_path, capsys):
         assert cf.read_field(tmp_path / field).instance.sha256 == wanted
 
 
-def test_weights_that_cannot_be_are_refused(tmp_path, capsys, drawing):
+def test_weights_out_of_range_are_refused(tmp_path, capsys, drawing):
     file = cf.write_instance(cf.sample("skew", 4), tmp_path / "skew.json")
     for option, value in (("--stroke-weight", "-1"), ("--skew-weight", "nan"), ("--stroke-weight", "1e7")):
         name = option[2:].replace("-", "_")
@@ -110,9 +110,9 @@ def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
     cf.write_field(cf.greedy(cf.sample("skew", 4)), tmp_path / "field.npz")
     start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
     assert invoke(["solve", "skew", "--size", "4", "--stroke-weight", "10", "-m", "search", *start]) == 1
-    said = capsys.readouterr().err
-    assert "stroke weight 10" in said
-    assert "size, gauge and weights" in said
+    printed = capsys.readouterr().err
+    assert "stroke weight 10" in printed
+    assert "size, gauge and weights" in printed
 
 
 def test_the_summary_names_weights_that_are_not_the_defaults():

@@ -665,7 +665,7 @@ def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(built, spe
     os.killpg(process.pid, signal.SIGINT)
     error = complaints(process.communicate()[1])
     assert process.returncode == 1
-    assert error == "crossfield: interrupted; files that stand are whole\n"
+    assert error == "crossfield: interrupted; all written files are complete\n"
     whole = content(built.folder)
     assert all(whole[name] == data for name, data in content(out).items())
     assert not list(out.glob(".*"))

@@ -86,7 +86,7 @@ def test_a_solver_without_time_gives_back_its_start_and_it_is_said(capsys, tmp_p
     show_report(Report(instance, (Candidate("start", start, 0.1), milp), (), stages={"start": 0.1}), tmp_path)
     said = capsys.readouterr().out
     assert "start returned" in said
-    assert f"MILP gave back its start: objective {late.objective:.4g}, bound" in said
+    assert f"MILP returned its start: objective {late.objective:.4g}, bound" in said
     assert "gap 75%" in said
     assert "0.1 s: start 0.1" in said
 

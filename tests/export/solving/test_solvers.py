@@ -579,7 +579,7 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
     assert code == 0
     assert "MILP: interrupted; its best field so far was kept" in err
     assert "two-stage" in out
-    assert "interrupted: two-stage; the report says what there is" in err
+    assert "interrupted: two-stage; report.json lists the results so far" in err
     assert (tmp_path / "report.json").exists()
 
 
@@ -587,7 +587,7 @@ def test_ctrl_c_during_the_milp_of_a_run_goes_on_with_its_best_point(tmp_path):
 def test_ctrl_c_elsewhere_leaves_whole_files_only(tmp_path):
     code, out, err = interrupted(tmp_path, "*.instance.json", ["run", "mouse", "--size", "100"], "}$")
     assert (code, out.splitlines()) == (1, [plan(cf.Limits())])
-    assert err == "crossfield: interrupted; files that stand are whole\n"
+    assert err == "crossfield: interrupted; all written files are complete\n"
     assert not list(tmp_path.rglob("*.part"))
     assert not (tmp_path / "report.json").exists()
     cf.read_instance(tmp_path / "models" / "mouse.instance.json")

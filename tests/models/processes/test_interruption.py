@@ -105,7 +105,7 @@ def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
     with started([*command, "-o", tmp_path / "out"]) as process:
         while not (tmp_path / "out").exists():
             assert process.poll() is None
-        assert press(process) == (1, "crossfield: interrupted; files that stand are whole\n")
+        assert press(process) == (1, "crossfield: interrupted; all written files are complete\n")
     assert not list(tmp_path.rglob(".*.part"))
     assert not (tmp_path / "out" / "report.json").exists()
 

@@ -1,0 +1,44 @@
+"""Groups of options that several commands share: a dataclass with one field per option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import MISSING, fields, is_dataclass
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from typing import Any, get_type_hints
+
+
+def with_option_groups(function: Callable[..., None]) -> Callable[..., None]:
+    """Command in which each parameter whose type is a dataclass is replaced by one option per field.
+
+    typer reads the options from the signature of the command. The function receives the dataclass.
+    """
+    hints = get_type_hints(function, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    parameters = [
+        option
+        for name, parameter in signature(function).parameters.items()
+        for option in (
+            _options(groups[name]) if name in groups else [parameter.replace(annotation=hints[name])]
+        )
+    ]
+
+    @wraps(function)
+    def command(*arguments: Any, **given: Any) -> None:
+        for name, group in groups.items():
+            names = [field.name for field in fields(group) if field.name in given]
+            given[name] = group(**{each: given.pop(each) for each in names})
+        function(*arguments, **given)
+
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {each.name: each.annotation for each in parameters}
+    return command
+
+
+def _options(group: Any) -> Iterator[Parameter]:
+    """One keyword parameter per field of a dataclass."""
+    hints = get_type_hints(group, include_extras=True)
+    for field in fields(group):
+        default = Parameter.empty if field.default is MISSING else field.default
+        yield Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[field.name])

@@ -1,0 +1,165 @@
+"""Options of every command that reads a sketch, a sample or an instance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from ...models.errors import InputError
+from ...models.sketch.choice import AS_DRAWN, Choice, Silhouette
+from .output import print_warnings
+
+if TYPE_CHECKING:
+    from ...models.instance.instance import Instance
+
+
+@dataclass(frozen=True)
+class SketchOptions:
+    """Grid, curvature lines, gauge and weights with which a sketch is read as an instance."""
+
+    size: Annotated[
+        int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
+    ] = None
+    mask: Annotated[
+        Path | None,
+        typer.Option(
+            "--mask",
+            metavar="FILE",
+            help="Picture of the same size as the sketch, white where the field is wanted.",
+        ),
+    ] = None
+    silhouette: Annotated[
+        Silhouette,
+        typer.Option(
+            "--silhouette",
+            help="Strokes along the outline of the drawing carry no direction (outer), or are curvature lines"
+            " like all others (none).",
+        ),
+    ] = "none"
+    curvature: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--curvature",
+            metavar="LABEL",
+            help="Label of the strokes that are curvature lines, such as colour=red, class=flow, id=group2,"
+            " layer=Flow (SVG) or cluster=3 (.scap). Other strokes cut the field. May be repeated; by default"
+            " red strokes, or all strokes of a drawing in one colour.",
+        ),
+    ] = None
+    view: Annotated[
+        str | None,
+        typer.Option(
+            "--view",
+            metavar="VIEW",
+            help="Viewpoint of a .curves file: front, side, top, or azimuth and elevation in degrees, as in"
+            " 30,25; by default the view in which the strokes extend furthest.",
+        ),
+    ] = None
+    gauge: Annotated[
+        Literal["strokes", "box"] | None,
+        typer.Option(
+            "--gauge",
+            help="Range of 90 degrees for the angle alpha: around the stroke in each pixel (strokes, exact),"
+            " or 0 to 90 as in the paper (box).",
+        ),
+    ] = None
+    stroke_weight: Annotated[
+        float | None,
+        typer.Option(
+            "--stroke-weight",
+            metavar="X",
+            help="Weight of the distance from the strokes, 0 to {most weight}, the same on every grid; by"
+            " default {stroke weight}, or the weight in the instance file.",
+        ),
+    ] = None
+    skew_weight: Annotated[
+        float | None,
+        typer.Option(
+            "--skew-weight",
+            metavar="X",
+            help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default"
+            " {skew weight}, or the weight in the instance file.",
+        ),
+    ] = None
+
+    @property
+    def choice(self) -> Choice:
+        """Strokes that are curvature lines. Raises InputError for a label that does not exist."""
+        return Choice(self.silhouette, tuple(self.curvature or ()), self.view)
+
+    @property
+    def given(self) -> bool:
+        """Whether any of the options is given."""
+        values = (self.size, self.mask, self.gauge, self.stroke_weight, self.skew_weight)
+        return self.choice != AS_DRAWN or any(value is not None for value in values)
+
+    def instance(self, what: str, *, quiet: bool) -> Instance:
+        """Instance of a sketch file, a built-in sample or an instance file, small enough for the memory.
+
+        Prints the warnings of the reader unless quiet. Raises InputError, and InstanceError for a weight that
+        is out of range.
+        """
+        import numpy as np
+
+        from ...models.memory import available_memory
+        from ...models.sketch.read import check_memory
+
+        instance = self._read(what).with_weights(self.stroke_weight, self.skew_weight)
+        check_memory(int(np.count_nonzero(instance.mask)), available_memory())
+        print_warnings(instance, quiet=quiet)
+        return instance
+
+    def _read(self, what: str) -> Instance:
+        from ...models.sketch.read import DEFAULT_SIZE, read_sketch
+        from ...models.sketch.samples import SAMPLES
+
+        path = Path(what)
+        if not path.is_file() and what in SAMPLES:
+            return self._sample(what)
+        if not path.exists():
+            raise InputError(
+                "there is no such file and no such sample; `crossfield samples` lists the samples", file=what
+            )
+        if path.suffix.lower() in {".json", ".npz"}:
+            return self._saved(path)
+        return read_sketch(
+            path,
+            size=DEFAULT_SIZE if self.size is None else self.size,
+            mask=self.mask,
+            gauge=self.gauge or "strokes",
+            silhouette=self.silhouette,
+            curvature=self.choice.curvature,
+            view=self.view,
+        )
+
+    def _sample(self, name: str) -> Instance:
+        from ...models.sketch.read import DEFAULT_SIZE
+        from ...models.sketch.samples import sample
+
+        if self.mask is not None:
+            raise InputError(f"the sample {name} has its own mask; leave --mask out")
+        if self.choice.curvature or self.view:
+            raise InputError(
+                f"the sample {name} has its own curvature lines; leave --curvature and --view out"
+            )
+        size = DEFAULT_SIZE if self.size is None else self.size
+        return sample(name, size, self.gauge or "strokes", silhouette=self.silhouette)
+
+    def _saved(self, path: Path) -> Instance:
+        from ...models.instance.file import read_instance
+
+        if self.size is not None or self.mask is not None:
+            raise InputError(
+                "is an instance, which has its own grid and mask; leave --size and --mask out", file=path
+            )
+        if self.choice != AS_DRAWN:
+            raise InputError(
+                "is an instance, which has its own curvature lines; "
+                "leave --silhouette, --curvature and --view out",
+                file=path,
+            )
+        instance = read_instance(path)
+        return instance if self.gauge is None else instance.with_gauge(self.gauge)
