@@ -98,6 +98,6 @@ def check_indexed(problem: Problem, layout: str, instead: str) -> None:
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(f"{layout} has no place for columns fixed one by one; write {instead}")
-    weights = (instance.w, instance.stroke_coefficient, instance.skew_coefficient)
-    for name, values in zip(("w", "w_strokes", "w_beta"), weights, strict=True):
-        check_coefficients(values, f"{name} of {instance.name}")
+    check_coefficients(instance.w, f"w of {instance.name}")
+    check_coefficients(instance.stroke_coefficient, f"w_strokes of {instance.name}")
+    check_coefficients(instance.skew_coefficient, f"w_beta of {instance.name}")

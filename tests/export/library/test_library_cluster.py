@@ -20,6 +20,7 @@ title = "a library for tests of clusters"
 [rungs.tiny]
 sizes = [3, 4]
 formats = ["nl", "mps"]
+prove = false
 
 [rungs.medium]
 sizes = [6]

@@ -132,7 +132,7 @@ def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size,
 
 @pytest.mark.slow
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=15)
 def test_searches_of_odd_instances_end(seed):
     instance = odd_instance(seed)
     walked(instance, seed, kicks=12, steps=6)
