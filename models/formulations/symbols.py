@@ -51,9 +51,9 @@ R: Final = alpha + beta - theta
 class Variable:
     """A block of columns: one variable per element of an index set.
 
-    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format,
-    NumPy and the formulas of the docs are derived; value: the variable at a given field, as an expression over
-    its index set; meaning: one line for the docs.
+    lower, upper: its bounds, numbers or expressions in data over its index set. Every format, NumPy and the
+    formulas of the docs are derived from them. value: the variable at a given field, as an expression over
+    its index set. meaning: one line for the docs.
     """
 
     name: str
