@@ -290,7 +290,7 @@ def test_unreadable_and_unsafe_files(tmp_path, written):
     path.write_bytes(pack_arrays(arrays)[:-30])
     for bad in (path, pickled, tmp_path / "long.npz", tmp_path / "absent.npz"):
         assert check_certificate.main([str(bad)]) == 2
-    with pytest.raises(InputError, match=r"it\.npz: is no certificate: is no \.npz, or has more or less"):
+    with pytest.raises(InputError, match=r"it\.npz: is not a certificate: is no \.npz, or has more or less"):
         read_certificate(path)
 
 
@@ -310,7 +310,7 @@ def test_every_forged_archive_is_refused_by_both_readers(written, tmp_path, caps
             other.write_bytes(forge(path.read_bytes()))
             assert check_certificate.main([str(other)]) == 2
             assert capsys.readouterr().out.startswith("unreadable: ")
-            with pytest.raises(InputError, match=r"other\.npz: is no certificate: "):
+            with pytest.raises(InputError, match=r"other\.npz: is not a certificate: "):
                 read_certificate(other)
 
 
@@ -327,7 +327,7 @@ def test_a_second_head_cannot_claim_twice_the_energy(second, written, tmp_path, 
     other.write_bytes(data)
     assert check_certificate.main([str(other)]) == 2
     assert invoke(["prove", "--check", str(other)]) == 1
-    assert "is no certificate" in capsys.readouterr().err
+    assert "is not a certificate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("second", ["instance_head.NPY", "instance_head.bin"])
@@ -341,7 +341,7 @@ def test_a_proof_for_another_instance_is_refused(second, written, tmp_path):
     other = tmp_path / "other.npz"
     other.write_bytes(packed([*(members | {"instance_head.npy": npy(text)}).items(),
                               (second, members["instance_head.npy"])]))  # fmt: skip
-    with pytest.raises(InputError, match="is no certificate"):
+    with pytest.raises(InputError, match="is not a certificate"):
         read_certificate(other, on=instance)
     with pytest.raises(InputError, match="is a certificate of another instance"):
         read_certificate(path, on=instance)
@@ -369,7 +369,7 @@ def test_arrays_that_a_certificate_has_are_of_one_kind_each(written):
 def test_the_text_of_a_certificate_has_each_key_once(written):
     _, arrays = written(1)
     text = arrays["head"].tobytes().replace(b"{", b'{"bound": 1.0, ', 1)
-    assert "a key that is there twice" in refusal(arrays | {"head": np.frombuffer(text, np.uint8)})
+    assert "a repeated key" in refusal(arrays | {"head": np.frombuffer(text, np.uint8)})
     assert "levels is no whole number" in refusal(with_head(arrays, levels=1.5))
     assert "of version 1" in refusal(with_head(arrays, version=True))
 
