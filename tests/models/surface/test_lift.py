@@ -119,7 +119,7 @@ def test_a_hint_and_flip_choose_the_side():
         ((6, 5, HALF, 0), "slant of 90 degrees; give one from 0 to less than 90"),
         ((6, 5, -0.1, 0), "slant"),
         ((6, 5, np.nan, 0), "slant of nan degrees"),
-        ((6, 5, 0.1, np.inf), "tilt inf, which is no direction"),
+        ((6, 5, 0.1, np.inf), "tilt inf, not a direction"),
     ],
 )
 def test_hints_that_say_nothing_possible_are_refused(hint, message):
