@@ -91,7 +91,7 @@ REFUSED = {
     "#ff0000": "'#ff0000' chooses no strokes; write colour=red, class=flow, id=group2",
     "red": "'red' chooses no strokes",
     "class=": "'class=' chooses no strokes",
-    "colour=redish": "'redish' is no colour; write a name or #rrggbb",
+    "colour=redish": "'redish' is not a colour; write a name or #rrggbb",
     "id=empty": "draws nothing of id=empty",
 }
 
