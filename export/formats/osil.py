@@ -11,7 +11,7 @@
 
 What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
 Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
-is said in <description>, not in comments.
+is stated in <description>, not in comments.
 
 Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
 each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
@@ -65,7 +65,7 @@ xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
-    """The bytes of the OSiL file, block by block. header: lines that say what it holds."""
+    """The bytes of the OSiL file, block by block. header: lines that describe the content."""
     problem, names, counts = form.problem, form.names, Counter[str]()
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
@@ -114,7 +114,7 @@ def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
 
 
 def _beside_nonlinear(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """The same for an objective that also has terms beyond quadratic: those are left to the tree."""
+    """As `_coefficients`, for an objective with terms beyond quadratic, which are left to the tree."""
     at, values = [np.zeros((0, degree + 1), np.int64)], [np.zeros(0)]
     for family in (family for family in problem.objective if family.degree <= 2):
         for term in family.of_degree(degree):
@@ -145,7 +145,7 @@ def _constraints(family: PlacedFamily, names: Names, counts: Counter[str]) -> It
 
 
 def _linear_rows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
-    """The matrix row by row: where each row starts, then columns, then values."""
+    """The matrix row by row: the start of each row, then columns, then values."""
     if not problem.rows:
         return
     widths = [(family.count, len(family.of_degree(1))) for family in problem.rows]

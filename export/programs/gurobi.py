@@ -1,4 +1,4 @@
-"""Gurobi as a reader of LP and MPS, through gurobipy. Its free licence ends at 2000 columns and rows."""
+"""Gurobi as a reader of LP and MPS, through gurobipy. Its free licence allows 2000 columns and rows."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from .reading import Meaning, finite
 _RAW: Final = 0
 """The style of solution files that HiGHS reads and writes with all digits."""
 _TICK: Final = 0.1
-"""Seconds between two looks at a running solver."""
+"""Seconds between two checks of a running solver."""
 
 
 def version() -> str:
@@ -43,7 +43,7 @@ def set_options(highs: Any, **options: str | float) -> None:
     for option, value in options.items():
         highs.setOptionValue(option, value)
     if options.get("threads"):
-        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - else that of the earlier solve is kept
+        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - otherwise the old number is kept
 
 
 def solved(highs: Any, path: Path) -> Any:

@@ -12,7 +12,7 @@ _SIZE: Final = r"^original problem has (\d+) variables \([^)]*\) and (\d+) const
 
 
 def _rows(text: str) -> tuple[Step, ...]:
-    """The rows of the table; where its bounds stand says its header, which versions have changed."""
+    """The rows of the table; its header gives the columns of bounds, which differ between versions."""
     header = re.search(_HEADER, text, re.MULTILINE)
     if header is None:
         return ()

@@ -112,4 +112,4 @@ def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
     document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
     manifest.path.write_text(json.dumps(document))
     (bad,) = verify(tmp_path, programs=["highs"]).bad
-    assert "the manifest says" in bad.reason
+    assert "the manifest states" in bad.reason

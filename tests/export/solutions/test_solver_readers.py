@@ -439,7 +439,7 @@ def test_miplib_omits_zeros():
 
 FAULTS = {
     "baron-26.5.27_qp_sum": "summary of BARON, which holds no values; give its results",
-    "baron_res_cut": "does not say how the search ended",
+    "baron_res_cut": "the end of the search is missing",
     "baron_res_cut_after_the_table": "line 183: the file is cut off where the objective should be",
     "baron_res_cut_in_the_table": "line 173: the table is cut off",
     "baron_res_value_missing": "line 180: 3 words stand where 4 should",
@@ -470,7 +470,7 @@ FAULTS = {
     "gurobi_cut_in_a_number": "line 8: the file is cut off in the middle",
     "gurobi_json_cut": "line 1: the JSON is damaged or cut off at column 900",
     "gurobi_json_no_status": "the SolutionInfo has no Status",
-    "gurobi_json_optimal_without_vars": "says optimal and holds no Vars",
+    "gurobi_json_optimal_without_vars": "states optimal but holds no Vars",
     "gurobi_json_value_is_nan": "x has no value",
     "gurobi_json_value_is_text": "not a list of names and values",
     "gurobi_no_values": "the file holds no values",

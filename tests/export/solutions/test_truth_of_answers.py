@@ -96,7 +96,7 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
     assert (facts["status"], facts["claimed"]) == ("unknown", "optimal-global")
     assert facts["worst_violation"] > 0.3
     assert re.search(
-        r"relaxed\.sol: says optimal-global, but its point breaks integrality by 0\.3", complaint
+        r"relaxed\.sol: claims optimal-global, but its point breaks integrality by 0\.3", complaint
     )
     assert "--tolerance" in complaint
     code, facts, complaint, written = reading(path, "--tolerance", "0.5")
@@ -143,7 +143,7 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
     assert of(reported=objective, bound=objective).status == "optimal-global"
     assert of(reported=objective * (1 + 0.5 * TOLERANCE), bound=objective - 1).status == "optimal-global"
     (why,) = of(reported=objective + 0.01).contradictions
-    assert why.startswith("it tells the objective")
+    assert why.startswith("it states the objective")
     (why,) = of(bound=objective + 0.01).contradictions
     assert why.startswith("the dual bound")
     assert of(reported=np.inf).status == of(reported=np.nan).status == "unknown"
@@ -184,7 +184,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
         assert facts["claimed"] == status
         wrong = code == 200 and values is point
         assert facts["status"] == ("unknown" if wrong else status)
-        assert ("its point is feasible" if wrong else "no answer") in complaint
+        assert ("its point is feasible" if wrong else "not a solution") in complaint
 
 
 # values
@@ -303,7 +303,7 @@ def test_files_of_a_status_alone_are_told_to_be_cut():
         data = path.read_bytes()
         end = len(data) - 1 if path.name.endswith("_tim.lst") else data.index(b"\n**** FILE SUMMARY")
         for length in (end, end - 1, end - 10):
-            with pytest.raises(SolutionError, match=r"cut off|no solution file|not the number of a status"):
+            with pytest.raises(SolutionError, match=r"cut off|not a solution file|not the number of a status"):
                 parse_raw(data[:length])
 
 

@@ -348,7 +348,7 @@ def test_without_a_start_and_time_there_is_no_point(tmp_path):
     problem = cf.formulate(instance, "milp-mccormick")
     found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(1e-6))
     assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
-    with pytest.raises(SolutionError, match="left no answer within its time; give it more, or a start"):
+    with pytest.raises(SolutionError, match="returned no answer within its time; give it more, or a start"):
         _ = found.field
     assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
 
@@ -360,7 +360,7 @@ def told_to_highs(program, folder, monkeypatch):
 
 
 def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, capsys):
-    """HiGHS says optimal of a point that is not feasible."""
+    """HiGHS reports an optimum for a point that is not feasible."""
     told_to_highs(
         """
         import pathlib, re
@@ -376,7 +376,7 @@ def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, 
     )
     files = tmp_path / "files"
     assert invoke(["solve", "skew", "--size", "4", "-f", "milp-mccormick", "-o", str(files), "--quiet"]) == 1
-    assert "says optimal-global, but" in capsys.readouterr().err
+    assert "claims optimal-global, but" in capsys.readouterr().err
     assert not list(files.glob("*.field.npz"))
 
 
