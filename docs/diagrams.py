@@ -114,7 +114,7 @@ def strip(figure: Figure) -> None:
 
 
 def facets(figure: Figure) -> None:
-    """The points (beta, z) that satisfy the facets, for three values of p1, and those (26) as printed adds."""
+    """The points (beta, z) that satisfy the facets, for three values of p1, and points that (26) adds."""
     shown = figure.subplots(1, 3, sharey=True)
     beta = np.linspace(-QUARTER, QUARTER, 5)  # all corners are among these
     for axes, p1 in zip(shown, (0.0, 0.5, 1.0), strict=True):

@@ -43,12 +43,7 @@ def generated(command: str) -> str:
 
 def formulations() -> None:
     """Write docs/formulations.md: every formulation as mathematics, and the tables of formats and solvers."""
-    parts = [
-        "# Formulations",
-        generated("python docs/make.py formulations"),
-        kinds_in_short(),
-        INTRODUCTION,
-    ]
+    parts = ["# Formulations", generated("python docs/make.py formulations"), kinds_in_short(), INTRODUCTION]
     parts.append(
         markdown(
             ("variable", "over", "meaning"), [[f"`{v.name}`", v.over, v.meaning] for v in VARIABLES.values()]
@@ -63,7 +58,7 @@ def formulations() -> None:
             recipe.summary,
             f"in short `{recipe.short}`, options: {settable}",
         )
-        facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in sentences)
+        facts = " ".join(f"{words[0].upper()}{words[1:]}." for words in about)
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
     parts += [
