@@ -52,7 +52,7 @@ def formulations() -> None:
     for name, recipe in FORMULATIONS.items():
         formulation = declare(name)
         settable = ", ".join(sorted(recipe.settable)) or "none"
-        sentences = (
+        about = (
             recipe.source,
             recipe.kind,
             recipe.summary,

@@ -1,4 +1,4 @@
-"""Files that are written beside and renamed: what others left in a folder stands in nobody's way."""
+"""Files are written under another name and renamed; leftovers of others do not interfere."""
 
 import os
 import subprocess

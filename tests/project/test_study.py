@@ -1,4 +1,4 @@
-"""The study goes on where it was killed, each run with one row; its page is made from the rows beside it."""
+"""The study continues after a kill, each run with one row; its page is made from its rows."""
 
 from __future__ import annotations
 

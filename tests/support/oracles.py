@@ -79,7 +79,7 @@ def absence(program: str) -> str:
 
 
 def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
-    """What the AMPL Solver Library says of an .nl file at its starting point.
+    """The AMPL Solver Library's report on an .nl file at its starting point.
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """

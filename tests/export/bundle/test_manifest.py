@@ -195,7 +195,7 @@ def test_the_whole_set_is_the_same_under_another_hash_seed(tmp_path):
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """A manifest of qp-fixed with its instance beside it."""
+    """A manifest of qp-fixed and its instance."""
     return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, ["nl"]).path
 
 

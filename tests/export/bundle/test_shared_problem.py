@@ -77,7 +77,7 @@ kept = cached_property.__get__
 
 
 def unchanged(name: str, suffix: str, dialect: str, monkeypatch) -> None:
-    """The worst that threads can do to cached values: every reader gets one of its own."""
+    """The worst that threads can do to cached values: every reader gets its own array."""
     shape = "pixel" if name == "milp-mccormick" else "row"
     usual = bytes_of(make_problem(name, make_instance(shape)), suffix, dialect)
     with monkeypatch.context() as patch:

@@ -1,4 +1,4 @@
-"""Without integrality a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
+"""Without integrality a lifted product is a relaxation, as files, manifests, tables and `verify` state."""
 
 import json
 from dataclasses import replace
@@ -80,7 +80,7 @@ def starts(instance):
 
 
 def test_a_solver_is_chosen_that_reads_the_products(two):
-    """HiGHS would solve the weaker problem of the .mps; it does when it is asked for, and the facts tell."""
+    """HiGHS would solve the weaker problem of the .mps; it does so on request, and the facts state it."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted

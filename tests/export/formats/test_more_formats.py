@@ -81,7 +81,7 @@ def feasible_points(problem: Problem) -> Points:
 
 
 def tiny() -> Instance:
-    """Two pixels with strokes that no field follows without loss: the window is that of the box."""
+    """Two pixels with strokes that no field follows without loss: the window is the box's."""
     pixels = [[0, 0], [0, 1]]
     return Instance(
         "small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], skew_coefficient=1e-2, gauge="box"
@@ -173,7 +173,7 @@ def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.oracles
 def test_verify_hands_them_to_their_readers(tmp_path: Path):
-    """SCIP reads every .osil, GLPK the linear .mod, as the table states; nobody is handed .qplib or .bar."""
+    """SCIP reads every .osil, GLPK the linear .mod, as the table states; no program gets .qplib or .bar."""
     write_all(tiny(), tmp_path, formats=MORE)
     found = verify(tmp_path, programs=["scip", "glpk"], seconds=0.3)
     assert found.bad == []
@@ -359,7 +359,7 @@ def bound(text: str) -> float:
 
 
 def osil_model(path: Path) -> tuple[Meaning, Any, float]:
-    """What the XML says: coefficients, the nonlinear node or None, and the constant."""
+    """The content of the XML: coefficients, the nonlinear node or None, and the constant."""
     root = Xml.parse(path).getroot()
     data = root.find("instanceData", SPACE)
 
@@ -409,7 +409,7 @@ def osil_model(path: Path) -> tuple[Meaning, Any, float]:
 
 
 def assert_means(model: Meaning, problem: Problem) -> None:
-    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are not there."""
+    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are missing."""
     expected = of_problem(problem)
     n, m = problem.columns, problem.row_count
     assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
@@ -708,11 +708,11 @@ def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
 
 BARON = importlib.util.find_spec("gamspy_baron")
 FITS = ["minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqp-mccormick", "miqp-exact", "qp-fixed"]
-"""What two pixels keep within BARON's free size: 10 columns, 10 rows, 50 nonlinear operations."""
+"""Formulations that fit BARON's free size on two pixels: 10 columns, 10 rows, 50 nonlinear operations."""
 
 
 def by_baron(path: Path, problem: Problem) -> Any:
-    """What BARON, in its free edition of 10 columns and 10 rows, answers to the file."""
+    """The answer of BARON, in its free edition of 10 columns and 10 rows, to the file."""
     program = Path(BARON.submodule_search_locations[0]) / "baron"
     done = subprocess.run([program, path.name], cwd=path.parent, capture_output=True, text=True, check=False)
     assert "Normal completion" in done.stdout, done.stdout

@@ -1,4 +1,4 @@
-"""Messages tell numbers as people write them, and advice that helps."""
+"""Numbers in messages are plain, and the advice of messages helps."""
 
 import re
 
@@ -11,7 +11,7 @@ from crossfield.models.errors import CrossfieldError, UnsupportedByFormatError
 
 ALL = ["nl", "gms", "lp", "mps", "mod", "osil", "qplib", "bar"]
 SCALAR = re.compile(r"np\.|\barray\(|dtype")
-"""What the representation of a NumPy number or array has and a plain number has not."""
+"""Marks of the representation of NumPy numbers and arrays, which plain numbers do not have."""
 
 
 def one_stroke(theta=1.0, w=1.0, **given):
@@ -19,7 +19,7 @@ def one_stroke(theta=1.0, w=1.0, **given):
 
 
 def refusals(instance, folder):
-    """Why writers refuse what they refuse of an instance, but for what is beyond a format's degree."""
+    """Reasons of writers to refuse an instance, except polynomials beyond a format's degree."""
     manifests = write_all(instance, folder, formats=ALL)
     reasons = [reason for each in manifests for reason in each.document["refused"].values()]
     return [reason for reason in reasons if "nothing beyond" not in reason]
@@ -53,7 +53,7 @@ def test_a_coefficient_is_told_as_a_plain_number():
 
 
 def test_messages_about_numbers_of_numpy_are_plain():
-    """Values that come out of arrays, handed to everything that tells them."""
+    """Values from arrays, passed to every function that prints them."""
     mask, one = np.ones((1, 2), bool), np.float64(1.0)
     instance = one_stroke()
     field = cf.greedy(instance)

@@ -1,4 +1,4 @@
-"""What notebooks show: pictures, tables that load nothing, and one line of each."""
+"""Representations in notebooks: pictures, tables that load nothing, and one line of each."""
 
 import base64
 import io
@@ -85,7 +85,7 @@ def test_a_solution_without_a_point_is_told(problem):
 
 @pytest.mark.slow
 def test_a_module_alone_shows_pictures_too():
-    """The face of the package says who draws before any of its modules is there."""
+    """The top-level package registers the drawing function before any of its modules is loaded."""
     code = (
         "from crossfield.models.sketch.samples import sample; import sys; i = sample('skew', 4); "
         "assert 'matplotlib' not in sys.modules; sys.exit(not i._repr_png_().startswith(b'\\x89PNG'))"

@@ -1,4 +1,4 @@
-"""What Ipopt leaves when it is stopped: the best feasible point that it came by."""
+"""Result of Ipopt when it is stopped: the best feasible point that it has found."""
 
 import signal
 from dataclasses import replace
@@ -24,7 +24,7 @@ def relaxed(tmp_path):
 
 @pytest.fixture
 def own_interrupt():
-    """The driver takes over SIGINT; give it back."""
+    """The driver takes over SIGINT; restore it."""
     before = signal.getsignal(signal.SIGINT)
     yield
     signal.signal(signal.SIGINT, before)

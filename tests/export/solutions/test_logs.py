@@ -1,4 +1,4 @@
-"""Logs of solvers: what each says, how far a rounded bound is trusted, and what is no log."""
+"""Logs of solvers: content, trust in rounded bounds, and files that are not logs."""
 
 import math
 from contextlib import suppress
@@ -11,7 +11,7 @@ from crossfield.models.errors import CrossfieldError, SolutionError
 
 LOGS = places.DATA / "logs"
 OPTIMUM = 0.26710785
-"""Of the problem of five of the logs, as Gurobi, HiGHS and SCIP find it."""
+"""Optimum of the problem of five of the logs, as found by Gurobi, HiGHS and SCIP."""
 
 KNOWN = {
     "highs": ("highs", "1.15.1", "optimal", 0.267104325999, 0.267107849905, 6.06, 1, None, 280, 421),

@@ -1,4 +1,4 @@
-"""The command `evaluate` and its function: exact fields, reports, what Ctrl-C leaves."""
+"""The command `evaluate` and its function: exact fields, reports, and the effect of Ctrl-C."""
 
 import json
 

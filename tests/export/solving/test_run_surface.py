@@ -1,4 +1,4 @@
-"""A run shades the surface over its field where that can be trusted, says why not, and stops for Ctrl-C."""
+"""A run shades the surface over its field if it can be trusted, states doubts, and stops for Ctrl-C."""
 
 import json
 from dataclasses import replace

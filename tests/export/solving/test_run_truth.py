@@ -1,4 +1,4 @@
-"""A run tells where it began, which solver gave back its start, and where the time went."""
+"""A run reports its start, the solver that returned its start, and the seconds of each stage."""
 
 import json
 from dataclasses import replace

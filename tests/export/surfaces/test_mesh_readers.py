@@ -1,4 +1,4 @@
-"""Programs that nobody here wrote read a surface: its places, quads and texture, and the way it faces."""
+"""External programs read a surface: its places, quads and texture, and its orientation."""
 
 import json
 import subprocess

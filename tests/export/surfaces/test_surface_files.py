@@ -1,4 +1,4 @@
-"""Files of a surface: the mesh is the surface, each is the same twice, and nothing is left half done."""
+"""Files of a surface: the mesh equals the surface, writes are repeatable and complete."""
 
 import json
 from collections import Counter

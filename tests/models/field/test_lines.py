@@ -1,4 +1,4 @@
-"""Fields from two lines a pixel: the same crosses whatever the turns and the order, in every gauge."""
+"""Fields from two lines per pixel: the same crosses for all turns and orders, in every gauge."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Raw fields read back: our own, and those that other programs leave on our mesh."""
+"""Raw fields read back: our own, and those of other programs on our mesh."""
 
 import numpy as np
 import pytest

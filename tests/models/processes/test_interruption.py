@@ -1,4 +1,4 @@
-"""Ctrl-C and a run: what it ends, what is kept, and that nobody is left behind."""
+"""Ctrl-C and a run: its end, the kept results, and that no process is left behind."""
 
 import json
 import os
@@ -24,7 +24,7 @@ report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.
 
 @contextmanager
 def started(command, first=None):
-    """A process that has printed a line which begins so; afterwards none that it has started is left."""
+    """A process that has printed a line with this start; in the end no child of it is left."""
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
@@ -39,7 +39,7 @@ def started(command, first=None):
 
 
 def press(process, times=1):
-    """Exit code and complaints of a process that Ctrl-C is pressed for."""
+    """Exit code and complaints of a process after Ctrl-C."""
     for _ in range(times):
         os.killpg(process.pid, signal.SIGINT)
     err = process.communicate()[1]

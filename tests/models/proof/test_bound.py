@@ -1,4 +1,4 @@
-"""The bound of a lattice against all labellings of small ones, and what passes, threads, pruning do to it."""
+"""The bound of a lattice against all labellings of small ones, after passes, with threads and pruning."""
 
 from itertools import product
 
@@ -66,7 +66,7 @@ def discrete(lattice):
 
 
 def least_labelling(unary, pairs):
-    """The least sum over all labellings: pixels are eliminated one by one, which forgets none."""
+    """The least sum over all labellings: pixels are eliminated one by one."""
     tables = [((i,), cost) for i, cost in enumerate(unary)] + [((i, j), cost) for i, j, cost in pairs]
     for pixel in range(len(unary)):
         mine = [table for table in tables if pixel in table[0]]

@@ -1,4 +1,4 @@
-"""Proofs whose levels are cut into branches: what they hold together, and what a checker makes of them."""
+"""Proofs whose levels are cut into branches: the cells that they hold together, and their check."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_branches_cut_one_pixel_and_hold_all_cells_together(cut):
 
 
 def test_no_branch_is_below_its_level():
-    """Before what the branches hold is rounded in its turn."""
+    """Before the cells of the branches are rounded in their turn."""
     field = first_field(INSTANCE)
     with crew(1) as hands:
         root = Dual(Lattice.whole(field, 8), hands)

@@ -79,7 +79,7 @@ def test_the_same_proof_gives_the_same_bytes(tmp_path):
 
 
 def test_a_certificate_that_is_cut_off_holds_with_the_levels_that_were_checked(written, tmp_path):
-    """It is over after so many questions, whenever that is."""
+    """Time is over after that many calls, at any point."""
     _, whole = written(3)
     bound, path, kept = check_certificate.check(whole).bound, tmp_path / "it.npz", []
     pixels = len(whole["alpha"])
@@ -98,7 +98,7 @@ def test_no_certificate_is_written_where_it_is_over_before_a_level_is_checked(tm
 
 
 def after(questions):
-    """Says that it is over when it has been asked so often."""
+    """Return a function that reports the end of time after that many calls."""
     asked = iter(range(questions))
     return lambda: next(asked, None) is None
 
@@ -267,7 +267,7 @@ def flipped(array, at):
 
 
 def test_levels_that_do_not_follow_are_not_written(tmp_path):
-    """A prover that drops what may hold a better field is found out, and the file that stood there stays."""
+    """A prover that drops cells of a better field is detected, and the old file stays."""
     proof = proven(1)
     path = tmp_path / "it.npz"
     path.write_bytes(b"kept")
@@ -316,7 +316,7 @@ def test_every_forged_archive_is_refused_by_both_readers(written, tmp_path, caps
 
 @pytest.mark.parametrize("second", ["head.NPY", "HEAD.npy", "head.bin", "head.npy"])
 def test_a_second_head_cannot_claim_twice_the_energy(second, written, tmp_path, capsys):
-    """One reader opens `head.npy`; another may take the last member, or cut the endings of names."""
+    """One reader opens `head.npy`; another may take the last member, or cut the suffixes of names."""
     path, arrays = written(1)
     twice = 2 * read_certificate(path).energy
     claims = members_of(pack_arrays(with_head(arrays, energy=twice, bound=twice, status="optimal")))

@@ -1,4 +1,4 @@
-"""What the bound rests on, in exact rational numbers, and the same for the costs as they are computed."""
+"""The lemmas of the bound in exact rational numbers, and for the costs as they are computed."""
 
 import random
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Proofs from end to end: what is proven is so, whatever the weights, gauge and mask."""
+"""Proofs from end to end: true for all weights, gauges and masks."""
 
 import crossfield as cf
 import numpy as np
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.numeric
 
 
 def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
-    """Where no window is in the way, all jumps are tried by dense least squares."""
+    """All jumps are tried by dense least squares, where no window binds."""
     for seed in range(12):
         instance = random_instance(seed, shape=(2, 2))
         proof = cf.prove(instance, jobs=1)
@@ -140,7 +140,7 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
 
 @pytest.mark.slow
 def test_a_stroke_that_either_line_may_carry_leaves_no_gap():
-    """At the end one box goes over an edge of its window, however fine the lattice."""
+    """At the end one box crosses an edge of its window, on lattices of any spacing."""
     instance = weighted(3, stroke_coefficient=0.1)
     proof = cf.prove(instance, jobs=1)
     assert proof.status == "optimal"

@@ -224,7 +224,7 @@ def test_a_deadline_that_is_far_changes_no_bit():
 
 
 class Hourglass:
-    """Time that is over after it has been asked for so many times, and how often it was asked."""
+    """A time limit that is over after a number of calls, and counts them."""
 
     def __init__(self, grains):
         self.grains, self.asked = grains, 0

@@ -1,4 +1,4 @@
-"""What in a drawing is a curvature line: strokes chosen by label, and silhouettes that are none."""
+"""Curvature lines of a drawing: strokes chosen by label, and silhouettes that are excluded."""
 
 import io
 import json

@@ -171,7 +171,7 @@ def test_the_method_bends_a_given_start_too(tmp_path):
 
 
 def test_rounds_end_when_the_time_is_over():
-    """Asked once a round; what was reached by then comes back, and the start where nothing was."""
+    """The function is called once per round; the present result is returned, or the start without one."""
     start = polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
     asked = []
 

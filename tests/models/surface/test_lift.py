@@ -1,4 +1,4 @@
-"""Surfaces over cross fields: near the truth, the same however crosses are written, and always ended."""
+"""Surfaces over cross fields: near the truth, independent of the notation of crosses, and always ended."""
 
 import functools
 from dataclasses import replace
@@ -32,7 +32,7 @@ def apart(first, second):
 
 
 def error(surface, true):
-    """Mean angle to the true normals, the side by the truth."""
+    """Mean angle to the true normals, on the side of the truth."""
     return min(apart(each.normals, true.normals).mean() for each in (surface, surface.flipped()))
 
 
