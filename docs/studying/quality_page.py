@@ -68,12 +68,12 @@ def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
 def changes_table(rows: list[Row]) -> str:
     """All changes, for hidden curves and surfaces; those beyond two standard errors are bold."""
     drawn, known = changes(rows, surfaces=False), changes(rows, surfaces=True)
-    cells = [[words, _told(drawn[name]), _told(known[name])] for name, (words, *_) in CHANGES.items()]
+    cells = [[words, _cell(drawn[name]), _cell(known[name])] for name, (words, *_) in CHANGES.items()]
     cells = [line for line in cells if any(line[1:])]
     return markdown(("change", "hidden curves, degrees", "surfaces, degrees"), cells)
 
 
-def _told(found: Change | None) -> str:
+def _cell(found: Change | None) -> str:
     if found is None:
         return ""
     text = f"{found} ({found.pairs} pairs)"
@@ -92,7 +92,7 @@ class Elsewhere:
 
     def __str__(self) -> str:
         parts = [
-            f"{OTHERS[way].format(seconds=self.seconds)} {_told(found)}"
+            f"{OTHERS[way].format(seconds=self.seconds)} {_cell(found)}"
             for way, found in self.changes.items()
         ]
         return (

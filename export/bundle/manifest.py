@@ -274,7 +274,7 @@ def is_recordable(problem: Problem) -> bool:
     return _narrowed(plain, problem.windows).sha256 == problem.sha256
 
 
-def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+def write_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
     """Write manifest and instance for a problem just written in one format; return the manifest.
 
     Files of the same problem that an existing manifest lists stay listed. Raises OutputError.

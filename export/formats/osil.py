@@ -7,10 +7,10 @@
     <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
     <quadraticCoefficients>
     <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               not halved; -1 is the objective (O1, O2)
-    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       what is beyond quadratic, in one <nl> (O2)
+    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms beyond quadratic, in one <nl> (O2)
 
-What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
-Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
+Terms up to quadratic are coefficients; squares of sums and cos(pi p) beyond that keep their form.
+Indices count from 0, in the order of our columns and rows. Counts precede the lists. The content of the file
 is stated in <description>, not in comments.
 
 Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
@@ -107,13 +107,13 @@ def _variables(block: Block, names: Names, kind: str, counts: Counter[str]) -> I
 def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
     """Columns (k, degree), each set once, and coefficients (k,) of the objective's terms up to quadratic."""
     nonlinear = problem.objective_degree > 2
-    index, value = _beside_nonlinear(problem, degree) if nonlinear else problem.merged_objective(degree)
+    index, value = _quadratic_part(problem, degree) if nonlinear else problem.merged_objective(degree)
     if degree:
         check_coefficients(value, "the objective")
     return index, value
 
 
-def _beside_nonlinear(problem: Problem, degree: int) -> tuple[Ints, Floats]:
+def _quadratic_part(problem: Problem, degree: int) -> tuple[Ints, Floats]:
     """As `_coefficients`, for an objective with terms beyond quadratic, which are left to the tree."""
     at, values = [np.zeros((0, degree + 1), np.int64)], [np.zeros(0)]
     for family in (family for family in problem.objective if family.degree <= 2):

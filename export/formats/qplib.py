@@ -1,4 +1,4 @@
-"""QPLIB's own format, for what is at most quadratic: lines of numbers in a fixed order, comments after `#`.
+"""QPLIB's own format, for problems up to quadratic: lines of numbers in a fixed order, comments after `#`.
 
     tiny # ...                     name of the instance; the header stands in comments of the first lines
     CGL # ...                      type of objective (L linear, D convex diagonal, C convex, Q any), of
@@ -19,7 +19,7 @@
 Everything counts from 1. Objective and rows are x'Qx/2 + bx with a *lower triangular* Q, not the triangle of
 a symmetric one: a square's entry and a product's entry are both twice the coefficient. See
 qplib.zib.de/doc.html (Q_row,col = 0 for row < col); Jij-Inc/ommx#1207 and #1209 found it so in all 453
-instances against their GAMS models. No line is comment alone and none is empty, for not every reader skips
+instances against their GAMS models. No line is only a comment or empty, because some readers do not skip
 those.
 
 Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic

@@ -43,7 +43,7 @@ def read(path: Path) -> Meaning:
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     plain, products = model.linear_constraints, model.quadratic_constraints
     senses = np.array([*plain.get_senses(), *products.get_senses()])
     limits = np.array([*plain.get_rhs(), *products.get_rhs()])

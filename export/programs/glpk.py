@@ -54,7 +54,7 @@ def read(path: Path) -> Meaning:
         (int(i), int(j), float(value)) for key, i, j, value in (line for line in lines if line[0] == "a")
     ]
     if any(not j for _, j, _ in entries):
-        raise RefusedError("it has a constant beside ONE")
+        raise RefusedError("it has a constant besides ONE")
     costs = np.zeros(len(names["j"]))
     for _, j, value in (entry for entry in entries if not entry[0]):
         costs[j - 1] = value

@@ -53,7 +53,7 @@ def solved(highs: Any, path: Path) -> Any:
     return highs
 
 
-def leave(highs: Any, solution: Path) -> None:
+def write_solution(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
     beside = solution.with_suffix(".part")
     if highs.writeSolution(str(beside), _RAW) == highspy.HighsStatus.kError:
@@ -67,7 +67,7 @@ def read(path: Path) -> Meaning:
     highs = loaded(path)
     lp, hessian = highs.getLp(), highs.getModel().hessian_
     if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     given: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
     given |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
     if len(lp.integrality_):
@@ -97,7 +97,7 @@ def solve(job: Job) -> Outcome:
     _run(highs)
     if highs.getModelStatus() == highspy.HighsModelStatus.kNotset:
         raise RefusedError("HiGHS answers with an error (model status Not Set)", file=job.model)
-    leave(highs, job.solution)
+    write_solution(highs, job.solution)
     if not len(highs.getLp().integrality_):
         return Outcome()
     info = highs.getInfo()

@@ -48,7 +48,7 @@ def read(path: Path) -> Meaning:
     """The LP or MPS file as SCIP reads it."""
     scip = _load(path)
     if scip.getObjoffset() != 0:
-        raise RefusedError("it has a constant beside ONE")
+        raise RefusedError("it has a constant besides ONE")
     variables = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     rows = [row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS]
     goals = [row for row in scip.getConss() if row.name in _OBJECTIVE_ROWS]

@@ -47,7 +47,7 @@ def read(path: Path) -> Meaning:
     """The file as Xpress reads it."""
     model = _load(path)
     if model.attributes.objsense != 1 or model.attributes.objrhs != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     n, m = model.attributes.cols, model.attributes.rows
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))

@@ -163,7 +163,7 @@ def read_solution(
             file=path,
         )
     if not raw.has_point:
-        return _told(raw, problem, None, tolerance)
+        return _solution(raw, problem, None, tolerance)
     with naming(path):
         return _mapped(raw, _form(raw, problem, held or {}), tolerance)
 
@@ -187,7 +187,7 @@ def _carried(problem: Problem, name: str) -> Problem:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
 
-def _told(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
+def _solution(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
     claims = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
     return Solution(problem, point, *claims, tolerance=tolerance)
 
@@ -197,7 +197,7 @@ def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
-    return replace(_told(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
+    return replace(_solution(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
 
 
 def _check_range(point: Floats, problem: Problem) -> None:

@@ -125,7 +125,7 @@ def evaluate(
     hidden = hidden_curves(instance, curves_of(instance, sketch, choice), curves)
     if not hidden:
         raise InputError(
-            f"{instance.name} has no curve of {SHORTEST} pixels or more beside others that could be hidden; "
+            f"{instance.name} has no curve of {SHORTEST} pixels or more besides others that could be hidden; "
             "choose a larger size, or a drawing of more curves"
         )
     done, interrupted = _in_turn(hidden, methods, limits, progress)

@@ -32,7 +32,7 @@ from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Deadline
 from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
-from ..bundle.manifest import is_recordable, leave_manifest
+from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
 from ..programs.calls import call
@@ -92,7 +92,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
         reasons = ", ".join(f"{solver} ({found.reason})" for solver, found in taking.items())
         raise UnsupportedBySolverError(
             f"{problem.name} is {_described(problem)}, which is not for {reasons}; "
-            "`crossfield list` shows which solver takes what; or relax it"
+            "`crossfield list` shows the problems that each solver takes; or relax it"
         )
     present = [solver for solver in willing if not solver.missing]
     if not present:
@@ -129,7 +129,7 @@ class Files(NamedTuple):
     start: Path
 
     @classmethod
-    def beside(cls, model: Path, solver: str) -> Self:
+    def for_model(cls, model: Path, solver: str) -> Self:
         """Return the files of a solve in the folder of the model."""
         start = STARTS[solver].suffix if solver in STARTS else ""
         suffixes = (f".{solver}{SOLVERS[solver].answers}", f".{solver}.log", f".{solver}.start{start}")
@@ -209,10 +209,10 @@ class Solvers:
         with _folder(folder) as place:
             taking = format_for(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
-            files = Files.beside(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
+            files = Files.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
             written = write(problem, files.model, start=start)
             if folder is not None and is_recordable(problem):
-                leave_manifest(problem, written, place)
+                write_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.
             search = deadline.later(deadline.left() - limits.seconds)
             return self.solve_file(written.problem, solver, files, limits, search, start=start)

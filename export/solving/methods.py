@@ -219,7 +219,7 @@ def _prove(request: Request) -> Iterator[Candidate]:
     from ...models.proof.prove import prove  # it loads compiled functions
 
     if not is_compiled():
-        request.progress("prove: compiling what proofs need, once on this machine")
+        request.progress("prove: compiling the functions of proofs, once on this machine")
         compile_proofs(request.folder, deadline)
     request.progress("prove: starting fields")
     proof = prove(

@@ -311,7 +311,7 @@ class _Bench:
             return ended(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
             return ended(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
-        files = Files.beside(subject.path, solver)
+        files = Files.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:
             found = self.solvers.solve_file(
@@ -418,8 +418,10 @@ def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
 def _as_relaxation(check: Check, checks: list[Check]) -> str:
     """Note on the solve of a relaxation, with the best point of the problem itself, if any."""
     best, reason = _best(checks, check.relaxes), f"; {check.reason}" if check.reason else ""
-    beside = f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
-    return f"a relaxation: products lifted without integrality{beside}{reason}"
+    comparison = (
+        f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
+    )
+    return f"a relaxation: products lifted without integrality{comparison}{reason}"
 
 
 def _best(checks: list[Check], group: str) -> float | None:

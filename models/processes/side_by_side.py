@@ -57,13 +57,13 @@ def workers(jobs: int) -> Iterator[Executor]:
     raise the exceptions of their task, and WorkerError when a process dies or a value cannot be sent.
     """
     if checked(jobs) == 1:
-        yield _Here()
+        yield _InProcess()
         return
     with _Processes(jobs) as processes:
         yield processes
 
 
-class _Here(Executor):
+class _InProcess(Executor):
     """Executor that runs a task in this process when it is submitted."""
 
     def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:

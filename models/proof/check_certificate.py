@@ -1,8 +1,8 @@
 """Check a certificate of a cross field with no code of its prover: `python check_certificate.py FILE`.
 
 One file, Python 3.9 or newer and NumPy. All of it is recomputed from the instance in float64: the energy U of
-the field, and at every level of the lattice the costs, a bound, what it excludes, and that the next level
-covers the rest. Exit code 0: the claim is proven. 1: it is not; a line names the place. 2: no certificate.
+the field, and at every level of the lattice the costs, a bound, the cells that it excludes, and that the next
+level covers the rest. Exit code 0: the claim is proven. 1: it is not; a line says where. 2: no certificate.
 
 "Optimal" means: no field has an energy below U by more than the number printed, which is at most OPTIMAL
 times the greater of 1 and U. "Gap" means: no field has an energy below the bound.
@@ -37,9 +37,9 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    at once these are the jumps from the least to the greatest of them; see `jumps`.
 
 3. A pass. M_e(x) is a number for each label of the earlier pixel of pair e, taken from the certificate; any
-   numbers will do. What the pair can give to its later pixel beside it is S_e(y) = min over x of c_e(x, y) -
+   numbers will do. The largest share that remains for its later pixel is S_e(y) = min over x of c_e(x, y) -
    M_e(x), so that c_e(x, y) >= M_e(x) + S_e(y). Go through the pixels in their order. At pixel i, theta_i is
-   D_i + the sum of M over its pairs to later pixels + the sum of what it has got from earlier ones, mu_i =
+   D_i + the sum of M over its pairs to later pixels + the sum of shares received from earlier ones, mu_i =
    min theta_i, t_i = theta_i - mu_i >= 0. It hands gamma t_i on, gamma = 1 / max(1, earlier pairs, later
    pairs): later pixels get
 
@@ -70,7 +70,7 @@ times the greater of 1 and U. "Gap" means: no field has an energy below the boun
    each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over the y in a box is a sum of single
    terms.
 
-5. Rounding. Messages may be anything, so errors in them do no harm; what counts is by how much an inequality
+5. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
    of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
    times the size of the numbers that enter; the sum over all of them is taken off every bound. Sums over
    pixels are made without rounding (math.fsum). Domains may fall short of what they should cover by SLIVER

@@ -33,7 +33,7 @@ from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, never
 from ..search.box_qp import least_in_box
 from ..search.energy import Quadratic, energy_at
-from .pruning import Left
+from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
@@ -50,7 +50,7 @@ class Forced:
     over theta + pi/4, and below theta - pi/4.
     """
 
-    left: Left
+    left: RemainingCells
     pairs: Bools
     strokes: Bools
     above: Floats
@@ -90,7 +90,7 @@ class Piece:
     crosses; -1 below the window and 1 above it, where v carries the stroke.
     """
 
-    left: Left
+    left: RemainingCells
     alpha_low: Floats
     alpha_high: Floats
     lines: Ints
@@ -166,7 +166,7 @@ class Piece:
         return Quadratic(energy.matrix + turned, vector)
 
 
-def forced(left: Left) -> Forced:
+def forced(left: RemainingCells) -> Forced:
     """Choices that are forced on the boxes that are left."""
     lattice = left.lattice
     at, target = lattice.instance.stroke_index, lattice.instance.target
@@ -180,7 +180,7 @@ def forced(left: Left) -> Forced:
     )
 
 
-def _best_jumps(left: Left) -> Bools:
+def _best_jumps(left: RemainingCells) -> Bools:
     """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
     lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
     turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)

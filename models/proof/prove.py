@@ -36,7 +36,7 @@ from .certificate_pace import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
-from .pruning import branches, finer, left, prolonged
+from .pruning import branches, finer, prolonged, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
@@ -343,7 +343,7 @@ class Work:
         """The duals that follow from a branch: on the lattice of half the spacing, or on its parts."""
         if branch.stalls:
             return branches(branch.dual, _PARTS)
-        lattice = finer(left(branch.dual, branch.bound, self.energy(self.best)))
+        lattice = finer(remaining_cells(branch.dual, branch.bound, self.energy(self.best)))
         return [] if _too_large(lattice) else [prolonged(branch.dual, lattice)]
 
     def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
@@ -423,7 +423,7 @@ class Work:
             chain.levels.append(level)
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
-            what = self.forced(left(dual, level.bound, energy))
+            what = self.forced(remaining_cells(dual, level.bound, energy))
             chain.forced = int(what.pairs.sum())
             self._fit(what)
         if chain.bound >= self.proven.bound:

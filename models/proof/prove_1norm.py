@@ -27,7 +27,7 @@ from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
 from .common_lattice import CommonLattice
 from .forced import Forced
 from .prove import COARSEST, Work, first_of
-from .pruning import Left
+from .pruning import RemainingCells
 
 
 class WorkIn1Norm(Work):
@@ -56,7 +56,7 @@ class WorkIn1Norm(Work):
         """The field, fitted."""
         return settled_1norm(field, over)
 
-    def forced(self, left: Left) -> Forced1Norm:
+    def forced(self, left: RemainingCells) -> Forced1Norm:
         """Choices that are forced on the boxes that are left."""
         return forced_1norm(left)
 
@@ -85,7 +85,7 @@ class Forced1Norm(Forced):
         return CrossField(instance, alpha, beta, left.lattice.p), fit.bound - beyond
 
 
-def forced_1norm(left: Left) -> Forced1Norm:
+def forced_1norm(left: RemainingCells) -> Forced1Norm:
     """Choices that are forced on the boxes that are left, in the 1-norm."""
     lattice = left.lattice
     at, target = lattice.instance.stroke_index, lattice.instance.target
@@ -94,7 +94,7 @@ def forced_1norm(left: Left) -> Forced1Norm:
     return Forced1Norm(left, _best_jumps(left), np.maximum(above, below) <= QUARTER, above, below)
 
 
-def _best_jumps(left: Left) -> Bools:
+def _best_jumps(left: RemainingCells) -> Bools:
     """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
     lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
     turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)

@@ -39,7 +39,7 @@ TOLERANCE: Final = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class RemainingCells:
     """The cells that are left on a lattice.
 
     cells: bool, flat like the labels: whether the cell from this label upwards is left.
@@ -54,7 +54,7 @@ class Left:
     beta_high: Floats
 
 
-def left(dual: Dual, bound: float, energy: float) -> Left:
+def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
     """The cells that a level leaves below an energy, after a forward pass of the dual."""
     lattice = dual.lattice
     dual.forward()
@@ -64,14 +64,14 @@ def left(dual: Dual, bound: float, energy: float) -> Left:
     _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
     steps = _ends(lattice, cells)
     at = lattice.h * (steps + lattice.offset[:, None])
-    return Left(
+    return RemainingCells(
         lattice, cells,
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
         np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
     )  # fmt: skip
 
 
-def finer(left: Left) -> Lattice:
+def finer(left: RemainingCells) -> Lattice:
     """The lattice of half the spacing on the cells that are left."""
     lattice = left.lattice
     h, half = lattice.h / 2, (lattice.offset > 0).astype(np.int32)

@@ -64,13 +64,13 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
     once = sums(weight * root)
-    matrix = _beside(alike, once, instance.skew_coefficient)
+    matrix = _coupled(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
     x = factored(matrix)(right) if tolerance is None else locally(matrix, right, tolerance)
     return x[:size], x[size:]
 
 
-def _beside(alike: Any, cross: _Complex, skew: float) -> Any:
+def _coupled(alike: Any, cross: _Complex, skew: float) -> Any:
     """The Hermitian matrix (2n, 2n) of both coefficients: `alike` for each, diagonals that couple them."""
     size = len(cross)
     at = np.nonzero(cross)[0]

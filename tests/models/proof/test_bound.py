@@ -10,7 +10,7 @@ from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.crew import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, left, prolonged
+from crossfield.models.proof.pruning import finer, prolonged, remaining_cells
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -179,7 +179,7 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                 dual.quantise()
                 bound = dual.bound()
                 assert bound <= best.energy().total
-                lattice = finer(left(dual, bound, energy))
+                lattice = finer(remaining_cells(dual, bound, energy))
                 dropped += (~lattice.allowed).sum()
                 assert holds(lattice, (best.alpha, best.beta))
                 for _ in range(20):

@@ -8,7 +8,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.processes.crew import crew
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import branches, finer, left, prolonged
+from crossfield.models.proof.pruning import branches, finer, prolonged, remaining_cells
 from crossfield.models.proof.record import LevelRecord, Proof
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
@@ -35,7 +35,7 @@ def cut():
             records.append(LevelRecord.of(part, energy))
             parents.append(0)
         for number, part in enumerate(parts, 1):
-            after = prolonged(part, finer(left(part, records[number].bound, energy)))
+            after = prolonged(part, finer(remaining_cells(part, records[number].bound, energy)))
             after.ascend(5)
             records.append(LevelRecord.of(after, energy))
             parents.append(number)
