@@ -79,10 +79,10 @@ def known(name: str, size: int) -> Rows:
     rows = []
     for way, field in fields.items():
         found, hinted = cf.surface(field), cf.surface(field, [middle_hint(true)])
-        error, told = normal_error(found, true.normals), angles(hinted.normals, true.normals)
+        error, hinted_error = normal_error(found, true.normals), angles(hinted.normals, true.normals)
         numbers = {
             "flat": flat.mean(), "cross": np.degrees(field.cross_error(true.u_angle, true.v_angle)).mean(),
-            "mean": error.mean(), "most": np.percentile(error, 95), "hinted": told.mean(),
+            "mean": error.mean(), "most": np.percentile(error, 95), "hinted": hinted_error.mean(),
             "side": float(angles(found.normals, true.normals).mean() <= error.mean() + 1e-9),
             "firm": found.firmness, "alike": rank_correlation(1 - found.confidence, error),
         }  # fmt: skip

@@ -169,8 +169,8 @@ def xpress(path: Path) -> Answer:
     except xpress.SolverError:
         return REFUSED
     model.optimize()
-    told = model.attributes
-    return float(told.objval) if told.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
+    found = model.attributes
+    return float(found.objval) if found.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
 
 
 def scip(path: Path) -> Answer:
@@ -189,19 +189,19 @@ def scip(path: Path) -> Answer:
 
 def glpk(path: Path) -> Answer:
     """GLPK's optimum."""
-    told = path.with_suffix(".txt")
+    report = path.with_suffix(".txt")
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
-    executed("glpsol", kind, str(path), "-o", str(told))
-    text = told.read_text() if told.exists() else ""
+    executed("glpsol", kind, str(path), "-o", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.search(r"Objective:.*= *(\S+)", text)
     return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
 
 
 def cbc(path: Path) -> Answer:
     """CBC's optimum."""
-    told = path.with_suffix(".txt")
-    executed("cbc", str(path), "solve", "solution", str(told))
-    text = told.read_text() if told.exists() else ""
+    report = path.with_suffix(".txt")
+    executed("cbc", str(path), "solve", "solution", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.match(r"Optimal - objective value (\S+)", text)
     return REFUSED if not text else float(found[1]) if found else "infeasible"
 

@@ -189,8 +189,8 @@ def readings(runs: list[Run]) -> str:
         ]
         wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
         version = runs[0].result.versions.get(name, f"absent: {entry.install}")
-        told = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
-        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(told), *counts, str(wrong)])
+        by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
+        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *counts, str(wrong)])
     return markdown(
         ("program", "version", "reads", "compared by", "agree", "refused, as stated", "not tried", "differ"),
         rows,

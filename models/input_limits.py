@@ -1,4 +1,4 @@
-"""Limits on files that come from elsewhere: the one table for all readers of inputs.
+"""Limits on external files: the one table for all readers of inputs.
 
 A file beyond a limit is refused with a message that states the limit, before work or memory is spent. Each
 limit is far above the needs of sketches, instances and fields of the largest grid.

@@ -135,7 +135,7 @@ def _pixels(instance: Instance, counts: Counter[str]) -> Iterator[bytes]:
 
 
 def _data(listed: Bytes, values: Floats, counts: Counter[str], what: str) -> Iterator[bytes]:
-    """One value per line: `00.02 0.3`. Lines, and those whose value is not 0, are counted."""
+    """One value per line: `00.02 0.3`. Counts lines, and nonzero values."""
     key = Counted(counts, what, Words(listed, None))
     value = Counted(counts, f"{what} other than 0", words(values))
     return render([key, b" ", value, b"\n"], len(listed))

@@ -174,7 +174,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     run = ca.nlpsol("solver", solver, model.problem, chosen)
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
     size = f"{len(model.start)} columns, {len(model.row_lower)} rows"
-    print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - it goes to the log
+    print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - the output is the log
     hook: Callable[[], object] = stopped
     if solver == "bonmin":
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Bonmin handles it once its search has begun

@@ -183,7 +183,7 @@ class Solvers:
         return self.program_version(program.name)
 
     def ask(self, program: str, step: str, *arguments: Any, seconds: float) -> Any:
-        """Return the result of a step (see protocol.py) of a program. Raises its errors."""
+        """Run a step (see protocol.py) of a program and return its result. Raises its errors."""
         log, deadline = self._folder / f"{program}.log", Deadline.after(seconds)
         return self.child(program).call(call, program, step, *arguments, deadline=deadline, log=log).value
 

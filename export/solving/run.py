@@ -47,7 +47,7 @@ START: Final = "start"
 
 
 def facts_with_energies(solution: Solution) -> dict[str, Any]:
-    """The facts of a solution and, where it has a point, those of its field."""
+    """The facts of a solution, with the facts of its field if it has a point."""
     facts = solution_facts(solution)
     if solution.point is None:
         return facts

@@ -21,7 +21,7 @@ _WALK: Final = [2, 3, 1, 0]
 
 
 def to_obj(surface: Surface, materials: str) -> bytes:
-    """The mesh as text. materials: name of the .mtl file in the same folder with the one material."""
+    """The mesh as text. materials: name of the .mtl file in its folder, which has the one material."""
     instance = surface.instance
     places, corners = vertices_of(instance.grid)
     height, width = instance.mask.shape

@@ -121,7 +121,7 @@ class Expected:
         }
 
     def as_coefficients(self, products: Floats) -> dict[str, int]:
-        """Counts of a file of coefficients. products: those of the objective's merged products."""
+        """Counts of a file of coefficients. products: coefficients of the objective's merged products."""
         return {
             "columns": self.columns,
             "linear costs": self.costs(),
@@ -182,5 +182,5 @@ def _costs_of(terms: list[Monomial], *, noise: bool) -> int:
 
 @cache
 def _occurrences(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> int:
-    """Number of places of an expression at which one of the symbols stands."""
+    """Number of places in an expression that hold one of the symbols."""
     return sum(node in symbols for node in sp.preorder_traversal(expression))

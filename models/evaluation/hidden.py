@@ -92,7 +92,7 @@ def summary(angles: Floats) -> Summary | None:
 
 
 def _parts(instance: Instance) -> Ints:
-    """The number of the 4-connected part of the mask in which each stroke lies, shape (s,)."""
+    """The number of the 4-connected part of the mask that contains each stroke, shape (s,)."""
     from scipy import ndimage
 
     row, column = instance.stroke_pixels.T

@@ -67,7 +67,7 @@ class Family:
         return [symbol for symbol in SLOTS[self.over] if symbol in present]
 
     def unknowns(self, fixed: tuple[str, ...] = ()) -> list[sp.Symbol]:
-        """Its symbols that mean variables, without the fixed ones."""
+        """Its symbols that denote variables, without the fixed ones."""
         return [
             symbol
             for symbol in self.symbols

@@ -56,7 +56,7 @@ def _domain(variable: Variable, formulation: Formulation) -> str:
 
 
 def _own(variable: Variable) -> sp.Symbol:
-    """The symbol that means the variable itself."""
+    """The symbol that denotes the variable itself."""
     return next(symbol for symbol, slot in SLOTS[variable.over].items() if slot == (variable.name, "itself"))
 
 

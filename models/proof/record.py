@@ -49,7 +49,7 @@ class LevelRecord:
 
     @classmethod
     def of(cls, dual: Dual, energy: float) -> Self:
-        """The record of a dual, whose shares are rounded to multiples of their quantum for it."""
+        """The record of a dual; its shares are first rounded to multiples of their quantum."""
         at, quantum, state = dual.lattice, dual.quantise(), dual.state
         return cls(
             at.h, at.alpha, at.beta, at.p, at.alpha_first, at.alpha_count, at.beta_first, at.beta_count,

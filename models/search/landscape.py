@@ -104,7 +104,7 @@ class Landscape:
     """
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
-        """Start at the angles x (2n,), of which those in the patch are solved for, and jumps p (m,)."""
+        """Start at the angles x (2n,), which are solved for inside the patch, and jumps p (m,)."""
         self.patch = patch
         self.p = p.copy()
         self._around = x

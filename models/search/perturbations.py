@@ -94,7 +94,7 @@ class Perturbations:
 
 
 def _quads_of_pairs(quads: Ints, pairs: int) -> Ints:
-    """Quads of which a pair is bottom or right side [0], top or left side [1], or -1; (pairs, 2)."""
+    """The quads with each pair at bottom or right [0], and at top or left [1], or -1; (pairs, 2)."""
     beside = np.full((pairs, 2), -1)
     for side in range(4):
         beside[quads[:, side], 0 if side < 2 else 1] = np.arange(len(quads))

@@ -307,7 +307,7 @@ def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
 
 
 def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of drawn lines; which pixels (n,) carry a line of family u.
+    """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u.
 
     The spacing of the lines is bisected by ratio; the best share seen wins.
     """

@@ -81,7 +81,7 @@ def _coupled(alike: Any, cross: _Complex, skew: float) -> Any:
 
 
 def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
-    """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; those of z^2 = 1 where both are 0."""
+    """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; as for z^2 = 1 where both are 0."""
     x0 = np.where((x0 == 0) & (x1 == 0), -1.0, x0)
     apart = np.sqrt(x1**2 - 4 * x0)
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2

@@ -148,13 +148,13 @@ def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
         for suffix in ("lp", "mps")
         if (found := at("ours", size, suffix))
     }
-    told = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
+    rates = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
     all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
     took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
     return (
         f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} targets are met; "
         "the first table has them all. "
-        f"At {size} x {size} pixels the writers make {told or 'what was not measured'}. All formats of the "
+        f"At {size} x {size} pixels the writers make {rates or 'what was not measured'}. All formats of the "
         f"largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
     )
 

@@ -83,8 +83,8 @@ def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """
-    said = asl_program.at_start(path)
-    statistics, values = said["problem statistics"], said["initial evaluations"]
+    answer = asl_program.at_start(path)
+    statistics, values = answer["problem statistics"], answer["initial evaluations"]
     columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
     goal = values["objective function"]["0"]
     gradient, jacobian = np.zeros(columns), np.zeros((rows, columns))

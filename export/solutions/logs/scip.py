@@ -20,7 +20,7 @@ def _rows(text: str) -> tuple[Step, ...]:
     bound, best = names.index("dualbound"), names.index("primalbound")
 
     def row(cells: list[str]) -> Step | None:
-        """The time stands behind a letter in the first cell."""
+        """A row whose first cell holds the time after a letter."""
         if len(cells) != len(names) or not cells[0].strip():
             return None
         return step(cells[0].split()[-1], cells[bound].strip(), cells[best].strip())

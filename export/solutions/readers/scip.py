@@ -67,7 +67,7 @@ def parse(data: bytes) -> RawSolution:
     if text == _UNKNOWN:
         raise cursor.fault("this is a partial solution, with columns of unknown value")
     objective = cursor.number(text)
-    per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost comes third
+    per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost is the third word
     names, values = labelled_numbers(data, cursor.position, len(data), per_line, label=0, numeric=(1,))
     return RawSolution(status, one_line(words), objective, names, values[:, 0], omits_zeros=True)
 

@@ -272,10 +272,10 @@ def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Pa
         assert_values(found.pop(f"{family.family.tag} {sense}"), family.values(point))
     for block in problem.blocks.values():
         for sign, ends in ((">=", block.lower), ("<=", block.upper)):
-            told = found.pop(
+            stated = found.pop(
                 f"{sign} {block.name}", np.full(block.count, -np.inf if sign == ">=" else np.inf)
             )
-            np.testing.assert_array_equal(told, ends)
+            np.testing.assert_array_equal(stated, ends)
     assert found == {}
 
 
@@ -665,8 +665,8 @@ def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
     kinds = np.where(binary, "BINARY_VARIABLES", np.where(problem.integer, "INTEGER_VARIABLES", "VARIABLES"))
     assert model["kind"] == dict(zip(columns, kinds.tolist(), strict=True))
     for end, bounds in (("lower", problem.lower), ("upper", problem.upper)):
-        told = np.isfinite(bounds) & ~binary
-        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(told)[0].tolist()}
+        stated = np.isfinite(bounds) & ~binary
+        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(stated)[0].tolist()}
     assert list(model["rows"]) == rows
     low, high = limits(problem)
     senses = np.where(low == high, "==", np.where(np.isfinite(low), ">=", "<="))

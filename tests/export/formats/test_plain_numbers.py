@@ -36,12 +36,12 @@ def refusals(instance, folder):
 )
 def test_the_advice_of_a_writer_helps(given, better, tmp_path):
     """A stroke that is nearly horizontal has a tiny cost at all weights; its direction can be changed."""
-    told = refusals(one_stroke(**given), tmp_path / "refused")
-    assert told
+    reasons = refusals(one_stroke(**given), tmp_path / "refused")
+    assert reasons
     assert all(
-        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in told
+        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in reasons
     )
-    assert not any(map(SCALAR.search, told))
+    assert not any(map(SCALAR.search, reasons))
     assert refusals(one_stroke(**better), tmp_path / "written") == []
 
 
@@ -72,6 +72,6 @@ def test_messages_about_numbers_of_numpy_are_plain():
         lambda: cf.Limits(np.float64(-1.0), np.float64(0.0)),
     ]
     for act in wrong:
-        with pytest.raises(CrossfieldError) as told:
+        with pytest.raises(CrossfieldError) as reasons:
             act()
-        assert not SCALAR.search(str(told.value)), str(told.value)
+        assert not SCALAR.search(str(reasons.value)), str(reasons.value)

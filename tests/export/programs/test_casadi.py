@@ -37,9 +37,9 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
 
     def seen(point):
         value, rows = model.evaluate(point)
-        told = {"x": point, "f": value, "g": rows}
+        outputs = {"x": point, "f": value, "g": rows}
         multipliers = [np.zeros(watch.sizes[name]) for name in list(watch.sizes)[3:]]
-        assert watch.eval([ca.DM(each) for each in (*told.values(), *multipliers)]) == [0]
+        assert watch.eval([ca.DM(each) for each in (*outputs.values(), *multipliers)]) == [0]
         return watch.value
 
     lower = problem.point(cf.power_field(problem.instance))

@@ -741,8 +741,8 @@ def test_a_solution_beyond_the_limit_is_refused_before_it_is_read(tmp_path, monk
     path = tmp_path / "large.sol"
     with path.open("wb") as stream:
         stream.truncate(MAX_SOLUTION + 1)
-    told = r"large.sol: has 2147483649 bytes; at most 2147483648 are read, .* without columns at 0"
-    with pytest.raises(InputError, match=told):
+    limit = r"large.sol: has 2147483649 bytes; at most 2147483648 are read, .* without columns at 0"
+    with pytest.raises(InputError, match=limit):
         read_raw(path)
     monkeypatch.setattr(registry, "MAX_SOLUTION", 1000)
     path.write_bytes(gzip.compress(bytes(1001)))

@@ -17,8 +17,8 @@ FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings
 
 RUN = """
 import sys, crossfield as cf
-tell = lambda line: print(line, flush=True)
-report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=tell)
+show = lambda line: print(line, flush=True)
+report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=show)
 """
 
 
@@ -111,8 +111,8 @@ def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
 
 
 def test_the_plan_names_each_method_that_searches_and_the_sum():
-    told = plan(cf.Limits(20))
-    assert told.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
+    sentence = plan(cf.Limits(20))
+    assert sentence.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
     timed = [method.name for method in METHODS.values() if method.timed]
     assert timed == ["search", "two-stage", "prove"]
 
@@ -121,12 +121,12 @@ def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
     class StoppedError(Exception):
         pass
 
-    def tell(line):
+    def show(line):
         assert line == plan(cf.Limits(7))
         raise StoppedError
 
     with pytest.raises(StoppedError):
-        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=tell)
+        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=show)
 
 
 @pytest.mark.parametrize(
@@ -145,8 +145,8 @@ def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, argu
 
     what, least = ("threads", 0) if "--threads" in arguments else ("jobs", 1)
     assert invoke([*arguments, "100000", "-o", str(tmp_path / "out")]) == 2
-    said = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
-    assert f"{what} must be between {least} and {MOST}, got 100000" in said
+    output = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
+    assert f"{what} must be between {least} and {MOST}, got 100000" in output
     assert not (tmp_path / "out").exists()
 
 

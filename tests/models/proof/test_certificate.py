@@ -99,8 +99,8 @@ def test_no_certificate_is_written_where_it_is_over_before_a_level_is_checked(tm
 
 def after(questions):
     """Return a function that reports the end of time after that many calls."""
-    asked = iter(range(questions))
-    return lambda: next(asked, None) is None
+    left = iter(range(questions))
+    return lambda: next(left, None) is None
 
 
 def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path):
@@ -220,16 +220,16 @@ def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path
     rng = np.random.default_rng(3)
     path, _ = written(3)
     data, verdict = path.read_bytes(), check_certificate.checked(str(path))
-    other, told = tmp_path / "other.npz", 0
+    other, refused_forgeries = tmp_path / "other.npz", 0
     for at in rng.integers(0, len(data), 100):
         other.write_bytes(data[:at] + bytes([data[at] ^ (1 << rng.integers(8))]) + data[at + 1 :])
         try:
             found = check_certificate.checked(str(other))
         except WRONG:
-            told += 1
+            refused_forgeries += 1
             continue
         assert (found.status, found.energy, found.bound) == (verdict.status, verdict.energy, verdict.bound)
-    assert told > 70
+    assert refused_forgeries > 70
 
 
 def test_what_is_refused_says_where(written):
@@ -255,9 +255,9 @@ def test_what_is_refused_says_where(written):
         "instance_w[0] is not in": arrays | {"instance_w": arrays["instance_w"] * 3},
     }
     for place, bad in cases.items():
-        said = refusal(bad)
-        assert place in said
-        assert "\n" not in said
+        text = refusal(bad)
+        assert place in text
+        assert "\n" not in text
 
 
 def flipped(array, at):

@@ -27,8 +27,8 @@ def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
 
 def a_few_steps():
     """Arguments that end a proof that cannot close its gap after a dozen reports."""
-    told = []
-    return {"progress": lambda *what: told.append(what), "stop": lambda: len(told) > 12}
+    seen = []
+    return {"progress": lambda *what: seen.append(what), "stop": lambda: len(seen) > 12}
 
 
 def weighted(seed, **weights):
@@ -113,11 +113,11 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 def test_limits_end_a_proof_with_what_it_has():
     instance = cf.sample("bottle", 12, stroke_weight=0.5)
-    told = []
-    some = cf.prove(instance, gap=0.5, progress=lambda *what: told.append(what))
+    seen = []
+    some = cf.prove(instance, gap=0.5, progress=lambda *what: seen.append(what))
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
-    assert all(bound <= energy and labels > 0 for bound, energy, labels in told)
+    assert all(bound <= energy and labels > 0 for bound, energy, labels in seen)
     none = cf.prove(instance, stop=lambda: True)
     assert none.ended == "interrupted"
     assert none.bound <= some.energy

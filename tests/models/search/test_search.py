@@ -227,11 +227,11 @@ class Hourglass:
     """A time limit that is over after a number of calls, and counts them."""
 
     def __init__(self, grains):
-        self.grains, self.asked = grains, 0
+        self.grains, self.count = grains, 0
 
     def __call__(self):
-        self.asked += 1
-        return self.asked > self.grains
+        self.count += 1
+        return self.count > self.grains
 
 
 WORK = {
@@ -247,11 +247,11 @@ WORK = {
 def test_work_ends_soon_after_its_time_and_gives_a_field(work):
     whole = Hourglass(np.inf)
     WORK[work](whole)
-    assert whole.asked > 10
-    for grains in (0, 3, whole.asked // 2):
+    assert whole.count > 10
+    for grains in (0, 3, whole.count // 2):
         time = Hourglass(grains)
         assert np.isfinite(WORK[work](time).energy().total)
-        assert time.asked - grains <= 8
+        assert time.count - grains <= 8
 
 
 def test_a_patch_without_time_is_not_whole_and_its_walk_stops():

@@ -100,10 +100,10 @@ def test_a_hint_and_flip_choose_the_side():
     found, turned = cf.surface(field), cf.surface(field, flip=True)
     assert turned.heights == pytest.approx(-found.heights, nan_ok=True)
     assert turned.normals == pytest.approx(found.flipped().normals)
-    told = [cf.surface(field, [each], flip=True) for each in (hint, other)]
-    assert [(apart(each.normals, true.normals).mean() < 20) for each in told] == [True, False]
+    flipped = [cf.surface(field, [each], flip=True) for each in (hint, other)]
+    assert [(apart(each.normals, true.normals).mean() < 20) for each in flipped] == [True, False]
     straight = cf.surface(field, [replace(hint, slant=0.05)], flip=True)
-    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # such a hint tells no side
+    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # no side follows
 
 
 @for_each(
@@ -203,9 +203,9 @@ def test_an_end_in_time_leaves_the_best_so_far():
 
 
 def test_progress_tells_of_every_part():
-    told = []
-    cf.surface(constant([[1, 0, 0, 1]]), progress=told.append)
-    assert told == ["surface, part 1 of 2", "surface, part 2 of 2"]
+    messages = []
+    cf.surface(constant([[1, 0, 0, 1]]), progress=messages.append)
+    assert messages == ["surface, part 1 of 2", "surface, part 2 of 2"]
 
 
 def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
