@@ -223,7 +223,7 @@ class _Sets:
 
     @contextmanager
     def threads(self, jobs: int) -> Iterator[None]:
-        """Threads that write files: most of the time is spent in NumPy, zlib and hashlib, which run in parallel.
+        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run in parallel.
 
         After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
         existing file is complete.
