@@ -156,8 +156,8 @@ def start_of(problem: Problem, field: CrossField) -> Start:
 def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float:
     """Write the start in a solver's format, and return its objective.
 
-    Raises InputError for a solver without a format of starts, UnsupportedBySolverError for a solver that does
-    not take the problem, InstanceError when the field is on another instance, and OutputError.
+    Raises InputError for a solver without a format of starts, and UnsupportedBySolverError for a solver that
+    does not take the problem. Raises InstanceError when the field is on another instance, and OutputError.
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")

@@ -1,7 +1,7 @@
 """Solving with any installed program of the table: one way for all of them.
 
-The problem is written to a file, the program solves that file in a child process and writes a solution file,
-and the solution is read like any external solution file. So a solve tests the files too.
+The problem is written to a file. The program solves that file in a child process and writes a solution file,
+which is read like any external solution file. So a solve tests the files too.
 """
 
 from __future__ import annotations

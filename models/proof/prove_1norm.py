@@ -1,7 +1,7 @@
 """Proofs in the 1-norm: the method of models/proof/prove.py, on the lattices of common_lattice.py.
 
-Once a level's boxes leave no choice of jumps, the energy on them is the energy of a linear program except for
-strokes at the edges of their windows. Its multipliers prove its least value.
+Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes at
+the edges of their windows. Its multipliers prove its least value.
 
 Jumps. With s = (-1)^p, let g = min(|beta_i|, |beta_j|), negative where s beta_i beta_j >= 0: |B| grows by
 -2 g with the other parity. One step further |A| is at least pi/2 - |A|. So p is a best jump where |A| + g

@@ -6,8 +6,8 @@ there are. Each element is parsed once, for any number of uses, and the work is 
 `input_limits`. The bytes first pass defusedxml, which refuses entities. Files outside the drawing are never
 loaded: pictures and `use` of other files are ignored. So are clip paths, masks, dashes and text.
 
-Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled,
-because drawing programs export strokes as filled outlines. White (paper) counts as invisible.
+Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled:
+drawing programs export strokes as filled outlines. White (paper) counts as invisible.
 """
 
 from __future__ import annotations
