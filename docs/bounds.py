@@ -1,4 +1,4 @@
-"""Make docs/bounds.md, how far open MIP solvers prove optima: `python docs/bounds.py` (some five minutes)."""
+"""Make docs/bounds.md, the limits of open MIP solvers: `python docs/bounds.py` (some five minutes)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import numpy as np
 from crossfield.export.programs.highs import loaded
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
-from make import markdown, said
+from make import generated, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
 SECONDS: Final = 15.0
 SIDES: Final = (4, 5, 6, 7, 8)
 MILP_SECONDS: Final = 30.0
 TRIED: Final = tuple((4, 5, seed) for seed in range(1, 7)) + tuple((5, 5, seed) for seed in range(7, 13))
-"""Height, width and seed of the instances on which rows and bounds are tried."""
+"""Height, width and seed of the instances for the trials of rows and bounds."""
 RUNS: Final = (
     ("milp-mccormick", "highs", False),
     ("milp-mccormick", "highs", True),
@@ -43,9 +43,8 @@ def instance_of(height: int, width: int, seed: int) -> Instance:
 def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
     """Add a row for every quad C and odd subset F of its pairs.
 
-    Sum of p1 over F less that over C - F <= |F| - 1 + (2/pi) sum of s over C.
-    Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2
-    at least.
+    Sum of p1 over F minus that over C - F <= |F| - 1 + (2/pi) sum of s over C. If the sum of the p1 round C
+    is odd, so is the sum of the jumps, the crosses turn, and the |A| round C add up to at least pi/2.
     """
     p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
     for quad in problem.instance.grid.quads:
@@ -58,7 +57,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
 
 
 def bounds(problem: Problem, model: highspy.Highs) -> None:
-    """Bound s and t by pi/2: the two nearest jumps leave |A| below that, and |beta| is at most pi/4."""
+    """Bound s and t by pi/2: the two nearest jumps make |A| smaller, and |beta| is at most pi/4."""
     for name in ("s", "t"):
         for column in range(problem.columns)[problem.blocks[name].columns]:
             model.changeColBounds(column, 0.0, np.pi / 2)
@@ -66,7 +65,7 @@ def bounds(problem: Problem, model: highspy.Highs) -> None:
 
 @dataclass(frozen=True)
 class Trial:
-    """How HiGHS fared."""
+    """Result of a solve by HiGHS."""
 
     proven: bool
     objective: float
@@ -76,7 +75,7 @@ class Trial:
 
 
 def strengthened(task: tuple[tuple[int, int, int], tuple[str, ...]]) -> Trial:
-    """HiGHS on one thread on the written MPS of `milp-mccormick`, with rows or bounds added."""
+    """Solve the written MPS of `milp-mccormick` by HiGHS on one thread, with rows or bounds added."""
     size, chosen = task
     problem = cf.formulate(instance_of(*size), "milp-mccormick")
     with tempfile.TemporaryDirectory() as folder:
@@ -117,7 +116,7 @@ def strengthening() -> tuple[list[list[str]], list[list[str]]]:
 
 
 def overall(chosen: tuple[str, ...], found: list[Trial], plain: list[Trial]) -> list[str]:
-    """How a variant fares on all instances: proofs, shifted geometric means, where it is quicker."""
+    """Results of a variant on all instances: proofs, shifted geometric means, wins in time."""
     return [
         " + ".join(chosen) or "as written",
         f"{sum(each.proven for each in found)} of {len(found)}",
@@ -130,7 +129,7 @@ def overall(chosen: tuple[str, ...], found: list[Trial], plain: list[Trial]) -> 
 
 
 def shifted_mean(values: list[float] | list[int], shift: float) -> float:
-    """The geometric mean of values + shift, less the shift."""
+    """The geometric mean of values + shift, minus the shift."""
     return float(np.exp(np.mean(np.log(np.array(values) + shift))) - shift)
 
 
@@ -167,7 +166,7 @@ def main() -> None:
     )
     (DOCS / "bounds.md").write_text(
         PAGE.format(
-            said=said("python docs/bounds.py"),
+            said=generated("python docs/bounds.py"),
             short=in_short(closed, means),
             seconds=SECONDS,
             sizes=sizes,
@@ -179,20 +178,20 @@ def main() -> None:
 
 
 def in_short(closed: list[list[str]], means: list[list[str]]) -> str:
-    """How far proofs get, what the relaxation is worth, and whether strengthening pays.
+    """Summary: the reach of proofs, the quality of the relaxation, and the effect of strengthening.
 
     Rows of the page's first two tables.
     """
     whole = {
         name: [row[0] for row in closed if row[1] == f"`{name}`" and row[5] == "yes"] for name, _, _ in RUNS
     }
-    said = {name: f"up to {grids[-1]}" if grids else "nowhere" for name, grids in whole.items()}
+    reach = {name: f"up to {grids[-1]}" if grids else "nowhere" for name, grids in whole.items()}
     relaxed = max(float(row[3]) for row in closed if row[1].endswith("relaxed"))
     plain, *others = means
     best = min(others, key=lambda row: float(row[2]))
     return (
-        f"In {SECONDS:g} s HiGHS proves the optimum of `milp-mccormick` {said['milp-mccormick']}, "
-        f"and Bonmin that of `miqp-exact` {said['miqp-exact']}. "
+        f"In {SECONDS:g} s HiGHS proves the optimum of `milp-mccormick` {reach['milp-mccormick']}, "
+        f"and Bonmin that of `miqp-exact` {reach['miqp-exact']}. "
         f"The bound that the relaxation of the MILP gives is {relaxed:.5f} at most. "
         f'Of the rows and bounds tried to strengthen it, "{best[0]}" does best, '
         f"with a mean of {best[2]} s against {plain[2]} s as written."

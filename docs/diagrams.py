@@ -1,6 +1,6 @@
 """The figures of docs/mathematics.md: `python docs/make.py figures`.
 
-Every one is computed, none is drawn by hand.
+Every figure is computed.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def arc(axes: Any, begin: float, end: float, radius: float, name: str) -> None:
 
 
 def bare(axes: Any, title: str, *, equal: bool = True) -> None:
-    """No frame and no ticks."""
+    """Remove frame and ticks."""
     axes.set_axis_off()
     axes.set_title(title, fontsize=11)
     if equal:
@@ -114,7 +114,7 @@ def strip(figure: Figure) -> None:
 
 
 def facets(figure: Figure) -> None:
-    """The points (beta, z) that the facets leave, for three values of p1, and what (26) as printed adds."""
+    """The points (beta, z) that satisfy the facets, for three values of p1, and points that (26) adds."""
     shown = figure.subplots(1, 3, sharey=True)
     beta = np.linspace(-QUARTER, QUARTER, 5)  # all corners are among these
     for axes, p1 in zip(shown, (0.0, 0.5, 1.0), strict=True):
@@ -183,11 +183,11 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float]]] = {
     "facets": (facets, 7.6, 2.9),
     "singularities": (singular, 6.0, 3.1),
 }
-"""Name -> what draws it, width and height in inches."""
+"""Name -> drawing function, width and height in inches."""
 
 
 def draw(folder: Path) -> None:
-    """Write every figure as SVG; the same bytes each time."""
+    """Write every figure as SVG, with equal bytes each time."""
     for name, (paint, width, height) in FIGURES.items():
         with mpl.rc_context(STYLE):
             figure = Figure(figsize=(width, height), layout="constrained")

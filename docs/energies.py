@@ -1,10 +1,10 @@
-"""Make docs/energies.md: how low the energies of each method are, beside each other and proven optima.
+"""Make docs/energies.md: energies of all methods, compared with each other and with proven optima.
 
     python docs/energies.py [--sketches FOLDER] [--seconds S] [--work FOLDER]
 
-Takes about 2 S seconds for each sample and each sketch of the folder. Each field comes from a `crossfield
-solve --method` of its own. With --work, what is done stays in that folder, and the command goes on there when
-it is given again.
+Takes about 2 S seconds for each sample and each sketch of the folder. Each field comes from a separate
+`crossfield solve --method`. With --work, finished results stay in that folder, and a repeated command
+continues there.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.weights import REFERENCE
 from crossfield.models.search.box_qp import fitted
 from crossfield.models.sketch.samples import SAMPLES
-from make import markdown, said
+from make import generated, markdown
 from PIL import Image
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -57,7 +57,7 @@ class Sketch:
 
     @property
     def arguments(self) -> list[str]:
-        """How it is named on the command line."""
+        """Its argument on the command line."""
         return [self.what, *(["--mask", str(self.mask)] if self.mask else [])]
 
     def weights(self, size: int) -> list[str]:
@@ -90,7 +90,7 @@ def sketches(folder: Path | None) -> list[Sketch]:
 
 @dataclass(frozen=True)
 class Row:
-    """What the methods made of a sketch.
+    """Results of the methods on a sketch.
 
     improved: energy of the greedy field, improved; the search's memory in bytes, at most.
     """
@@ -105,12 +105,12 @@ class Row:
 
     @property
     def lower(self) -> float:
-        """By which share the search is below the greedy field."""
+        """Relative difference of the search below the greedy field."""
         return share(self.greedy["energy_2_norm"], self.search["energy_2_norm"])
 
     @property
     def lower_than_improved(self) -> float:
-        """By which share the search is below the greedy field, improved."""
+        """Relative difference of the search below the improved greedy field."""
         return share(self.improved, self.search["energy_2_norm"])
 
     def cells(self) -> list[str]:
@@ -134,7 +134,7 @@ class Row:
 
 
 def share(greedy: float, search: float) -> float:
-    """By which share the search is below; 0 where both are nothing but the price of beta."""
+    """Relative difference of the search below; 0 where both energies are only the price of beta."""
     return float((greedy - search) / greedy) if greedy > 1e-3 else 0.0
 
 
@@ -147,7 +147,7 @@ COLUMNS: Final = (
 def solved(
     sketch: Sketch, size: int, method: str, seconds: float, folder: Path, *options: str
 ) -> dict[str, Any]:
-    """The facts of `crossfield solve --method`, as `answered` has them."""
+    """The facts of `crossfield solve --method`, as from `answered`."""
     command = [
         *("solve", *sketch.arguments, "--size", str(size), *sketch.weights(size), "--method", method),
         *("--time-limit", str(seconds), "--json", "-o", str(folder), *options),
@@ -156,9 +156,9 @@ def solved(
 
 
 def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
-    """What a command of crossfield says as JSON, and `memory`: bytes that its processes took at most.
+    """The JSON output of a command of crossfield, and `memory`: most bytes of its processes.
 
-    In the folder it stays, with the files of the command, and is read from there the next time.
+    It is stored in the folder, with the files of the command, and read from there the next time.
     """
     kept = folder / "facts.json"
     if kept.exists():
@@ -178,7 +178,7 @@ def answered(command: list[str], folder: Path, name: str) -> dict[str, Any]:
 
 
 def field_in(folder: Path) -> Path:
-    """The field that `solved` left in a folder."""
+    """The field that `solved` wrote to a folder."""
     (path,) = folder.glob("*.field.npz")
     return path
 
@@ -211,7 +211,7 @@ def place(folder: Path, sketch: Sketch, size: int) -> Path:
 
 
 def picture(sketch: Sketch, folder: Path) -> str:
-    """A picture of the greedy field and that of the search side by side, and the Markdown that shows it."""
+    """A picture of the greedy field and the search's side by side, and its Markdown."""
     name, here = sketch.name, place(folder, sketch, max(SIZES))
     fields = {method: cf.read_field(field_in(here / method)) for method in ("greedy", "search")}
     images = []
@@ -229,7 +229,7 @@ def picture(sketch: Sketch, folder: Path) -> str:
 
 
 def best_angles(sketch: Sketch, folder: Path) -> list[str]:
-    """Greedy field and angles at size 256, and the angles beside those of Ipopt at size 64."""
+    """Greedy field and angles at size 256, and the angles compared with Ipopt's at size 64."""
     seconds = 600.0
     facts = solved(sketch, HUGE, "greedy", seconds, place(folder, sketch, HUGE) / "greedy")
     large = cold(cf.read_field(field_in(place(folder, sketch, HUGE) / "greedy")))
@@ -252,7 +252,7 @@ def best_angles(sketch: Sketch, folder: Path) -> list[str]:
 
 
 def cold(field: CrossField) -> CrossField:
-    """The field with every angle in the middle of its bounds: all that it tells of is the jumps."""
+    """The field with every angle in the middle of its bounds: only its jumps carry information."""
     instance = field.instance
     middle = (instance.alpha_lower + instance.alpha_upper) / 2
     return CrossField(instance, middle, np.zeros(instance.grid.size), field.p)
@@ -282,7 +282,7 @@ def tiny() -> Iterator[Instance]:
 
 
 def proofs() -> str:
-    """The search beside the optimum of `miqp-exact` that a solver proves from the written file."""
+    """The search compared with the optimum of `miqp-exact` that a solver proves from the written file."""
     rows, equal, proven = [], 0, 0
     for instance in tiny():
         begin = time.perf_counter()
@@ -318,9 +318,7 @@ def proofs() -> str:
 def optimum(
     instance: Instance, start: CrossField, provers: tuple[str, ...] = PROVERS
 ) -> tuple[Check | None, float | None]:
-    """The check of the first prover that closes `miqp-exact`, or None;
-    and the best dual bound of all that were asked.
-    """
+    """The check of the first prover that closes `miqp-exact`, or None, and the best dual bound of all."""
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
         write_all(instance, folder, ["miqp-exact"], ["mps", "nl"], start=start)
@@ -334,7 +332,7 @@ def optimum(
 
 
 def summary(rows: list[Row]) -> str:
-    """Whether the search was ever worse, and by how much it was lower."""
+    """Whether the search was ever worse, and its mean relative difference."""
     lines = []
     for size in (*SIZES, None):
         chosen = [row for row in rows if size in {row.size, None}]
@@ -367,7 +365,7 @@ def summary(rows: list[Row]) -> str:
 
 
 def in_short(rows: list[Row], closed: str) -> str:
-    """By how much the search is lower than other fields, and how often it is the optimum.
+    """How much lower the search is than other fields, and how often it is the optimum.
     closed: the part about proofs.
     """
     worse = sum(row.search["energy_2_norm"] > row.greedy["energy_2_norm"] * (1 + 1e-9) for row in rows)
@@ -398,7 +396,7 @@ def main() -> None:
         angles = [best_angles(sketch, folder) for sketch in every[-2:]]
         closed = proofs()
         text = PAGE.format(
-            said=said(f"python docs/energies.py --sketches FOLDER --seconds {given.seconds:g}"),
+            said=generated(f"python docs/energies.py --sketches FOLDER --seconds {given.seconds:g}"),
             seconds=f"{given.seconds:g}",
             cores=os.cpu_count(),
             python=platform.python_version(),

@@ -1,9 +1,9 @@
-"""Make docs/fields.md and docs/weights.md, how good fields are, from docs/fields.json.
+"""Make docs/fields.md and docs/weights.md, the quality of fields, from docs/fields.json.
 
     python docs/fields.py [--measure PART ...] [--sketches FOLDER] [--seconds S] [--jobs N]
 
 With --measure, parts are measured first, and their rows in docs/fields.json replaced: `methods` (hidden
-curves, each method), `weights` (hidden curves, each weight of the strokes), `strokes` (how far fields are
+curves, each method), `weights` (hidden curves, each weight of the strokes), `strokes` (deviation of fields
 from the strokes that they were shown) and `surfaces` (fields of surfaces with a known answer, with and
 without noise on the strokes), each weight, `shown` and `known` (both of these, each method). FOLDER has line
 drawings by others; the samples are there without it.
@@ -31,7 +31,7 @@ from crossfield.models.instance.weights import STROKE_WEIGHT
 from crossfield.models.sketch.samples import SAMPLES
 from energies import SKETCHES
 from fields_text import FIELDS, WEIGHTS
-from make import markdown, said
+from make import generated, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "fields.json"
@@ -42,10 +42,10 @@ NOISE: Final = (0.0, 3.0, 8.0)
 """Standard deviation of the noise on each stroke pixel, in degrees."""
 SEEDS: Final = 3
 OFF: Final = 10.0
-"""Degrees from which a stroke pixel counts as off its stroke."""
+"""Degrees from which a stroke pixel counts as missing its stroke."""
 MIDDLE: Final = 32
 OF_ENERGIES: Final = {"prove", "two-stage"}
-"""Methods whose one aim is a lower energy than that of others."""
+"""Methods whose only aim is a lower energy."""
 Rows = list[dict[str, Any]]
 
 
@@ -69,7 +69,7 @@ class Task:
 
 
 def angles(task: Task, instance: Instance, tried: Iterable[str]) -> Rows:
-    """A row for each method: its angles in degrees to the hidden curves; none where none can be hidden."""
+    """A row for each method with its angles in degrees to the hidden curves; none without hidden curves."""
     limits = cf.Limits(task.seconds, threads=1)
     try:
         found = cf.evaluate(instance, sketch=task.what, methods=tried, limits=limits)
@@ -87,7 +87,7 @@ def angles(task: Task, instance: Instance, tried: Iterable[str]) -> Rows:
 
 
 def methods(task: Task) -> Rows:
-    """Hidden curves of a drawing, by method; those about energies at one size only."""
+    """Hidden curves of a drawing, by method; methods for low energy at one size only."""
     tried = (n for n in task.only or METHODS if n not in OF_ENERGIES or task.size == MIDDLE)
     return angles(task, task.instance, tried)
 
@@ -171,7 +171,7 @@ MEASURES: Final[dict[str, Callable[[Task], Rows]]] = {
 
 
 def tasks(part: str, folder: Path | None, seconds: float) -> list[Task]:
-    """What is measured for a part, one after the other."""
+    """The tasks that measure a part, in order."""
     if part in {"surfaces", "known"}:
         names = [name for name, entry in SAMPLES.items() if entry.kind == "analytic"]
         return [
@@ -184,14 +184,14 @@ def tasks(part: str, folder: Path | None, seconds: float) -> list[Task]:
 
 
 def measured(part: str, folder: Path | None, seconds: float, jobs: int, only: Iterable[str] = ()) -> Rows:
-    """The rows of a part; of `methods` only those of some methods, where these are named."""
+    """The rows of a part; of `methods` only the named methods, if any."""
     given = [replace(task, only=tuple(only)) for task in tasks(part, folder, seconds)]
     with ProcessPoolExecutor(jobs) as processes:
         return [row for rows in processes.map(MEASURES[part], given) for row in rows]
 
 
 def renewed(rows: Rows, found: Rows) -> Rows:
-    """The rows, those that were found again in their places. Raises KeyError for one that is not there."""
+    """The rows with remeasured ones in their places. Raises KeyError for a missing place."""
     places = {(row["drawing"], row["size"], row["method"]): k for k, row in enumerate(rows)}
     anew = dict(enumerate(rows)) | {places[row["drawing"], row["size"], row["method"]]: row for row in found}
     return list(anew.values())
@@ -249,7 +249,7 @@ def by_weight(rows: Rows) -> str:
 
 
 def missed(rows: Rows, by: str) -> str:
-    """Share of stroke pixels that are missed, by a fact and size: mean over drawings and the worst one."""
+    """Share of missed stroke pixels, by a fact and size: mean over drawings and the worst one."""
     table = []
     for value in dict.fromkeys(row[by] for row in rows):
         shares = [[row["off"] for row in picked(rows, **{by: value}, size=size)] for size in SIZES]
@@ -274,7 +274,7 @@ def by_surface(rows: Rows, by: str) -> str:
 
 
 def in_short(rows: Rows) -> str:
-    """How many curves of how many drawings there are, and which method is nearest at each size."""
+    """Numbers of curves and drawings, and the method with the smallest error at each size."""
     names = dict.fromkeys(row["method"] for row in rows)
     found = []
     for size in SIZES:
@@ -294,8 +294,8 @@ def in_short(rows: Rows) -> str:
 
 
 def write_pages(kept: dict[str, Any]) -> None:
-    """Make both pages."""
-    command = said("python docs/fields.py")
+    """Write both pages."""
+    command = generated("python docs/fields.py")
     rows = kept["rows"]
     page = FIELDS.format(
         said=command, short=in_short(rows["methods"]), methods=by_method(rows["methods"]),
@@ -312,7 +312,7 @@ def write_pages(kept: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    """Measure what is asked for, and write the pages."""
+    """Measure the requested parts, and write the pages."""
     parser = argparse.ArgumentParser(
         description="Measure fields, and write docs/fields.md and docs/weights.md."
     )

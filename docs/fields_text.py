@@ -1,4 +1,4 @@
-"""What docs/fields.md and docs/weights.md say around the tables of fields.py."""
+"""Text of docs/fields.md and docs/weights.md around the tables of fields.py."""
 
 from typing import Final
 

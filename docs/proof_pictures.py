@@ -1,4 +1,4 @@
-"""The pictures of docs/proofs.md: what every level of a proof leaves of the crosses."""
+"""The pictures of docs/proofs.md: the crosses left at every level of a proof."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ def cells(level: LevelRecord, pixel: int) -> Bools:
 
 
 def shares(level: LevelRecord) -> Floats:
-    """The part of the strip in which a better cross of each pixel may lie, shape (n,)."""
+    """The part of the strip that may hold a better cross of each pixel, shape (n,)."""
     counts = [cells(level, pixel).sum() for pixel in range(len(level.alpha))]
     return np.minimum(np.array(counts) * level.h**2 / STRIP, 1.0)
 
 
 def of_boxes(boxes: Floats) -> Floats:
-    """The part of the strip in the boxes (n, 4) that a certificate leaves."""
+    """The part of the strip in the boxes (n, 4) of a certificate."""
     return (boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]) / STRIP
 
 
 def maps(proof: Proof, boxes: Floats, path: Path) -> None:
-    """For every level, and after the last, how much is left at every pixel; one colour scale."""
+    """Draw the part left at every pixel for every level, and after the last; one colour scale."""
     levels = proof.levels
     values = [*map(shares, levels), of_boxes(boxes)]
     titles = [
@@ -72,7 +72,7 @@ def maps(proof: Proof, boxes: Floats, path: Path) -> None:
 
 
 def _gaps(place: Any, proof: Proof) -> None:
-    """How far the bound of every level is from the energy."""
+    """Draw the distance of every level's bound from the energy."""
     gaps = [100 * (proof.energy - level.bound) / proof.energy for level in proof.levels]
     numbers = range(1, len(gaps) + 1)
     place.set_axis_on()
@@ -101,8 +101,8 @@ def _strokes(place: Any, proof: Proof) -> None:
 
 
 def strips(proof: Proof, path: Path) -> list[int]:
-    """Draw the cells that are left, level by level, of a pixel with a stroke and of the last one to hold out;
-    these pixels.
+    """Draw the cells that are left, level by level, for a pixel with a stroke and the last one to be decided;
+    return these pixels.
     """
     levels, instance = proof.levels[:SHOWN], proof.field.instance
     late = shares(levels[2])
@@ -126,7 +126,7 @@ def strips(proof: Proof, path: Path) -> list[int]:
 
 
 def _strip(place: Any, level: LevelRecord, pixel: int, proof: Proof) -> None:
-    """One pixel's strip, the cells that are left of it, and the cross of the field."""
+    """Draw one pixel's strip, the cells that are left of it, and the cross of the field."""
     offset = offsets(proof.field.instance.grid)[pixel]
     alpha, beta = (
         np.degrees(centre[pixel] + level.h * (first[pixel] + np.arange(count[pixel]) + offset))

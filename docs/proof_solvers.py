@@ -1,6 +1,6 @@
-"""What MIP solvers prove from the written files: cold, and with the windows that a certificate leaves.
+"""Proofs of MIP solvers from the written files: cold, and with the windows of a certificate.
 
-Each solve is in a process of its own, on two threads where the solver has threads.
+Each solve runs in a separate process, on two threads if the solver has threads.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Options = dict[str, Any]
 
 @dataclass(frozen=True)
 class Answer:
-    """What a solver says at the end: best objective and dual bound, where there are any, and seconds."""
+    """Result of a solver: best objective and dual bound, if any, and seconds."""
 
     objective: float | None
     bound: float | None
@@ -46,7 +46,7 @@ class Answer:
 
     @property
     def proven(self) -> bool:
-        """Whether the bound is the objective, but for rounding."""
+        """Whether the bound equals the objective up to rounding."""
         if self.objective is None or self.bound is None:
             return False
         return self.objective - self.bound <= PROVEN * max(1.0, abs(self.objective))
@@ -125,7 +125,7 @@ def _work(task: tuple[str, Path, float, Options]) -> Answer:
 
 
 def solved(problem: Problem, solver: str, seconds: float, options: Options) -> Answer:
-    """What the solver says of the MPS file of a problem."""
+    """Solve the MPS file of a problem."""
     with (
         tempfile.TemporaryDirectory() as folder,
         ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as alone,
@@ -145,7 +145,7 @@ def fits(problem: Problem, solver: str) -> bool:
 
 
 def largest(name: str, size: int, formulation: str, solver: str) -> Instance:
-    """The sample at that size, or at the greatest below it that the free edition of the solver takes."""
+    """The sample at that size, or at the greatest size below it that the solver's free edition takes."""
     for smaller in range(size, 4, -1):
         try:
             instance = Sketch(name, name).instance(smaller)
@@ -179,11 +179,11 @@ SETTINGS: Final[tuple[tuple[str, str, str, Options], ...]] = (
         {"mip.strategy.variableselect": 3},
     ),
 )
-"""Solver, formulation, what is set in words, and what is set."""
+"""Solver, formulation, the setting in words, and the setting."""
 
 
 def settings(instances: list[Instance], seconds: float) -> Iterator[tuple[str, dict[str, Any]]]:
-    """How every setting fares on some instances: proofs, and the shifted geometric mean of seconds."""
+    """Results of every setting on some instances: proofs, and the shifted geometric mean of seconds."""
     for solver, formulation, words, options in SETTINGS:
         if not PROGRAMS[solver].present:
             continue
@@ -202,7 +202,7 @@ USES: Final = (
     ("gurobi", "milp-mccormick"),  # of the other one its free edition takes no more than some 20 pixels
     ("cplex", "miqp-exact"),
 )
-"""Which solver gets which formulation."""
+"""Formulations for each solver."""
 
 
 def certificate(instance: Instance, seconds: float) -> Certificate:
@@ -212,13 +212,13 @@ def certificate(instance: Instance, seconds: float) -> Certificate:
 
 
 def here(instance: Instance, norm: Norm, seconds: float) -> Answer:
-    """What `crossfield prove` says of an instance, in the norm that a formulation minimises."""
+    """Result of `crossfield prove` for an instance, in the norm that a formulation minimises."""
     proof = prove(instance, norm=norm, seconds=seconds)
     return Answer(proof.energy, proof.bound, 0, proof.seconds)
 
 
 def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator[dict[str, Any]]:
-    """What each solver that is installed proves of a sample: from the files as they are, and tightened."""
+    """Proofs of each installed solver for a sample: from the files as they are, and tightened."""
     proofs: dict[str, Certificate] = {}
     for solver, formulation in USES:
         if not PROGRAMS[solver].present:

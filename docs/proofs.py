@@ -4,9 +4,10 @@
                           [--work FOLDER]
 
 With --measure, parts are measured first, and their rows in docs/proofs.json replaced: `samples` (size 24),
-`fine` (size 48), `sketches` (drawings of a folder, size 24), `optima` (small instances beside other solvers),
-`solvers` (MIP solvers, cold and tightened), `settings` (of MIP solvers) and `pictures`. --names takes some of
-a part, --seconds replaces its time limit. With --work, fields and certificates stay in that folder.
+`fine` (size 48), `sketches` (drawings of a folder, size 24), `optima` (small instances, compared with other
+solvers), `solvers` (MIP solvers, cold and tightened), `settings` (of MIP solvers) and `pictures`. --names
+selects from a part, --seconds replaces its time limit. With --work, fields and certificates stay in that
+folder.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import MOST_LABELS, prove
 from crossfield.models.sketch.samples import SAMPLES
 from energies import PROVERS, Sketch, answered, optimum, sketches, tiny
-from make import markdown, said
+from make import generated, markdown
 from proof_text import PROOF
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -43,7 +44,7 @@ FINE: Final = 48
 AGREE: Final = 1e-6
 """Difference of equal optima, relative to 1 or the optimum if that is more."""
 WITHIN: Final = 1e-5
-"""By how much a solver may be off for its tolerances."""
+"""Greatest error of a solver within its tolerances."""
 PICTURED: Final = "mouse"
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
 TRIED: Final = 4  # random instances for settings
@@ -56,8 +57,8 @@ Kept = dict[str, dict[str, Facts]]
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What the command line asks for: which of a part, how long, and where files go."""
+class Request:
+    """Choices of the command line: names, time limit, and folders."""
 
     names: tuple[str, ...]
     seconds: float
@@ -65,16 +66,16 @@ class Asked:
     work: Path
 
     def wants(self, name: str) -> bool:
-        """Whether that one is to be measured."""
+        """Whether that name is to be measured."""
         return not self.names or name in self.names
 
 
-def proven(sketch: Sketch, size: int, asked: Asked) -> Facts:
-    """What `crossfield prove` says of a sketch, the size of its certificate, and the seconds of its check."""
-    folder = asked.work / f"{sketch.name}_{size}_proof"
+def proven(sketch: Sketch, size: int, request: Request) -> Facts:
+    """Result of `crossfield prove` for a sketch, size of its certificate, and seconds of its check."""
+    folder = request.work / f"{sketch.name}_{size}_proof"
     command = [
         *("prove", *sketch.arguments, "--size", str(size), *sketch.weights(size)),
-        *("--time-limit", str(asked.seconds)),
+        *("--time-limit", str(request.seconds)),
         *("--json", "-o", str(folder)),
     ]
     facts = answered(command, folder, sketch.name)
@@ -89,33 +90,33 @@ def proven(sketch: Sketch, size: int, asked: Asked) -> Facts:
         "levels": len(facts["levels"]),
         "bytes": certificate.stat().st_size,
         "check": time.perf_counter() - begin,
-        "limit": asked.seconds,
+        "limit": request.seconds,
     }
 
 
-def samples(asked: Asked) -> Iterator[tuple[str, Facts]]:
+def samples(request: Request) -> Iterator[tuple[str, Facts]]:
     """The samples at size 24."""
-    return ((name, proven(Sketch(name, name), SIZE, asked)) for name in SAMPLES if asked.wants(name))
+    return ((name, proven(Sketch(name, name), SIZE, request)) for name in SAMPLES if request.wants(name))
 
 
-def fine(asked: Asked) -> Iterator[tuple[str, Facts]]:
+def fine(request: Request) -> Iterator[tuple[str, Facts]]:
     """The samples at size 48."""
-    return ((name, proven(Sketch(name, name), FINE, asked)) for name in SAMPLES if asked.wants(name))
+    return ((name, proven(Sketch(name, name), FINE, request)) for name in SAMPLES if request.wants(name))
 
 
-def drawings(asked: Asked) -> Iterator[tuple[str, Facts]]:
+def drawings(request: Request) -> Iterator[tuple[str, Facts]]:
     """The drawings of a folder at size 24."""
-    for sketch in sketches(asked.sketches):
-        if sketch.name not in SAMPLES and asked.wants(sketch.name):
-            yield sketch.name, proven(sketch, SIZE, asked)
+    for sketch in sketches(request.sketches):
+        if sketch.name not in SAMPLES and request.wants(sketch.name):
+            yield sketch.name, proven(sketch, SIZE, request)
 
 
-def optima(asked: Asked) -> Iterator[tuple[str, Facts]]:
-    """Small instances beside the optimum that another solver proves."""
+def optima(request: Request) -> Iterator[tuple[str, Facts]]:
+    """Small instances, compared with the optimum that another solver proves."""
     for instance in tiny():
-        if not asked.wants(instance.name):
+        if not request.wants(instance.name):
             continue
-        proof = prove(instance, seconds=asked.seconds)
+        proof = prove(instance, seconds=request.seconds)
         best, _ = optimum(instance, proof.field, (*PROVERS, "casadi"))
         yield instance.name, {
             "grid": f"{instance.grid.width} x {instance.grid.height}",
@@ -125,30 +126,30 @@ def optima(asked: Asked) -> Iterator[tuple[str, Facts]]:
         }  # fmt: skip
 
 
-def solvers(asked: Asked) -> Iterator[tuple[str, Facts]]:
-    """What MIP solvers prove of some samples, from files as they are and tightened."""
+def solvers(request: Request) -> Iterator[tuple[str, Facts]]:
+    """Proofs of MIP solvers for some samples, from files as they are and tightened."""
     for name in MIP_SAMPLES:
-        if asked.wants(name):
-            for row in proof_solvers.both(name, SIZE, asked.seconds, SECONDS["samples"]):
+        if request.wants(name):
+            for row in proof_solvers.both(name, SIZE, request.seconds, SECONDS["samples"]):
                 yield f"{name} {row['solver']}", row
 
 
-def settings(asked: Asked) -> Iterator[tuple[str, Facts]]:
-    """How other settings of MIP solvers fare than the default."""
+def settings(request: Request) -> Iterator[tuple[str, Facts]]:
+    """Results of other settings of MIP solvers, compared with the default."""
     chosen = [instance for instance in tiny() if instance.name.startswith("random")][:TRIED]
-    return proof_solvers.settings(chosen, asked.seconds)
+    return proof_solvers.settings(chosen, request.seconds)
 
 
-def pictures(asked: Asked) -> Iterator[tuple[str, Facts]]:
-    """The pictures of what every level leaves of the crosses."""
-    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), seconds=asked.seconds)
-    certificate = write_certificate(proof, asked.work / f"{PICTURED}.certificate.npz")
+def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
+    """The pictures of the crosses left at every level."""
+    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), seconds=request.seconds)
+    certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
     proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")
     yield PICTURED, {"levels": len(proof.levels), "status": proof.status, "pixels": pixels}
 
 
-PARTS: Final[dict[str, Callable[[Asked], Iterator[tuple[str, Facts]]]]] = {
+PARTS: Final[dict[str, Callable[[Request], Iterator[tuple[str, Facts]]]]] = {
     "samples": samples,
     "fine": fine,
     "sketches": drawings,
@@ -160,7 +161,7 @@ PARTS: Final[dict[str, Callable[[Asked], Iterator[tuple[str, Facts]]]]] = {
 
 
 def machine() -> Facts:
-    """Where something was measured: processor, cores and load."""
+    """Processor, cores and load of a measurement."""
     info = Path("/proc/cpuinfo")
     model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
     return {
@@ -171,9 +172,9 @@ def machine() -> Facts:
     }
 
 
-def measure(part: str, asked: Asked) -> None:
-    """Put the rows of a part into docs/proofs.json as they come."""
-    for name, facts in PARTS[part](asked):
+def measure(part: str, request: Request) -> None:
+    """Write the rows of a part to docs/proofs.json as they come."""
+    for name, facts in PARTS[part](request):
         kept = read()
         kept.setdefault(part, {})[name] = facts | {"machine": machine()}
         print(part, name, facts, file=sys.stderr, flush=True)
@@ -181,7 +182,7 @@ def measure(part: str, asked: Asked) -> None:
 
 
 def read() -> Kept:
-    """What was measured."""
+    """Read all measured rows."""
     return dict(json.loads(KEPT.read_text())) if KEPT.exists() else {}
 
 
@@ -197,7 +198,7 @@ ENDS: Final = {
     "interrupted": "open: interrupted",
     "gap": "open: gap asked for",
 }
-"""Why a proof has ended, when it is not with an optimum."""
+"""Reasons for the end of a proof without an optimum."""
 
 
 def proof_table(rows: dict[str, Facts]) -> str:
@@ -257,12 +258,12 @@ def titled(solver: str) -> str:
 
 
 def difference(row: Facts) -> float:
-    """How far both optima are apart, relative to 1 or the optimum if that is more."""
+    """Difference of both optima, relative to 1 or the optimum if that is more."""
     return float(abs(row["energy"] - row["other"]) / max(1.0, row["other"]))
 
 
 def solvers_table(rows: dict[str, Facts]) -> str:
-    """What MIP solvers prove."""
+    """The table of proofs of MIP solvers."""
     cells = [
         [
             titled(row["solver"]),
@@ -270,9 +271,9 @@ def solvers_table(rows: dict[str, Facts]) -> str:
             row["name"],
             f"{row['width']} x {row['height']}",
             f"{row['free_jumps']} of {row['pairs']}",
-            *told(row, "cold"),
-            *told(row, "tightened"),
-            *told(row, "here"),
+            *solver_cells(row, "cold"),
+            *solver_cells(row, "tightened"),
+            *solver_cells(row, "here"),
         ]
         for row in sorted(rows.values(), key=lambda row: (row["formulation"], row["solver"], row["name"]))
     ]
@@ -283,8 +284,8 @@ def solvers_table(rows: dict[str, Facts]) -> str:
     return markdown(columns, cells)
 
 
-def told(row: Facts, what: str) -> list[str]:
-    """The best point, the bound and the seconds of a solver."""
+def solver_cells(row: Facts, what: str) -> list[str]:
+    """Cells of a solver: the best point, the bound and the seconds."""
     answer = row[what]
     best, bound = (
         "none" if answer[name] is None else f"{round(answer[name], 5) + 0.0:.5f}"
@@ -309,7 +310,7 @@ def settings_table(rows: dict[str, Facts]) -> str:
 
 
 def in_short(kept: Kept) -> str:
-    """What the proofs reach, whether other solvers agree, and what those reach by themselves."""
+    """Summary: the reach of proofs, agreement with other solvers, and the reach of those."""
     rows, small, mip = kept["samples"], kept["optima"], kept["solvers"]
     closed = [row for row in rows.values() if row["status"] == "optimal"]
     open_gaps = ", ".join(
@@ -338,7 +339,7 @@ def in_short(kept: Kept) -> str:
 
 
 def where(rows: dict[str, Facts]) -> str:
-    """On what rows were measured."""
+    """The machine of the measurements."""
     machines = [row["machine"] for row in rows.values()]
     first, loads = machines[0], [each["load"] for each in machines]
     return (
@@ -350,7 +351,14 @@ def where(rows: dict[str, Facts]) -> str:
 
 def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
-    parts = ["# Proven optima", said("python docs/proofs.py"), in_short(kept), OPENING, PROOF, PICTURES]
+    parts = [
+        "# Proven optima",
+        generated("python docs/proofs.py"),
+        in_short(kept),
+        OPENING,
+        PROOF,
+        PICTURES,
+    ]
     parts += ["## Samples at 24", SAMPLES_TEXT, where(kept["samples"]), proof_table(kept["samples"])]
     parts += ["## Beside other solvers", OPTIMA_TEXT, optima_table(kept["optima"])]
     if "sketches" in kept:
@@ -431,7 +439,7 @@ default help. Means are geometric, shifted by 1 s, runs that met the limit count
 
 
 def main() -> None:
-    """Measure what is asked for, and write the page."""
+    """Measure the requested parts, and write the page."""
     parser = argparse.ArgumentParser(description="Measure proofs and write docs/proofs.md.")
     parser.add_argument("--measure", nargs="*", choices=PARTS, default=[], help="Parts to measure first.")
     parser.add_argument("--names", nargs="*", default=[], help="Only these of a part.")
@@ -442,7 +450,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for part in given.measure:
             seconds = given.seconds or SECONDS[part]
-            measure(part, Asked(tuple(given.names), seconds, given.sketches, given.work or Path(name)))
+            measure(part, Request(tuple(given.names), seconds, given.sketches, given.work or Path(name)))
     (DOCS / "proofs.md").write_text(page(read()))
 
 

@@ -1,8 +1,8 @@
-"""The folders of the package, what each uses, and their picture, for docs/architecture.md:
+"""The folders of the package, their imports, and their picture, for docs/architecture.md:
 `python docs/make.py architecture`.
 
-What lives in a folder is the first line of the docstring in its `__init__.py`; what it uses are its imports.
-Only the order of the folders and their places in the picture stand here.
+A folder is described by the first line of the docstring in its `__init__.py`; its arrows are its imports.
+Only the order of the folders and their places in the picture are set here.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final
 
 PARTS: Final = ("models", "export", "templates")
 GROUND: Final = "models"
-"""At its top what every folder uses, and so left out of the table."""
+"""The folder whose top level every folder uses; it is left out of the table."""
 
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/sketch", "models/field",
@@ -29,7 +29,7 @@ ORDER: Final = (
     "export/library/building", "export/library/checking", "export/library/contributions",
     "export/library/site", "export/cli",
 )  # fmt: skip
-"""From the ground up: a folder uses only folders that stand before it."""
+"""From the ground up: a folder uses only earlier folders."""
 
 
 def folders(root: Path) -> list[str]:
@@ -39,13 +39,13 @@ def folders(root: Path) -> list[str]:
 
 
 def first_line(root: Path, folder: str) -> str:
-    """What lives in a folder: the first line of its docstring."""
+    """Description of a folder: the first line of its docstring."""
     text = ast.get_docstring(ast.parse((root / folder / "__init__.py").read_text(encoding="utf-8"))) or ""
     return text.partition("\n")[0]
 
 
 def uses(root: Path, folder: str) -> list[str]:
-    """The other folders from which the modules of a folder import, the ground left out."""
+    """The other folders from which the modules of a folder import, except the ground."""
     found = set()
     for path in (root / folder).glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -66,7 +66,7 @@ def targets(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
 
 
 def table(root: Path) -> list[list[str]]:
-    """Rows: folder, what lives there, what it uses; in the order from the ground up."""
+    """Rows in the order from the ground up: folder, description, imports."""
     return [
         [
             f"`{folder}/`",
@@ -108,7 +108,7 @@ FLOW: Final = (
     ("models/search", "models/field", "CrossField", ""),
     ("models/search", "models/proof", "a field", ""),
 )
-"""Where data goes: from, to, and what it is called."""
+"""Arrows of data: from, to, and the name of the data."""
 INK: Final = {
     "models": ("#e3edf9", "#3d6ea8"),
     "export": ("#e6f3e6", "#4b8b50"),
@@ -126,7 +126,7 @@ orient="auto-start-reverse">
 
 
 def picture(root: Path) -> str:
-    """The rooms and the way of data through them, as SVG."""
+    """The folders and the data between them, as SVG."""
     height = 940
     parts = [
         (
@@ -148,7 +148,7 @@ def picture(root: Path) -> str:
 
 
 def bars(root: Path) -> list[str]:
-    """The folders that use all of the flow, above it, and the ground below it."""
+    """The folders that use the whole flow, above it, and the ground below it."""
     library = [folder for folder in ORDER if folder.startswith("export/library/")]
     step = (WHOLE - 24 + 8) / len(library)
     return [
@@ -168,8 +168,8 @@ def bars(root: Path) -> list[str]:
 def bar(root: Path, folder: str, y: int, height: int) -> str:
     """A folder over the whole width."""
     what = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
-    said = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{what}</text>'
-    return panel(folder, LEFT, y, WHOLE, height) + said
+    text = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{what}</text>'
+    return panel(folder, LEFT, y, WHOLE, height) + text
 
 
 def chip(text: str, x: float, y: float, width: float) -> str:
@@ -196,7 +196,7 @@ def corner(folder: str) -> tuple[int, int]:
 
 
 def box(root: Path, folder: str) -> str:
-    """A room with its name and what lives there."""
+    """A folder with its name and description."""
     x, y = corner(folder)
     lines = "".join(
         f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
@@ -243,7 +243,7 @@ def written(text: str, x: float, y: float, anchor: str = "middle") -> str:
 
 
 def outside(text: str, y: int, *, down: bool) -> str:
-    """What comes in at the first room, or goes out beside the last one."""
+    """The data that enter at the first folder, or leave at the last one."""
     if down:
         middle = LEFT + WIDE / 2
         return f'{written(text, LEFT, y, "start")}<path class="flow" d="M{middle} {y + 10}V317"/>'

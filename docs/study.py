@@ -1,29 +1,29 @@
-"""Measure what is of practical use, and make docs/study.md: `python docs/study.py --page`.
+"""Measure methods and formulations in practice, and make docs/study.md: `python docs/study.py --page`.
 
     python docs/study.py [--jobs N | --scheduler ADDRESS] [--parts PART ...] [--sketches FOLDER]
     python docs/study.py --quick --data FOLDER
     python docs/study.py --plan | --page
 
-Without options it does all runs that have no row yet in docs/studying/data, then makes the page. Killed and
-given again it goes on where it was. --quick is the same in two minutes, small, into another folder. --plan
-counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers have
-the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1. Runs of a solver that is not installed wait
-for a machine where it is.
+Without options it does all runs that have no row yet in docs/studying/data, then makes the page. After an
+interruption, the same command continues. --quick does the same in two minutes, small, in another folder.
+--plan counts the runs and their seconds. With --scheduler, dask workers do the runs: scheduler and workers
+have the folder docs on their PYTHONPATH, and OPENBLAS_NUM_THREADS=1. Runs of a solver that is not installed
+wait for a machine with it.
 
 The plan (studying/plan.py), every run on one thread:
 
     proofs    30 instances on each of the rungs 4, 6, 8, 12, 16, 24: `prove` in both norms, at most 20 s, and
-              the best angles for the jumps of the greedy field; what all else is judged by
+              the best angles for the jumps of the greedy field; the reference for all other runs
     solvers   the same instances: nine formulations x each solver that takes them, cold, 6 s each;
               20 variants: from the greedy field, with the printed facet, with the windows of a proof. A pair
-              that proves fewer than a tenth of a rung is not run on the next one, and a row says so
+              that proves fewer than a tenth of a rung is not run on the next one, and a row states this
     quality   drawings without one of their curves, surfaces with known answers, sizes 24 and 32: fields of
-              many energies, both norms, several weights; the error beside the gap to the best
+              many energies, both norms, several weights; the error and the gap to the best
     practice  drawings at 24, 48, 128, 256, whole and without their three longest curves: eight ways to a
               field, 1 s or 10 s for those with a limit
 
 18,400 runs, 28 hours on one core if each took all of its time. Solvers end early on small rungs, and the rule
-leaves out most runs of the large ones: some 10 hours on one core, 5 on two.
+skips most runs of the large ones: some 10 hours on one core, 5 on two.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ DOCS: Final = Path(__file__).resolve().parent
 DATA: Final = DOCS / "studying" / "data"
 
 
-def told(plan: Plan, folder: Path | None) -> str:
+def overview(plan: Plan, folder: Path | None) -> str:
     """The stages of a plan, with their runs and the most hours on one core."""
     lines, count, seconds = [], 0, 0.0
     for stage in stages(plan, folder):
@@ -56,7 +56,7 @@ def told(plan: Plan, folder: Path | None) -> str:
 
 
 def main() -> None:
-    """Do what is left of the plan, and make the page."""
+    """Do the remaining runs of the plan, and make the page."""
     parser = argparse.ArgumentParser(description="Measure what is of practical use; make docs/study.md.")
     parser.add_argument("--quick", action="store_true", help="a small plan of two minutes; give --data too")
     parser.add_argument("--plan", action="store_true", help="only tell the runs and their seconds")
@@ -71,7 +71,7 @@ def main() -> None:
     if given.quick and given.data == DATA:
         parser.error("--quick is another plan; give --data FOLDER for its rows")
     if given.plan:
-        print(told(plan, given.sketches))
+        print(overview(plan, given.sketches))
         return
     if not given.page:
         carry_out(

@@ -1,10 +1,10 @@
-"""Make docs/surface.md, how near surfaces come to known ones, from docs/surface.json.
+"""Make docs/surface.md, the errors of surfaces against known ones, from docs/surface.json.
 
     python docs/surface.py [--measure PART ...] [--sketches FOLDER] [--jobs N]
 
 With --measure, parts are measured first, and their rows in docs/surface.json replaced: `known` (surfaces with
 a known answer, from exact crosses and from the field of each method), `noise` (bend fields of noisy strokes),
-`trust` (what is said of samples and drawings) and `times`. FOLDER has line drawings by others.
+`trust` (doubts about samples and drawings) and `times`. FOLDER has line drawings by others.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.trust import OFF, off_right_angles
 from energies import SKETCHES
-from make import markdown, said
+from make import generated, markdown
 from surface_text import PAGE
 
 DOCS: Final = Path(__file__).resolve().parent
@@ -56,7 +56,7 @@ def angles(first: Any, second: Any) -> Any:
 
 
 def normal_error(surface: cf.Surface, normals: Any) -> Any:
-    """Angles to the true normals in degrees, on the side that is nearer to the truth."""
+    """Angles to the true normals in degrees, on the side nearer to the truth."""
     both = [angles(each.normals, normals) for each in (surface, surface.flipped())]
     return min(both, key=np.mean)
 
@@ -79,10 +79,10 @@ def known(name: str, size: int) -> Rows:
     rows = []
     for way, field in fields.items():
         found, hinted = cf.surface(field), cf.surface(field, [middle_hint(true)])
-        error, told = normal_error(found, true.normals), angles(hinted.normals, true.normals)
+        error, hinted_error = normal_error(found, true.normals), angles(hinted.normals, true.normals)
         numbers = {
             "flat": flat.mean(), "cross": np.degrees(field.cross_error(true.u_angle, true.v_angle)).mean(),
-            "mean": error.mean(), "most": np.percentile(error, 95), "hinted": told.mean(),
+            "mean": error.mean(), "most": np.percentile(error, 95), "hinted": hinted_error.mean(),
             "side": float(angles(found.normals, true.normals).mean() <= error.mean() + 1e-9),
             "firm": found.firmness, "alike": rank_correlation(1 - found.confidence, error),
         }  # fmt: skip
@@ -117,7 +117,7 @@ def noise(name: str, size: int) -> Rows:
 
 
 def trust(name: str, what: str, size: int) -> Rows:
-    """What is said of the surface over the bend field of a sample or drawing."""
+    """Doubts about the surface over the bend field of a sample or drawing."""
     instance = cf.sample(what, size) if what in SAMPLES else cf.read_sketch(what, size=size)
     field = field_by("bend", instance)
     found = cf.surface(field)
@@ -181,7 +181,7 @@ def by_surface(rows: Rows) -> str:
 
 
 def with_hints(rows: Rows) -> str:
-    """The same with one hint, and the cross errors and firmness of exact crosses and of bend."""
+    """As `by_surface` with one hint, and the cross errors and firmness of exact crosses and of bend."""
     table = []
     for name, size in dict.fromkeys((row["surface"], row["size"]) for row in rows):
         exact, bend, *_ = [row for row in rows if (row["surface"], row["size"]) == (name, size)]
@@ -206,7 +206,7 @@ def by_noise(rows: Rows, clean: Rows) -> str:
 
 
 def by_drawing(rows: Rows) -> str:
-    """What is said of drawings."""
+    """The table of doubts about drawings."""
     table = [
         [
             row["drawing"], f"{row['unfit']:.0%}", str(row["spots"]), f"{row['slant']:.0f}",
@@ -233,11 +233,12 @@ def by_time(rows: Rows) -> str:
 
 
 def write_page(rows: dict[str, Rows]) -> None:
-    """Make the page."""
+    """Write the page."""
     ranks = [row["alike"] for row in rows["known"] if row["way"] == "bend"]
     sides = [row["side"] for row in rows["known"] if row["way"] != "power"]
     page = PAGE.format(
-        said=said("python docs/surface.py"), known=by_surface(rows["known"]), hints=with_hints(rows["known"]),
+        said=generated("python docs/surface.py"), known=by_surface(rows["known"]),
+        hints=with_hints(rows["known"]),
         noise=by_noise(rows["noise"], rows["known"]), seeds=SEEDS, trust=by_drawing(rows["trust"]),
         times=by_time(rows["times"]), least=f"{min(ranks):.1f}", most=f"{max(ranks):.1f}",
         sides=f"{sum(sides):.0f} of {len(sides)}",
@@ -246,7 +247,7 @@ def write_page(rows: dict[str, Rows]) -> None:
 
 
 def main() -> None:
-    """Measure what is asked for, and write the page."""
+    """Measure the requested parts, and write the page."""
     parser = argparse.ArgumentParser(description="Measure surfaces, and write docs/surface.md.")
     parser.add_argument(
         "--measure", nargs="+", choices=MEASURES, default=[], help="parts to be measured anew"

@@ -2,7 +2,7 @@
 
 `python docs/surface_pictures.py` draws docs/pictures/surface_known.png and surface_samples.png anew.
 
-A row is a surface; where the truth is known, it is shaded beside. All rows are under the same lamp.
+A row is a surface; a known true surface is shaded next to it. All rows have the same lamp.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ WIDTH: Final = 1600
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A surface of a picture. title: said above it.
+    """A surface of a picture. title: text above it.
 
     drawing: file or sample that it was read from; None: its stroke pixels. truth: the true normals (n, 3).
     """
@@ -52,7 +52,7 @@ class Row:
 
 
 def draw_rows(rows: list[Row], path: Path) -> Path:
-    """The path of the PNG that now has a row for each surface."""
+    """Draw a PNG with a row for each surface, and return its path."""
     cells = [_cells(row, _scale(row)) for row in rows]
     columns = max(map(len, cells))
     heights = [CELL * max(cell.shape[0] / max(cell.shape[:2]) for cell in line) for line in cells]
@@ -85,7 +85,7 @@ def _scale(row: Row) -> int:
 
 
 def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
-    """The path of the PNG that now shows a surface four times: strokes, normals, lamp, matcap."""
+    """Draw a PNG of a surface four times, strokes, normals, lamp, matcap, and return its path."""
     row = Row("", surface, drawing)
     scale = max(1, WIDTH // (4 * surface.instance.grid.width))
     found = raster(surface.instance, surface.normals, scale)
@@ -96,7 +96,7 @@ def strip(surface: Surface, drawing: str | Path, path: Path) -> Path:
 
 
 def _cells(row: Row, scale: int) -> list[Floats]:
-    """The pictures of a row, (h, w, 4) each, `scale` pixels a pixel of the grid."""
+    """The pictures of a row, (h, w, 4) each, `scale` pixels per pixel of the grid."""
     instance = row.surface.instance
     drawing = None if row.drawing is None else read_drawing(row.drawing, on=instance)
     found = raster(instance, row.surface.normals, scale)

@@ -1,4 +1,4 @@
-"""What docs/surface.md says around the tables of surface.py."""
+"""Text of docs/surface.md around the tables of surface.py."""
 
 from typing import Final
 

@@ -1,6 +1,6 @@
-"""What programs make of files that break the rules of docs/format-rules.md (`docs/make.py traps`).
+"""Results of programs on files that break the rules of docs/format-rules.md (`docs/make.py traps`).
 
-Each file has a few lines and one trap; how a program read it shows in the optimum that it finds.
+Each file has a few lines and one trap; the optimum that a program finds shows how it read the file.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ TRAPS: Final = (
     mps("M25", "`BV`, then `UP 5`, greatest x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
         BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
 )  # fmt: skip
-"""`meant` is what a person would take the file for; `refused` where it has no clear meaning."""
+"""`meant` is a human reader's interpretation of the file; `refused` for files without a clear meaning."""
 
 
 def highs(path: Path) -> Answer:
@@ -169,8 +169,8 @@ def xpress(path: Path) -> Answer:
     except xpress.SolverError:
         return REFUSED
     model.optimize()
-    told = model.attributes
-    return float(told.objval) if told.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
+    found = model.attributes
+    return float(found.objval) if found.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
 
 
 def scip(path: Path) -> Answer:
@@ -189,19 +189,19 @@ def scip(path: Path) -> Answer:
 
 def glpk(path: Path) -> Answer:
     """GLPK's optimum."""
-    told = path.with_suffix(".txt")
+    report = path.with_suffix(".txt")
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
-    executed("glpsol", kind, str(path), "-o", str(told))
-    text = told.read_text() if told.exists() else ""
+    executed("glpsol", kind, str(path), "-o", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.search(r"Objective:.*= *(\S+)", text)
     return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
 
 
 def cbc(path: Path) -> Answer:
     """CBC's optimum."""
-    told = path.with_suffix(".txt")
-    executed("cbc", str(path), "solve", "solution", str(told))
-    text = told.read_text() if told.exists() else ""
+    report = path.with_suffix(".txt")
+    executed("cbc", str(path), "solve", "solution", str(report))
+    text = report.read_text() if report.exists() else ""
     found = re.match(r"Optimal - objective value (\S+)", text)
     return REFUSED if not text else float(found[1]) if found else "infeasible"
 
@@ -216,7 +216,7 @@ PROGRAMS: Final[dict[str, tuple[str, Callable[[Path], Answer]]]] = {
     "HiGHS": ("highspy", highs), "Gurobi": ("gurobipy", gurobi), "CPLEX": ("cplex", cplex),
     "Xpress": ("xpress", xpress), "SCIP": ("pyscipopt", scip), "GLPK": ("glpsol", glpk), "CBC": ("cbc", cbc),
 }  # fmt: skip
-"""Title -> its Python package or executable, and how its optimum is found."""
+"""Title -> its Python package or executable, and the function for its optimum."""
 
 
 def present() -> list[str]:
@@ -225,7 +225,7 @@ def present() -> list[str]:
 
 
 def answer(title: str, trap: Trap) -> Answer:
-    """What a program makes of a file."""
+    """Result of a program on a file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / trap.name
         path.write_text(trap.text)
@@ -233,19 +233,19 @@ def answer(title: str, trap: Trap) -> Answer:
 
 
 def shown(value: Answer, trap: Trap) -> str:
-    """A cell: bold where the program neither refuses nor finds what is meant."""
+    """A cell: bold where the program neither refuses nor finds the intended optimum."""
     text = f"{value:g}" if isinstance(value, float) else value
     wrong = value not in {REFUSED, trap.meant}
     return f"**{text}**" if wrong else text
 
 
 def meaning(trap: Trap) -> str:
-    """What is meant, as a cell."""
+    """The intended optimum, as a cell."""
     return f"{trap.meant:g}" if isinstance(trap.meant, float) else trap.meant.replace(REFUSED, "unclear")
 
 
 def table() -> tuple[tuple[str, ...], list[list[str]]]:
-    """Columns and rows: rule, file, what is meant, and what each program finds."""
+    """Columns and rows: rule, file, intended optimum, and the result of each program."""
     titles = present()
     rows = [
         [trap.rule, trap.what, meaning(trap)] + [shown(answer(title, trap), trap) for title in titles]

@@ -1,6 +1,6 @@
 """Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a file that was written, a program that read it, and its answer, checked by `crossfield verify
+Every row is a written file, a program that read it, and its answer, checked by `crossfield verify
 --solve`.
 """
 
@@ -23,7 +23,7 @@ from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.verify.verify import Check, Verdict, Verification, verify
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
-from make import markdown, said
+from make import generated, markdown
 
 DOCS: Final = Path(__file__).resolve().parent
 SECONDS: Final = 15.0
@@ -120,7 +120,7 @@ def routes(main: Run) -> list[str]:
 
 
 def same_problem(main: Run) -> str:
-    """What the formulations that are one problem have as optimum."""
+    """Optima of the formulations of the same problem."""
     groups = {
         "2-norm energy": ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact"),
         "1-norm smoothness, 2-norm rest": ("miqcp-bilinear", "miqp-mccormick"),
@@ -136,7 +136,7 @@ def same_problem(main: Run) -> str:
 
 
 def in_short(main: Run, runs: list[Run]) -> str:
-    """How many files were read, how many as meant, and for how many formulations an optimum is proven."""
+    """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
     found = [f for each in runs for f in each.result.checks if f.step == "read"]
     read = sum(f.verdict == Verdict.AGREES for f in found)
     wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
@@ -154,7 +154,7 @@ def in_short(main: Run, runs: list[Run]) -> str:
 
 
 def errata(runs: list[Run]) -> str:
-    """The misprints as numbers: optimum, and the energy of the field it stands for."""
+    """The misprints as numbers: optimum, and the energy of its field."""
     rows = []
     for each in runs:
         for name in VARIANTS:
@@ -179,7 +179,7 @@ def errata(runs: list[Run]) -> str:
 
 
 def readings(runs: list[Run]) -> str:
-    """How many files each program read, and with what result."""
+    """Number of files that each program read, by result."""
     rows = []
     for name, entry in PROGRAMS.items():
         found = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
@@ -189,8 +189,8 @@ def readings(runs: list[Run]) -> str:
         ]
         wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
         version = runs[0].result.versions.get(name, f"absent: {entry.install}")
-        told = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
-        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(told), *counts, str(wrong)])
+        by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
+        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *counts, str(wrong)])
     return markdown(
         ("program", "version", "reads", "compared by", "agree", "refused, as stated", "not tried", "differ"),
         rows,
@@ -198,7 +198,7 @@ def readings(runs: list[Run]) -> str:
 
 
 def capabilities() -> str:
-    """Who takes what, with the reasons below."""
+    """The solvers that take each formulation, with the reasons below."""
     marks = {"yes": "yes", "local": "local", "no": "-"}
     rows = [[f"`{p.name}`", *(marks[takes(p, name).answer] for name in SOLVERS)] for p in smallest_problems()]
     reasons = [
@@ -225,7 +225,7 @@ def main() -> None:
     grid += f"in a random direction (seed {SEED}), w_beta = 0.001"
     parts = [
         "# One instance, all routes",
-        said("python docs/validate.py"),
+        generated("python docs/validate.py"),
         in_short(main_run, runs),
         (
             f"An instance of {grid}, in all formulations and all formats, handed to every program "

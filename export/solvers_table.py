@@ -1,12 +1,12 @@
-"""The one table of solvers: what each reads, refuses, starts from, proves, what brings it.
+"""The one table of solvers: formats, refusals, starts, proofs, and the programs that contain them.
 
-It is true of solvers anywhere, not only of those that are installed here. `crossfield list`, the manifests,
-starting points, solving, verification, the library and the docs are generated from it; a solver is added by
-one entry.
+It describes solvers anywhere, not only the installed ones. `crossfield list`, the manifests,
+starting points, solving, verification, the library and the docs are generated from it; one entry adds a
+solver.
 
 A refusal names a trait of a problem *as the format holds it* (LP and MPS hold (8) and (9) with lifted
-products), and the stage at which it strikes: `read`: the file is not taken; `solve`: it is read, but not
-solved, or not to a proven optimum. The tests hand each combination to the real solver.
+products), and its stage. `read`: the file is not taken; `solve`: it is read, but not solved, or not to a
+proven optimum. The tests pass each combination to the real solver.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Proof = Literal["global", "convex", "local"]
 
 
 class Refusal(NamedTuple):
-    """Why a solver does not take a trait, and where that shows; `local`: it answers, without proof."""
+    """Reason why a solver does not take a trait, and the stage; `local`: it answers, without proof."""
 
     stage: Stage
     reason: str
@@ -49,17 +49,17 @@ TRAITS: Final[dict[str, Callable[[Problem], bool]]] = {
     "integers": lambda p: bool(p.integer.any()),
     "non-convexity": lambda p: not p.convex and max(p.objective_degree, p.row_degree) > 1,
 }
-"""What a solver may not take."""
+"""Traits of problems that a solver may refuse."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """A Python package or an executable that reads our files, and may bring solvers.
+    """A Python package or an executable that reads our files, and may contain solvers.
 
-    algebra, behaviour: the formats of which it tells coefficients, or values at points. needs: its package,
-    or its executable. tolerance: relative difference of the numbers that it tells, 0 for equal to the bit.
-    free: what its free edition takes. adds: pattern of the columns that it adds when it reads or writes a
-    model.
+    algebra, behaviour: the formats for which it reports coefficients, or values at points. needs: its
+    package, or its executable. tolerance: relative difference of the numbers that it reports, 0 for equal to
+    the bit. free: limits of its free edition. adds: pattern of the columns that it adds when it reads or
+    writes a model.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Program:
 
     @property
     def solvers(self) -> tuple[str, ...]:
-        """The names of the solvers that it brings; none where it only reads."""
+        """The names of the solvers that it contains; none if it only reads."""
         return tuple(name for name, solver in SOLVERS.items() if solver.program == self.name)
 
 
@@ -122,7 +122,7 @@ PROGRAMS: Final = {
         ),
     )
 }  # fmt: skip
-"""The programs that our files are for, as far as they can be had for free.
+"""The programs that read our files, as far as they are available for free.
 
 Each has a module in export/programs.
 """
@@ -131,7 +131,7 @@ Each has a module in export/programs.
 class StartFile(NamedTuple):
     """The file from which a solver starts: its layout (see export/bundle/starts.py), suffix, and use.
 
-    convex: whether the solver uses it for convex problems only.
+    convex: whether the solver uses it only for convex problems.
     """
 
     layout: str
@@ -142,15 +142,14 @@ class StartFile(NamedTuple):
 
 @dataclass(frozen=True)
 class Solver:
-    """A solver: the formats it reads, the preferred one first; what brings it; what it refuses, by trait.
+    """A solver: the formats it reads, the preferred one first, its program, and its refusals, by trait.
 
-    program: the name of the program that brings it. package: a Python package that it needs besides. proves:
-    of what it takes, `global`: all optima are proven; `convex`: those of convex problems; `local`: none.
-    start: the file it starts from beside a model, where it takes one. answers: suffix of its solution files.
-    bundled: whether it is installed with crossfield. not_for: classes of problems for which other bundled
-    solvers come first. vendor: who makes it,
-    where others of its maker stand here too: what they find is one opinion. feasible_within: how far a row
-    may be broken by the points that it tells.
+    program: the name of the program that contains it. package: an additional Python package. proves:
+    `global`: all optima of the problems that it takes are proven; `convex`: those of convex problems;
+    `local`: none. start: the file with a starting point for a model, if it takes one. answers: suffix of its
+    solution files. bundled: whether it is installed with crossfield. not_for: classes of problems for which
+    other bundled solvers come first. vendor: its maker, if the table has others of the same maker: together
+    they count as one opinion. feasible_within: largest violation of a row by the points that it reports.
     """
 
     name: str
@@ -169,7 +168,7 @@ class Solver:
 
     @property
     def maker(self) -> str:
-        """Who makes it."""
+        """The maker of the solver."""
         return self.vendor or self.title
 
     def refusal(self, held: Problem, *stages: Stage) -> Refusal | None:
@@ -181,7 +180,7 @@ class Solver:
 
     @property
     def missing(self) -> str:
-        """How to install it where it is not here; empty where it is."""
+        """Instructions to install it; empty if it is installed."""
         if not PROGRAMS[self.program].present:
             return PROGRAMS[self.program].install
         return f"pip install {self.package}" if self.package and find_spec(self.package) is None else ""
@@ -274,11 +273,11 @@ SOLVERS: Final = {
             answers=".csv", vendor="IBM",
         ),
         Solver("cbc", "CBC", ("mps", "lp"), "cbc", _LINEAR_ONLY, vendor="COIN-OR"),
-        # What is 1e-5 from a whole number it takes for whole and tells rounded: times pi/2 and pi in rows.
+        # Values within 1e-5 of a whole number are reported rounded, which rows multiply by pi/2 or pi.
         Solver("glpk", "GLPK", ("mps", "lp", "mod"), "glpk", _LINEAR_ONLY, feasible_within=5e-5),
     )
 }  # fmt: skip
-"""The table of solvers. Bundled ones stand in the order in which they are preferred."""
+"""The table of solvers. Bundled ones are in the order of preference."""
 
 BUNDLED: Final = {name: solver for name, solver in SOLVERS.items() if solver.bundled}
 """The solvers that are installed with crossfield."""
@@ -315,12 +314,12 @@ def takes_in(problem: Problem, solver: str, name: str) -> Taking:
 
 
 def takers(problem: Problem) -> dict[str, Taking]:
-    """What each solver says to a problem."""
+    """The answer of each solver to a problem."""
     return {name: takes(problem, name) for name in SOLVERS}
 
 
 def smallest(formulation: Formulation) -> Problem:
-    """The formulation on two pixels: enough to ask what a format carries and a solver takes."""
+    """The formulation on two pixels: enough to determine what a format carries and a solver takes."""
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
     instance = Instance("smallest", np.ones((1, 2), dtype=bool), pixels, ones, ones)
     return Problem(instance, formulation, np.zeros(1, dtype=np.int32) if formulation.fixed else None)

@@ -1,6 +1,6 @@
 """The mathematics, from a drawing to a field.
 
-At the top only what every folder uses: errors (one family), storage (files that are whole or not there),
+The top level holds what every folder uses: errors (one family), storage (files are complete or absent),
 archives of arrays, and limits of inputs. Folders: processes, instance, sketch, field, formulations, search.
-Nothing here knows a solver, a solver's file format, a template or the command line.
+No module here depends on a solver, a solver's file format, a template or the command line.
 """

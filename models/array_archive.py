@@ -1,10 +1,10 @@
 """Archives of arrays (.npz): equal arrays give equal bytes, and one strict reader unpacks them within limits.
 
-The reader accepts what `pack_arrays`, `numpy.savez` and `numpy.savez_compressed` write, and nothing else, so
-that no other program can find other arrays in the same file:
+The reader accepts only what `pack_arrays`, `numpy.savez` and `numpy.savez_compressed` write, so that no other
+program can find other arrays in the same file:
 
-- The file consists of the members, the central directory and its end record, in this order, with nothing
-  before, between or after them. There are no comments, and no 64-bit end record.
+- The file consists of the members, the central directory and its end record, in this order, without other
+  bytes before, between or after them. There are no comments, and no 64-bit end record.
 - Each member is stored or deflated, and is not encrypted. Its header repeats the directory exactly; the
   64-bit sizes that NumPy adds are the only extra field.
 - Names are ASCII, end in `.npy` and differ in more than case. Each array is one that its caller expects.
@@ -40,7 +40,7 @@ _WIDE: Final = struct.Struct("<2H2Q")
 _UNKNOWN: Final = 0xFFFFFFFF  # stands for a size that the extra field of 64-bit sizes holds
 _STORED: Final = 0
 _METHODS: Final = (_STORED, zipfile.ZIP_DEFLATED)
-_HEADER: Final = 128  # bytes of an array's header, whatever the array
+_HEADER: Final = 128  # bytes of an array's header, for every array
 _ARRAY: Final = re.compile(
     rb"\x93NUMPY\x01\x00\x76\x00\{'descr': '([ -&(-~]{1,20})', 'fortran_order': (False|True), "
     rb"'shape': \(((?:[0-9]{1,10}(?:,|(?:, [0-9]{1,10})+))?)\), \} *\n"
@@ -49,12 +49,12 @@ _NUMBERS: Final = re.compile(r"\|(?:b1|[iu]1)|<(?:[iu][248]|f[248])")
 
 
 class _DamagedError(Exception):
-    """What is wrong with the bytes of an archive."""
+    """A defect in the bytes of an archive."""
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a member may be: number of dimensions, most entries along one, kinds of its numbers."""
+    """Limits of a member: number of dimensions, most entries along one, kinds of its numbers."""
 
     dimensions: int
     most: int
@@ -63,7 +63,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class _Member:
-    """A member: how and where its bytes are packed, their number once unpacked, and their checksum."""
+    """Position and packing of a member, the number of its bytes once unpacked, and their checksum."""
 
     deflated: bool
     packed: memoryview
@@ -72,10 +72,10 @@ class _Member:
 
 
 def pack_arrays(arrays: Arrays) -> bytes:
-    """Return the bytes of a compressed .npz, which depend on the arrays alone, not on clock or processor.
+    """Return the bytes of a compressed .npz, which depend only on the arrays, not on clock or processor.
 
-    numpy.savez_compressed gives steady bytes too, but promises neither them nor, up to numpy 2.1, a way to
-    refuse pickles; its members are 20 bytes longer.
+    numpy.savez_compressed also gives steady bytes but does not promise them. Up to numpy 2.1 it offers no way
+    to refuse pickles, and its members are 20 bytes longer.
     """
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -90,7 +90,7 @@ def pack_arrays(arrays: Arrays) -> bytes:
 
 
 class ArrayArchive:
-    """The members of an .npz that is in memory; each is unpacked when it is asked for.
+    """The members of an .npz in memory; each is unpacked on request.
 
     Raises InstanceError for bytes that the module's docstring does not allow, and for members of more than
     MAX_ARCHIVE bytes in all.
@@ -110,15 +110,15 @@ class ArrayArchive:
         return name in self._members
 
     def arrays(self, expected: Mapping[str, Expected], prefix: str = "") -> Arrays:
-        """Return the expected arrays by name. prefix: what precedes the names in the archive.
+        """Return the expected arrays by name. prefix: text before the names in the archive.
 
-        Raises InstanceError, naming the array, for one that is missing, of another kind or shape, pickled,
-        damaged, or larger than it may be.
+        Raises InstanceError, naming the array, for an array that is missing, of another kind or shape,
+        pickled, damaged, or too large.
         """
         return {name: self._array(prefix, name, kind) for name, kind in expected.items()}
 
     def finish(self) -> None:
-        """Raise InstanceError if the archive holds an array that was never asked for."""
+        """Raise InstanceError if the archive holds an array that was never requested."""
         if self._unread:
             raise InstanceError(
                 f"holds an array {shortened(min(self._unread))!r} that does not belong in it; write it again"
@@ -140,13 +140,13 @@ def _damaged(error: Exception) -> InstanceError:
 
 
 def _need(holds: object, otherwise: str) -> None:
-    """Nothing if the condition holds; otherwise the error."""
+    """Raise _DamagedError unless the condition holds."""
     if not holds:
         raise _DamagedError(otherwise)
 
 
 def _members(data: memoryview) -> Iterator[tuple[str, _Member]]:
-    """The members in their order, by name without ending."""
+    """The members in their order, by name without suffix."""
     end = len(data) - _END.size
     _need(end >= 0, "it is cut off")
     mark, *disks, here, count, size, begin, comment = _END.unpack(data[end:])
@@ -169,7 +169,7 @@ def _members(data: memoryview) -> Iterator[tuple[str, _Member]]:
 
 
 def _member(data: memoryview, place: int, entry: tuple[Any, ...], name: str) -> tuple[_Member, int]:
-    """The member at a place, whose header must repeat its directory entry, and the place after it."""
+    """The member at a position, whose header must repeat its directory entry, and the next position."""
     version, flags, method, time, date, checksum, packed, length = entry[2:10]
     mark, *repeated, name_length, extra = _LOCAL.unpack_from(data, place)
     begin = place + _LOCAL.size + len(name)
@@ -197,22 +197,22 @@ def _array(member: _Member, name: str, expected: Expected) -> np.ndarray[Any, An
     head = unpacker.decompress(packed, _HEADER) if member.deflated else bytes(packed[:_HEADER])
     kind, shape = _described(head, name, expected)
     length = math.prod(shape) * kind.itemsize
-    _need(length == member.length - _HEADER, f"array {name!r} has another length than its header says")
+    _need(length == member.length - _HEADER, f"array {name!r} has another length than its header states")
     if member.deflated:
         rest: bytes | memoryview = unpacker.decompress(unpacker.unconsumed_tail, length + 1)
-        _need(unpacker.eof and not unpacker.unused_data, f"array {name!r} has more than its header says")
+        _need(unpacker.eof and not unpacker.unused_data, f"array {name!r} has more than its header states")
     else:
         rest = packed[_HEADER:]
-    _need(len(rest) == length, f"array {name!r} has another length than its header says")
+    _need(len(rest) == length, f"array {name!r} has another length than its header states")
     _need(zlib.crc32(rest, zlib.crc32(head)) == member.checksum, f"array {name!r} has another checksum")
     found = np.frombuffer(rest, dtype=kind).reshape(shape)
-    # NumPy takes the bytes of bits as they are, and counts and inverts others than 0 and 1 wrongly.
+    # NumPy takes the bytes of bits unchanged, and counts and inverts values other than 0 and 1 wrongly.
     _need(kind.kind != "b" or not (found.view(np.uint8) > 1).any(), f"array {name!r} has bits beyond 1")
     return found
 
 
 def _described(head: bytes, name: str, expected: Expected) -> tuple[np.dtype[Any], tuple[int, ...]]:
-    """The kind and the shape that the header of an array promises. Raises InstanceError for other ones."""
+    """The kind and shape in the header of an array. Raises InstanceError unless they are expected."""
     found = _ARRAY.fullmatch(head)
     if found is None:
         raise _DamagedError(f"array {name!r} has no header as NumPy writes it")

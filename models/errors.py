@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any, Final
 
 LONGEST: Final = 1000
-"""Characters of a message, its file aside."""
+"""Most characters of a message, without the name of its file."""
 QUOTED: Final = 80
-"""Characters of a text from a file inside of a message."""
+"""Most characters of a text from a file that a message quotes."""
 _HEAD: Final = (
-    0.7  # part of a shortened text that is its beginning; the rest is its end, where the remedy stands
+    0.7  # share of a shortened text from its beginning; the rest is its end, where the remedy stands
 )
 
 
 def printable(text: str) -> str:
-    """The text on one line, safe for a terminal: invisible characters as their escapes."""
+    """The text on one line, safe for a terminal: invisible characters become escapes."""
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(map(_visible, line))
 
@@ -30,12 +30,12 @@ def _visible(character: str) -> str:
 
 
 def shortened(text: object, most: int = QUOTED) -> str:
-    """A text from a file for a message: printable, its middle left out beyond `most` characters."""
+    """A printable text from a file for a message, without its middle where it exceeds `most` characters."""
     try:
         whole = str(text)
     except ValueError:  # a whole number of more digits than Python writes
         whole = "a number of thousands of digits"
-    beyond = len(whole) > 2 * most  # do not make megabytes printable to show a line of them
+    beyond = len(whole) > 2 * most  # avoids making megabytes printable to show one line
     line = printable(whole[:most] + "..." + whole[-most:] if beyond else whole)
     head = int(_HEAD * most)
     return line if len(line) <= most else f"{line[:head]} ... {line[head + 5 - most :]}"
@@ -45,13 +45,13 @@ class CrossfieldError(Exception):
     """Base of all errors that crossfield raises on purpose."""
 
     def __init__(self, message: str, *, file: str | Path | None = None) -> None:
-        """Keep the message on one line that is safe to print, led by the file it is about."""
+        """Store the message on one safe line, preceded by the file that it concerns."""
         line = shortened(message, LONGEST)
         super().__init__(f"{printable(str(file))}: {line}" if file is not None else line)
         self.file = file
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the message as it stands: the constructor would shorten it again, file included."""
+        """Pickle the message unchanged: the constructor would shorten it again, file included."""
         return _unpickled, (type(self), self.args), self.__dict__
 
 
@@ -63,7 +63,7 @@ def _unpickled(kind: type[CrossfieldError], args: tuple[str, ...]) -> Crossfield
 
 @contextmanager
 def naming(file: str | Path) -> Iterator[None]:
-    """Nothing; errors of crossfield that name no file meanwhile come out naming this one."""
+    """Name this file in errors of crossfield raised in the block that name no file."""
     try:
         yield
     except CrossfieldError as error:
@@ -81,19 +81,19 @@ class InstanceError(CrossfieldError):
 
 
 class NoStrokeError(InputError, InstanceError):
-    """No pixel or no stroke of a sketch is left: its mask misses them, or the grid is too coarse for it."""
+    """A sketch without pixels or strokes: its mask misses them, or the grid is too coarse."""
 
 
 class FormulationError(CrossfieldError):
-    """An unknown formulation, or an option that the formulation does not have."""
+    """An unknown formulation, or an option that it does not have."""
 
 
 class UnsupportedByFormatError(CrossfieldError):
-    """A format that cannot carry a formulation; raised before a byte is written."""
+    """A format that cannot hold a formulation; raised before a byte is written."""
 
 
 class SolverError(CrossfieldError):
-    """A solver that failed on a file, or that had too little time."""
+    """A solver that failed on a file or had too little time."""
 
 
 class MissingSolverError(SolverError):
@@ -105,7 +105,7 @@ class UnsupportedBySolverError(SolverError):
 
 
 class SolutionError(CrossfieldError):
-    """A solution file that is malformed, empty, or of another problem."""
+    """A solution file that is malformed, empty or belongs to another problem."""
 
 
 class OutputError(CrossfieldError):
@@ -113,10 +113,10 @@ class OutputError(CrossfieldError):
 
 
 class ConsistencyError(CrossfieldError):
-    """A file whose content would differ from its problem: a defect of crossfield. No file is left."""
+    """A file whose content would differ from its problem: a defect of crossfield. No file is written."""
 
     def __init__(self, message: str, *, file: str | Path | None = None) -> None:
-        """Add the request to report it, unless `message` has it already."""
+        """Add the request to report the defect, unless `message` already has it."""
         super().__init__(message if message.endswith(_REPORT) else message + _REPORT, file=file)
 
 

@@ -1,7 +1,7 @@
-"""How much is read at most of files that come from elsewhere: the one table of all readers of inputs.
+"""Limits on external files: the one table for all readers of inputs.
 
-A file beyond a limit is refused with a message that states it, before the work or the memory is spent. Each
-limit is far above what sketches, instances and fields of the largest grid need.
+A file beyond a limit is refused with a message that states the limit, before work or memory is spent. Each
+limit is far above the needs of sketches, instances and fields of the largest grid.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import Final
 
 MAX_BYTES: Final = 200_000_000
-"""Bytes of a file, but for archives of arrays (MAX_ARCHIVE)."""
+"""Bytes of a file, except for archives of arrays (MAX_ARCHIVE)."""
 
 # SVG
 MAX_TAGS: Final = 1_000_000
 """Tags and attributes of a drawing."""
 MAX_ELEMENTS: Final = 100_000
-"""Elements drawn, those repeated by `use` counted each time."""
+"""Elements drawn, counting every repetition by `use`."""
 MAX_USES: Final = 10_000
 """Copies made by `use`."""
 MAX_USE_DEPTH: Final = 100
@@ -23,13 +23,13 @@ MAX_USE_DEPTH: Final = 100
 MAX_DATA: Final = 10_000_000
 """Characters of path data, point lists, styles and transforms of elements."""
 MAX_CURVES: Final = 500_000
-"""Segments of all shapes, those repeated by `use` counted each time."""
+"""Segments of all shapes, counting every repetition by `use`."""
 MAX_LENGTH: Final = 64
 """Characters of a length or a colour."""
 MAX_TRANSFORM: Final = 1000
 """Characters of a transform."""
 LEAST_LENGTH: Final = 1e-9
-"""Width and height of a page: below it the quotient of two lengths is no number any more."""
+"""Width and height of a page: the quotient of two smaller lengths is not finite."""
 MAX_STYLE: Final = 1_000_000
 """Characters of style sheets."""
 MAX_RULE_CHECKS: Final = 1_000_000
@@ -41,7 +41,7 @@ MAX_SEGMENTS: Final = 5_000_000
 MAX_PIECES: Final = 40_000_000
 """Pieces of segments between pixel edges."""
 MAX_LINES: Final = 500_000
-"""Lines of a .scap file, one for each sample of a pen stroke."""
+"""Lines of a .scap file, one per sample of a pen stroke."""
 
 # Pictures
 MAX_SIDE: Final = 40_000
@@ -51,7 +51,7 @@ MAX_PIXELS: Final = 80_000_000
 MAX_GRID: Final = 9999
 """Rows and columns of a grid."""
 MAX_ARCHIVE: Final = 1 << 31
-"""Bytes of an .npz, packed and unpacked: far more than a field that can be solved takes."""
+"""Bytes of an .npz, packed and unpacked: far more than a solvable field takes."""
 MAX_HEAD: Final = 1 << 20
 """Bytes of the text in an .npz."""
 MAX_NUMBER: Final = 40
@@ -59,8 +59,8 @@ MAX_NUMBER: Final = 40
 
 # Solutions
 MAX_SOLUTION: Final = 1 << 31
-"""Bytes of a solution file, packed and unpacked: a line for each of 40 million columns."""
+"""Bytes of a solution file, packed and unpacked: one line for each of 40 million columns."""
 
 # Logs of solvers
 MAX_LOG: Final = 50_000_000
-"""Bytes of a log: a line a second for years."""
+"""Bytes of a log: one line per second for years."""

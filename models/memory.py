@@ -1,4 +1,4 @@
-"""Memory that is free for this process, where the system states it."""
+"""Memory that is free for this process, where the system reports it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pathlib import Path
 
 
 def available_memory(root: Path = Path("/")) -> int | None:
-    """Bytes that can be had without swapping, or None where the system does not state them, as on Windows.
+    """Bytes available without swapping, or None where the system does not report them, as on Windows.
 
-    On Linux, the least of what the machine and each control group of the process have left: a container is
-    limited by its group. Elsewhere, all memory of the machine. root: where `proc` and `sys` lie.
+    On Linux, the least of what the machine and each control group of the process have left: the group limits
+    a container. Elsewhere, all memory of the machine. root: folder that holds `proc` and `sys`.
     """
     try:
         text = (root / "proc/meminfo").read_text("ascii")
@@ -30,7 +30,7 @@ def _all_memory() -> int | None:
 
 
 def _left_in_groups(root: Path) -> Iterator[int]:
-    """What each control group with a limit has left, of version 2 and of version 1, from the inside out."""
+    """Free bytes of each control group with a limit, versions 2 and 1, from the inside out."""
     try:
         lines = (root / "proc/self/cgroup").read_text("utf-8").splitlines()
     except (OSError, ValueError):
@@ -46,7 +46,7 @@ def _left_in_groups(root: Path) -> Iterator[int]:
 
 
 def _left(top: Path, path: str, limit: str, used: str, cache: str) -> Iterator[int]:
-    """What the group at a path below `top` and its parents have left; files that it caches count as free."""
+    """Free bytes of the group at a path below `top` and of its parents; cached files count as free."""
     inner = top / path.lstrip("/")
     for folder in (inner, *inner.parents):
         if folder.is_relative_to(top):

@@ -1,6 +1,6 @@
-"""What objects show of themselves in notebooks: a picture, or a table as HTML.
+"""Representations of objects in notebooks: a picture, or a table as HTML.
 
-Nothing here can draw. The face of the package knows who does, and is asked when a notebook asks.
+This module does not draw. The top-level package finds the drawing function when a notebook requests it.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class Pictured:
 
 
 def table_of(title: str, facts: Mapping[str, object], picture: bytes | None = None) -> str:
-    """An HTML table of facts below a title, with a picture (PNG) beside it; it loads nothing."""
+    """An HTML table of facts below a title, with a picture (PNG) at its side; it loads no other files."""
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(str(value))}</td></tr>'
         for name, value in facts.items()
     )
-    told = f"<table><caption>{escape(title)}</caption><tbody>{rows}</tbody></table>"
+    table = f"<table><caption>{escape(title)}</caption><tbody>{rows}</tbody></table>"
     if picture is None:
-        return told
+        return table
     image = f'<img alt="" src="data:image/png;base64,{b64encode(picture).decode()}"/>'
-    return f'<div style="display:flex;gap:1em;align-items:center">{told}{image}</div>'
+    return f'<div style="display:flex;gap:1em;align-items:center">{table}{image}</div>'

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written beside, then renamed."""
+"""Complete files or none: written to a temporary neighbour, then renamed."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from typing import IO, Final
 from .errors import InputError, OutputError
 
 PART: Final = ".part"
-"""Ending of the names of temporary neighbours, which begin with a dot."""
+"""Suffix of the names of temporary neighbours, which begin with a dot."""
 _MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[IO[bytes]]:
-    """A binary stream to a temporary neighbour of `path` that takes its place on success.
+    """A binary stream to a temporary neighbour of `path` that replaces it on success.
 
-    On any failure, Ctrl-C included, the neighbour is removed and what stood at `path` stays.
+    On any failure, Ctrl-C included, the neighbour is removed and the old file at `path` stays.
     Raises OutputError when the folder cannot be written or the disk is full.
     """
     path = Path(path)
@@ -51,17 +51,17 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
 
 
 def neighbour(path: Path) -> Path:
-    """A name beside `path` that no other writer uses: it tells the machine and the process."""
+    """A name in the folder of `path` that no other writer uses, because it contains machine and process."""
     return path.with_name(f".{path.name[:_LONGEST]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}{PART}")
 
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
-    """Remove temporary files that killed processes left in a folder; each process looks once per folder.
+    """Remove temporary files that killed processes left in a folder; each process does so once per folder.
 
-    Removes only what this user's processes on this machine wrote, and keeps what cannot be removed: no write
-    needs that, because names are never used twice. Keeps everything where it is unknown whether a process is
-    alive: on Windows, and for other machines. Raises OSError when the folder cannot be listed.
+    Removes only files that this user's processes on this machine wrote, and ignores files that it cannot
+    remove: no write needs the removal, because names are never used twice. Keeps files of processes whose
+    state is unknown: on Windows, and for other machines. Raises OSError when the folder cannot be listed.
     """
     for entry in os.scandir(folder):
         mark = _MARK.fullmatch(entry.name)
@@ -95,7 +95,7 @@ def _lives(process: int) -> bool:
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:
-    """The path, now holding `data`. Raises OutputError."""
+    """Write `data` and return the path. Raises OutputError."""
     with replacing(path) as stream:
         stream.write(data)
     return Path(path)
@@ -104,13 +104,13 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
 def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a smaller file") -> bytes:
     """The whole content of a file.
 
-    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes, with the remedy
-    for these. With `most` it must be a plain file, because nothing else tells its length.
+    Raises InputError when it is missing, a folder, unreadable, or has more than `most` bytes; `remedy` then
+    completes the message. With `most` it must be a regular file, because only these report their length.
     """
     try:
         status = Path(path).stat()
         if most is not None and not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-            raise InputError("cannot be read: is no plain file", file=path)
+            raise InputError("cannot be read: is not a regular file", file=path)
         if most is not None and status.st_size > most:
             raise InputError(f"has {status.st_size} bytes; at most {most} are read, {remedy}", file=path)
         return Path(path).read_bytes()
@@ -119,11 +119,11 @@ def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a 
 
 
 def make_folder(path: str | Path) -> Path:
-    """The folder, made with its parents when it was not there. Raises OutputError."""
+    """Create the folder with its parents if it is missing, and return it. Raises OutputError."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"cannot be made: {_reason(error)}; choose another folder", file=path) from error
+        raise OutputError(f"cannot be created: {_reason(error)}; choose another folder", file=path) from error
     return Path(path)
 
 

@@ -33,7 +33,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 COMPILING = pytest.StashKey[subprocess.Popen]()
 FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
-"""Fixtures, and the program that those who use them need."""
+"""Fixtures, and the program that each needs."""
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def hidden(monkeypatch, tmp_path_factory):
 
 
 def pytest_sessionstart(session):
-    """Compile what proofs need once, and not in every process that runs tests, while these collect them."""
+    """Compile the functions of proofs once, not in every process that runs tests, while they collect them."""
     if not hasattr(session.config, "workerinput") and not session.config.option.collectonly:
         program = "from crossfield.export.solving.compiling import compile_all; compile_all()"
         command = [sys.executable, "-c", program]
@@ -110,7 +110,7 @@ def pytest_sessionfinish(session):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
-    """What a worker of pytest-xdist left out, where the process on the terminal collects nothing."""
+    """Report the tests that a worker of pytest-xdist skipped; the process on the terminal collects none."""
     node.config.stash[LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", {})
 
 

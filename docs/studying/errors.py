@@ -1,4 +1,4 @@
-"""How far fields are from hidden curves and true crosses: paired differences, by drawing, and gaps."""
+"""Errors of fields on hidden curves and true crosses: paired differences, by drawing, and gaps."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Kind = Callable[[Row], bool]
 
 
 def case_of(row: Row) -> tuple[Any, ...]:
-    """The instance that a field was made from, weights left out: drawing, size, curve, noise and its seed."""
+    """The instance of a field, without its weights: drawing, size, curve, noise and its seed."""
     noise = (row["noise"], row["seed"]) if row["hidden"] < 0 else ()
     return (row["instance"], row["size"], row["hidden"], *noise)
 
 
 def is_surface(row: Row) -> bool:
-    """Whether it is about a surface with a known answer."""
+    """Whether the row is about a surface with a known answer."""
     return bool(row["hidden"] < 0)
 
 
 def is_default(row: Row) -> bool:
-    """Whether it has the default weights."""
+    """Whether the row has the default weights."""
     return bool(row["w_strokes"] == STROKE_WEIGHT and row["w_beta"] == SKEW_WEIGHT)
 
 
@@ -51,7 +51,7 @@ def mean_by_drawing(rows: Iterable[Row], value: Callable[[Row], float]) -> Summa
 
 @dataclass(frozen=True)
 class Change:
-    """What a change does to the error: degrees, mean over drawings and standard error, and pairs."""
+    """Effect of a change on the error: degrees, mean over drawings and standard error, and pairs."""
 
     mean: float
     error: float
@@ -60,7 +60,7 @@ class Change:
 
     @property
     def sure(self) -> bool:
-        """Whether it is beyond two standard errors."""
+        """Whether the effect exceeds two standard errors."""
         return abs(self.mean) > 2 * self.error
 
     def __str__(self) -> str:
@@ -68,7 +68,7 @@ class Change:
 
 
 def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
-    """The error after less the error before, of the same cases; None for fewer than three drawings."""
+    """The error after minus the error before, for the same cases; None for fewer than three drawings."""
     old, new = defaultdict[Any, list[float]](list), defaultdict[Any, list[float]](list)
     for row in rows:
         for kind, kept in ((before, old), (after, new)):
@@ -84,7 +84,7 @@ def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:
 
 
 def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, bool]]:
-    """Of every case under default weights the least 2-norm energy, and whether it is the proven optimum."""
+    """Least 2-norm energy of every case with default weights, and whether it is the proven optimum."""
     least: dict[tuple[Any, ...], float] = {}
     bound: dict[tuple[Any, ...], float] = {}
     for row in rows:
@@ -98,7 +98,7 @@ def best_energies(rows: Iterable[Row]) -> dict[tuple[Any, ...], tuple[float, boo
 
 
 def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
-    """Each field under default weights, of cases whose optimum is proven, with its relative gap to it."""
+    """Each field with default weights, for cases with a proven optimum, with its relative gap to it."""
     kept = [row for row in usable(rows) if is_default(row)]
     best = best_energies(kept)
     return [
@@ -109,7 +109,7 @@ def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
 
 
 def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
-    """Each field with its gap, and its error less that of the field of least energy of its instance."""
+    """Each field with its gap, and its error minus that of the field of least energy of its instance."""
     least: dict[Any, Row] = {}
     for row, _ in found:
         case = case_of(row)

@@ -1,4 +1,4 @@
-"""What the rows say: who proved what, against which optimum, and how far fields are from the best."""
+"""Facts from the rows: proofs by solver, contradictions to optima, and gaps of fields."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .rows import EVERY, NOT_RUN, Row
 PROVEN: Final = 1e-6
 """Gap, relative to 1 or the objective if that is more, of an optimum that is proven."""
 WITHIN: Final = 1e-5
-"""By how much a claim may be off the proven optimum, in the same measure: solvers keep rows to 1e-6."""
+"""Tolerated excess of a claim over the proven optimum, in the same measure: solvers keep rows to 1e-6."""
 CLAIMS: Final = frozenset({"optimal-global", "optimal"})
 PROBLEMS: Final = {
     "2-norm": ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact"),
@@ -26,12 +26,12 @@ PROBLEMS: Final = {
 
 
 def scale(value: float) -> float:
-    """What a difference is relative to."""
+    """The reference value of a relative difference."""
     return max(1.0, abs(value))
 
 
 def is_proven(row: Row) -> bool:
-    """Whether a run ends with an optimum and its proof, by the solver's word or by its bound."""
+    """Whether a run ends with an optimum and its proof, by the solver's status or by its bound."""
     if row["objective"] is None or row["status"] in {"unknown", NOT_RUN}:
         return False
     if row["status"] in CLAIMS:
@@ -43,7 +43,7 @@ def is_proven(row: Row) -> bool:
 
 
 def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
-    """The rows by the values of some columns, in the order in which they come."""
+    """The rows by the values of some columns, in their order."""
     found: dict[tuple[Any, ...], list[Row]] = defaultdict(list)
     for row in rows:
         found[tuple(row[name] for name in names)].append(row)
@@ -51,7 +51,7 @@ def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]
 
 
 def measured(rows: Iterable[Row]) -> list[Row]:
-    """The rows of runs, without those that stand for what was not run."""
+    """The rows of runs, without rows about skipped runs."""
     return [row for row in rows if row["instance"] != EVERY]
 
 
@@ -64,9 +64,9 @@ MIXED: Final = "1-norm and 2-norm"
 
 
 def optima(proofs: Iterable[Row], solvers: Iterable[Row] = ()) -> Optima:
-    """What `prove` found of every instance, and the best angles for given jumps.
+    """Results of `prove` for every instance, and the best angles for given jumps.
 
-    solvers: their rows, of which the best point of the mixed problem is taken, without a bound.
+    solvers: their rows, which give the best point of the mixed problem, without a bound.
     """
     problem = {("prove", 2.0): "2-norm", ("prove", 1.0): "1-norm"}
     found = {
@@ -89,7 +89,7 @@ def problem_of(row: Row) -> str:
 
 
 def contradictions(rows: Iterable[Row], known: Optima) -> list[tuple[Row, str]]:
-    """Rows of our own problems that say what cannot be, by the proven optimum; and what."""
+    """Rows of our own problems that contradict the proven optimum, with the contradiction."""
     found = []
     for row in rows:
         key = (problem_of(row), row["instance"], row["size"])
@@ -107,7 +107,7 @@ def contradictions(rows: Iterable[Row], known: Optima) -> list[tuple[Row, str]]:
 
 
 def gap(row: Row) -> float:
-    """How far the bound of a run is below its objective, relative to it, between 0 and 1; 1 without."""
+    """Relative distance of a run's bound below its objective, between 0 and 1; 1 without a bound."""
     if is_proven(row):
         return 0.0
     if row["objective"] is None or row["bound"] is None:
@@ -117,7 +117,7 @@ def gap(row: Row) -> float:
 
 
 def over(row: Row, known: Optima) -> float | None:
-    """How far the objective of a run is above the least that is known, in that measure; None without a point.
+    """Excess of a run's objective over the least known one, in that measure; None without a point.
 
     Negative below it, where a formulation is a relaxation.
     """
@@ -128,7 +128,7 @@ def over(row: Row, known: Optima) -> float | None:
 
 
 def spent(row: Row) -> float:
-    """Seconds of a proof; infinite for a run that proves nothing."""
+    """Seconds of a proof; infinite for a run without a proof."""
     return float(row["seconds"]) if is_proven(row) and row["seconds"] is not None else float("inf")
 
 
@@ -143,10 +143,10 @@ Times = dict[str, dict[tuple[Any, ...], float]]
 
 
 def ratios(times: Times) -> dict[str, np.ndarray[Any, Any]]:
-    """Performance ratios of Dolan and More, sorted: of each line one for every case that all lines have.
+    """Performance ratios of Dolan and More, sorted: for each line, one per case that all lines have.
 
-    The ratio is the time of a proof over that of the quickest; infinite where nothing is proven. Cases that
-    nobody proves count too.
+    The ratio is the time of a proof over that of the fastest; infinite without a proof. Cases without any
+    proof count too.
     """
     common = sorted(set.intersection(*(set(each) for each in times.values()))) if times else []
     best = {each: min(of[each] for of in times.values()) for each in common}

@@ -1,4 +1,4 @@
-"""Runs that give a field of a drawing or a surface: how far it is from a hidden curve or from the truth."""
+"""Runs that make a field of a drawing or a surface, with its error on a hidden curve or on the truth."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from .rows import Run
 from .solving import FAILED, energies, sizes
 
 MOST_CURVES: Final = 8
-"""Curves of a drawing that are hidden in turn, the longest ones."""
+"""Number of curves of a drawing that are hidden in turn, the longest ones."""
 PERTURBED: Final = "perturbed"
 SHARES: Final = (0.02, 0.1, 0.3)
-"""Of the pixels of a perturbed field that get another cross at random."""
+"""Shares of the pixels of a perturbed field that get another cross at random."""
 Found = tuple[CrossField, dict[str, Any]]
 
 
@@ -44,8 +44,8 @@ def surface(name: str, size: int) -> Any:
     return cf.analytic(name, size)
 
 
-def asked(run: Run, folder: Path | None) -> Instance:
-    """The instance that a run makes a field from."""
+def instance_of(run: Run, folder: Path | None) -> Instance:
+    """The instance of a run."""
     if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
         found = noisy(surface(run.instance, run.size).instance, run.noise, run.seed)
     else:
@@ -54,7 +54,7 @@ def asked(run: Run, folder: Path | None) -> Instance:
 
 
 def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
-    """Mean degrees from a field to the hidden curve, or to the true crosses; None where neither is."""
+    """Mean degrees from a field to the hidden curve, or to the true crosses; None without either."""
     if run.instance in SAMPLES and SAMPLES[run.instance].kind == "analytic":
         truth = surface(run.instance, run.size)
         return float(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
@@ -63,18 +63,18 @@ def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
 
 def fielded(run: Run, folder: Path | None) -> dict[str, Any]:
     """The row of a field."""
-    instance = asked(run, folder)
+    instance = instance_of(run, folder)
     facts: dict[str, Any] = {"version": generator(), **sizes(instance)}
     begin = time.perf_counter()
     try:
-        field, told = _field(run, instance)
+        field, facts_of_field = _field(run, instance)
     except CrossfieldError as failure:
         spent = time.perf_counter() - begin
         return facts | {"status": FAILED, "seconds": spent, "note": str(failure)}
     facts |= {"status": "field", "seconds": time.perf_counter() - begin, **energies(field)}
     norm = 1 if run.norm == 1 else 2
     facts |= {"objective": field.energy(norm).total, "error": error(run, field, folder)}
-    return facts | {"off": float(np.degrees(field.shape.mean_deviation))} | told
+    return facts | {"off": float(np.degrees(field.shape.mean_deviation))} | facts_of_field
 
 
 def _field(run: Run, instance: Instance) -> Found:

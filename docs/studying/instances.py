@@ -1,8 +1,8 @@
-"""The instances of the study: anyone can make the same, from the samples and from seeds.
+"""The instances of the study, reproducible from the samples and from seeds.
 
 whole NAME    the sample, its longer side as many pixels as the rung
 crop NAME     the square of the rung's size with most stroke pixels in the sample of twice that size, 24
-at least; turned by a quarter for every second of SHAPES
+              at least; turned by a quarter for every second of SHAPES
 lines SEED    a full square with straight strokes at random
 noise SEED    a full square, half of its pixels with a stroke in a random direction
 """
@@ -25,7 +25,7 @@ SHAPES: Final = (
     "cylinder_bend", "mouse", "bottle", "saddle", "skew", "singular", "ring",
     "tilted_cylinder", "torus_patch", "wave_sheet",
 )  # fmt: skip
-"""The samples of the rungs. Named here, because rows are of these whatever samples there will be."""
+"""The samples of the rungs. They are named here, because rows refer to these, whatever samples are added."""
 RANDOM: Final = 5  # instances of each random kind on a rung
 FEWEST: Final = 3  # stroke pixels of a whole sample on a rung
 SMALLEST: Final = 24  # size of the sample of a crop
@@ -33,7 +33,7 @@ SMALLEST: Final = 24  # size of the sample of a crop
 
 @cache
 def rung(size: int) -> tuple[str, ...]:
-    """The names of the 30 instances of a size; lines stand for samples of which too little is left."""
+    """The names of the 30 instances of a size; lines replace samples with too few strokes left."""
     names = [f"whole {name}" for name in SHAPES if _is_there(name, size)]
     names += [f"crop {name}" for name in SHAPES]
     missing = len(SHAPES) - sum(name.startswith("whole") for name in names)
@@ -51,7 +51,7 @@ def _is_there(name: str, size: int) -> bool:
 
 @lru_cache(maxsize=8)
 def made(name: str, size: int) -> Instance:
-    """The instance of that name on a rung, under the coefficients of the paper, 1 and 1e-6."""
+    """The instance of that name on a rung, with the coefficients of the paper, 1 and 1e-6."""
     kind, _, what = name.partition(" ")
     found = {"whole": cf.sample, "crop": crop, "lines": lines, "noise": noise}[kind](
         what if kind in {"whole", "crop"} else int(what), size
@@ -121,7 +121,7 @@ def surfaces() -> list[str]:
 
 @lru_cache(maxsize=8)
 def drawing(name: str, size: int, folder: Path | None = None) -> Instance:
-    """A drawing at a size, under the default weights."""
+    """A drawing at a size, with the default weights."""
     return cf.sample(name, size) if name in SAMPLES else cf.read_sketch(_file(name, folder), size=size)
 
 

@@ -1,4 +1,4 @@
-"""docs/study.md from the rows: answers first, then the parts, then what may be wrong."""
+"""docs/study.md from the rows: answers first, then the parts, then threats to validity."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 from crossfield.export.solvers_table import PROGRAMS
-from make import said
+from make import generated
 
 from . import errors, practice_page, quality_page, solver_page
 from .instances import surfaces
@@ -23,21 +23,21 @@ COMMAND: Final = "python docs/study.py --page"
 
 
 def counted(text: str) -> dict[str, int]:
-    """From how many rows of each part a page was made, by what it says at its end."""
-    said = text.rstrip().rpartition("from the first ")[2].rstrip(".")
-    return {part: int(count) for count, part in (each.split() for each in said.split(", "))}
+    """Numbers of rows of each part from which a page was made, according to its end."""
+    counts = text.rstrip().rpartition("from the first ")[2].rstrip(".")
+    return {part: int(count) for count, part in (each.split() for each in counts.split(", "))}
 
 
 def read(data: Path) -> Kept:
-    """The rows of all parts; a study may be adding others meanwhile."""
+    """The rows of all parts; a running study may add others."""
     files = {part: data / f"{part}.csv" for part in PARTS}
     return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
 
 
 def ordered(kept: Kept, plan: Plan) -> Kept:
-    """The rows in the order of the plan, whenever they came: colours and lines of tables follow it.
+    """The rows in the order of the plan: colours and lines of tables follow it.
 
-    Rows that are not of the plan, of other drawings, come last.
+    Rows that are not in the plan, of other drawings, come last.
     """
     place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
     return {
@@ -46,7 +46,7 @@ def ordered(kept: Kept, plan: Plan) -> Kept:
 
 
 def completeness(kept: Kept, plan: Plan) -> str:
-    """How much of the plan has been done."""
+    """Sentence on the completed share of the plan."""
     planned = [run for stage in stages(plan, None) for run in stage.runs]
     done = {key_of(row) for rows in kept.values() for row in rows}
     skipped = {key_of(row) for row in kept["solvers"] if row["status"] == NOT_RUN}
@@ -61,7 +61,7 @@ def completeness(kept: Kept, plan: Plan) -> str:
 
 
 def answers(kept: Kept) -> dict[str, list[str]]:
-    """The answers in plain words: sentences by question, the first of which says most."""
+    """The answers in plain words: sentences by question, the most important one first."""
     return {
         "Can they be solved?": solvable(kept),
         "Does it matter?": matters(kept),
@@ -69,13 +69,13 @@ def answers(kept: Kept) -> dict[str, list[str]]:
     }
 
 
-def told(found: dict[str, list[str]], most: int | None = None) -> str:
-    """Questions and answers as paragraphs, each of so many sentences at most."""
+def paragraphs(found: dict[str, list[str]], most: int | None = None) -> str:
+    """Questions and answers as paragraphs, each of that many sentences at most."""
     return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in found.items())
 
 
 def solvable(kept: Kept) -> list[str]:
-    """How far solvers get, and how far `prove` does."""
+    """Answer on the reach of solvers, and of `prove`."""
     found = solver_page.facts_in_short(kept)
     standing, own = found["standing"], found["prove"][2]
     if not standing:
@@ -110,7 +110,7 @@ def solvable(kept: Kept) -> list[str]:
 
 
 def matters(kept: Kept) -> list[str]:
-    """What the optimum does to the error, and what does more."""
+    """Answer on the effect of the optimum on the error, and of other changes."""
     found = quality_page.changes(kept["quality"], surfaces=False)
     optimum = found["optimum"]
     if optimum is None:
@@ -137,7 +137,7 @@ def matters(kept: Kept) -> list[str]:
 
 
 def threats(kept: Kept) -> str:
-    """What may be wrong, with the editions and the machine."""
+    """Threats to validity, with the editions and the machine."""
     free = [f"{p.title}: {p.free}" for p in PROGRAMS.values() if p.free]
     rows = [row for part in kept.values() for row in part if row["machine"]]
     machines = ", ".join(sorted({row["machine"] for row in rows}))
@@ -160,9 +160,9 @@ def page(kept: Kept, plan: Plan) -> str:
     kept = ordered(kept, plan)
     parts = [
         "# Of what practical use?",
-        said(COMMAND),
+        generated(COMMAND),
         QUESTION,
-        told(answers(kept)),
+        paragraphs(answers(kept)),
         completeness(kept, plan),
     ]
     parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
@@ -181,4 +181,4 @@ def write_page(data: Path, target: Path, plan: Plan) -> None:
 
 def in_short(kept: Kept, plan: Plan) -> str:
     """The first sentence of each answer, for the index of all pages."""
-    return told(answers(ordered(kept, plan)), most=1)
+    return paragraphs(answers(ordered(kept, plan)), most=1)

@@ -15,7 +15,7 @@ from .rows import Run
 from .solving import ANGLES, PROOF, PROOF_SECONDS, pairs
 
 FEWEST_PROVEN: Final = 0.1
-"""Share of a rung that a pair has to prove, to be run on the next one."""
+"""Share of a rung that a pair has to prove to be run on the next one."""
 VARIANTS: Final = (
     *(("milp-mccormick", solver, {"start": "greedy"}) for solver in ("highs", "scip", "cplex", "xpress")),
     *(("miqp-exact", solver, {"start": "greedy"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
@@ -24,15 +24,15 @@ VARIANTS: Final = (
     *(("miqp-exact", solver, {"windows": "proof"}) for solver in ("scip", "cplex", "bonmin", "gurobi")),
     *(("minlp-cubic", solver, {"windows": "proof"}) for solver in ("scip", "gurobi")),
 )
-"""What is measured beside the cold runs: formulation, solver, and what differs."""
+"""Variants in addition to the cold runs: formulation, solver, and the difference."""
 WEIGHTS: Final = (1.0, 5.0, 80.0)
-"""Of the strokes, beside the default."""
+"""Weights of the strokes, besides the default."""
 SKEWS: Final = (1e-4, 1e-2, 1.0)
-"""Weights of the skew, beside the default."""
+"""Weights of the skew, besides the default."""
 NOISE: Final = ((0.0, (0,)), (3.0, (0, 1, 2, 3)), (8.0, (0, 1, 2, 3)))
 """Degrees of noise on the strokes of a surface, and seeds."""
 SEEDS: Final = (0, 1)
-"""Of perturbed fields."""
+"""Seeds of perturbed fields."""
 SEARCHES: Final = (1.0, 3.0)
 """Seconds of searches in the part about quality."""
 METHODS_TIMED: Final = ("search", "two-stage", "prove")
@@ -40,7 +40,7 @@ METHODS_TIMED: Final = ("search", "two-stage", "prove")
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is measured: sizes, and how many of everything; seconds of a run by part."""
+    """Extent of the study: sizes, and numbers of everything; seconds of a run by part."""
 
     rungs: tuple[int, ...] = (4, 6, 8, 12, 16, 24)
     instances: int = 30
@@ -65,7 +65,7 @@ QUICK: Final = Plan(
 
 @dataclass(frozen=True)
 class Stage:
-    """Runs that may be done in any order; after: the rung whose proofs decide who is run, 0 for none."""
+    """Runs that may be done in any order; after: the rung whose proofs decide which are run, 0 for none."""
 
     name: str
     runs: tuple[Run, ...]
@@ -73,7 +73,7 @@ class Stage:
 
 
 def stages(plan: Plan, folder: Path | None) -> Iterator[Stage]:
-    """All of the plan: proofs first, small rungs before large ones, parts in turn; variants a rung later."""
+    """The whole plan: proofs first, small rungs before large ones, parts in turn; variants a rung later."""
     rungs, practice, quality = (dict(enumerate(each)) for each in (plan.rungs, plan.practice, plan.quality))
     for number in range(max(len(rungs) + 1, len(practice), len(quality))):
         before = rungs.get(number - 1, 0)
@@ -152,7 +152,7 @@ def weights(plan: Plan, size: int, folder: Path | None) -> Iterator[Run]:
 
 
 def _instances(plan: Plan, size: int, folder: Path | None) -> Iterator[tuple[str, dict[str, float]]]:
-    """Drawings with what hides a curve, curve by curve; then surfaces with their noise."""
+    """Drawings with each hidden curve, curve by curve; then surfaces with their noise."""
     for curve in range(plan.curves):
         for name in drawings(folder)[: plan.most]:
             if curve < len(curves(name, size, MOST_CURVES, folder)):
@@ -164,10 +164,10 @@ def _instances(plan: Plan, size: int, folder: Path | None) -> Iterator[tuple[str
 
 
 def _default(part: str, name: str, size: int, way: str, **given: float) -> Run:
-    """A run under the default weights, where no others are given."""
+    """A run with the default weights, unless others are given."""
     return Run(part, name, size, way, **{"w_strokes": STROKE_WEIGHT, "w_beta": SKEW_WEIGHT} | given)  # type: ignore[arg-type]
 
 
 def expected(run: Run) -> float:
-    """The most seconds that a run takes, but for reading and writing."""
+    """Most seconds of a run, without reading and writing."""
     return run.limit

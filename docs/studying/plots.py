@@ -1,4 +1,4 @@
-"""The plots of the study: SVG, the same for the same rows, in colours that the colour-blind tell apart."""
+"""The plots of the study: SVG, equal for equal rows, in colours for the colour-blind."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .errors import medians
 mpl.use("svg")
 
 INK: Final = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Okabe and Ito, without the yellow, which is no ink on white paper."""
+"""The palette of Okabe and Ito, without yellow, which is illegible on white paper."""
 MARKS: Final = ("o", "s", "^", "D", "v", "P", "X", "*", "h")
 DASHES: Final = ("-", "--", ":", "-.")
 OURS: Final = "crossfield prove"
-"""How the names of lines begin that are drawn thicker."""
+"""Beginnings of the names of lines that are drawn thicker."""
 _STYLE: Final = {
     "svg.hashsalt": "crossfield",
     "svg.fonttype": "path",
@@ -42,7 +42,7 @@ Bars = tuple[list[float], list[float], list[float]]
 
 @contextmanager
 def drawn(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
-    """The axes of panels side by side; afterwards they are in the file."""
+    """The axes of adjacent panels; the file is written at the end of the context."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(wide, high), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1)
@@ -65,7 +65,7 @@ def _thick(name: str) -> dict[str, float]:
 
 
 def profiles(path: Path, panels: dict[str, dict[str, Any]]) -> None:
-    """Performance profiles: of each panel the sorted ratios of every line."""
+    """Performance profiles: for each panel, the sorted ratios of every line."""
     with drawn(path, len(panels), high=4.9) as axes:
         for axis, (title, lines) in zip(axes, panels.items(), strict=True):
             looks = styles(list(lines))
@@ -103,7 +103,7 @@ def growth(path: Path, rungs: list[int], share: dict[str, Line], seconds: dict[s
 
 
 def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
-    """Error beside the gap to the optimum: points by kind of field, and medians of bins."""
+    """Error against the gap to the optimum: points by kind of field, and medians of bins."""
     with drawn(path, len(panels), high=3.8) as axes:
         names = list(dict.fromkeys(name for kinds in panels.values() for name in kinds))
         looks = styles(names)
@@ -131,7 +131,7 @@ def error_by_gap(path: Path, panels: dict[str, dict[str, Line]]) -> None:
 
 
 _ZERO: Final = 0.01
-"""Percent: where what is less is drawn."""
+"""Percent: smaller gaps are drawn here."""
 
 
 def error_by_weight(path: Path, panels: dict[str, dict[str, Bars]]) -> None:
@@ -158,7 +158,7 @@ _BESIDE: Final = 0.0155
 
 
 def error_by_seconds(path: Path, panels: dict[str, dict[str, tuple[float, float, float]]]) -> None:
-    """Error to hidden curves beside seconds, a panel for each size, a mark for each way."""
+    """Error on hidden curves against seconds, a panel for each size, a mark for each way."""
     names = list(dict.fromkeys(name for ways in panels.values() for name in ways))
     looks = styles(names)
     with drawn(path, len(panels), high=3.6, wide=11.0) as axes:

@@ -1,4 +1,4 @@
-"""What the page says of ways to a field in practice: quality and time by size, and what to take."""
+"""Text of the page on ways to a field in practice: quality and time by size, and recommendations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .words import PRACTICE_TEXT
 
 Kept = dict[str, list[Row]]
 QUICK: Final = 1.0
-"""Seconds that somebody who draws waits."""
+"""Seconds for which somebody who draws is willing to wait."""
 MILP_WAY: Final = "two-stage"
 
 
@@ -30,10 +30,10 @@ def name_of(row: Row) -> str:
 
 @dataclass(frozen=True)
 class Fare:
-    """How a way fares at a size.
+    """Results of a way at a size.
 
-    seconds: median. error: degrees to hidden curves, over drawings. over: median share of energy above the
-    least that any way found of the same instance. off: mean degrees from the strokes shown.
+    seconds: median. error: degrees to hidden curves, over drawings. over: median relative excess of energy
+    over the least of any way for the same instance. off: mean degrees from the strokes shown.
     """
 
     runs: int
@@ -46,7 +46,7 @@ class Fare:
 
     @classmethod
     def of(cls, rows: list[Row], least: dict[Any, float]) -> Fare:
-        """That of rows of one way and size."""
+        """Results from the rows of one way and size."""
         good = [row for row in rows if row["status"] != FAILED]
         over = [row["energy_2"] / max(least[errors.case_of(row)], 1e-9) - 1 for row in good]
         return cls(
@@ -75,7 +75,7 @@ Fares = dict[int, dict[str, Fare]]
 
 
 def fares(rows: list[Row]) -> Fares:
-    """How each way fares at each size: on the instances of which every way has a row."""
+    """Results of each way at each size, on the instances for which every way has a row."""
     ways = {name_of(row) for row in rows}
     have: dict[Any, set[str]] = {}
     least: dict[Any, float] = {}
@@ -108,7 +108,7 @@ def table(found: Fares) -> str:
 
 
 def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf)) -> list[str]:
-    """Ways that take more than the first and at most the second seconds, nearest to hidden curves first."""
+    """Ways that take more than the first and at most the second seconds, smallest error first."""
     found = [
         (fare.error.mean, way)
         for way, fare in ways.items()
@@ -118,7 +118,7 @@ def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf))
 
 
 def recommendation(kept: Kept) -> list[str]:
-    """Three sentences: what to draw with, what to take for the least energy, what to leave."""
+    """Three sentences: ways for drawing, for the least energy, and for proofs."""
     found = fares(kept["practice"])
     if not found:
         return ["The ways to a field are not measured yet."]
@@ -126,7 +126,7 @@ def recommendation(kept: Kept) -> list[str]:
 
 
 def _for_drawing(found: Fares, rows: list[Row]) -> str:
-    """What to draw with at each size, what comes next, and which slower way comes nearer."""
+    """Recommended ways for drawing at each size, the next best, and slower ways with a smaller error."""
     order = {size: ranking(ways, (0.0, QUICK)) for size, ways in found.items()}
     best = {size: ways[0] for size, ways in order.items() if ways}
     if not best:
@@ -216,7 +216,7 @@ def _for_solvers(kept: Kept) -> str:
 
 
 def below_all_others(rows: list[Row], way: str) -> tuple[int, int]:
-    """On how many fields the energy of a way is below that of every other one, and of how many."""
+    """Number of fields on which a way has less energy than every other one, and number of all."""
     cases: dict[Any, tuple[list[float], list[float]]] = defaultdict(lambda: ([], []))
     for row in rows:
         if row["energy_2"] is not None:
@@ -226,7 +226,7 @@ def below_all_others(rows: list[Row], way: str) -> tuple[int, int]:
 
 
 _SAME: Final = 1e-4
-"""Relative difference of energies that are the same."""
+"""Relative difference of energies that count as equal."""
 
 
 def _sizes(sizes: Iterable[int]) -> str:

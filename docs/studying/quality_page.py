@@ -1,4 +1,4 @@
-"""What the page says of the quality of fields: what buys a better one."""
+"""Text of the page on the quality of fields: changes that improve it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Kept = dict[str, list[Row]]
 
 
 def made_by(way: str, *, norm: int = 2, strokes: float = STROKE_WEIGHT, skew: float = SKEW_WEIGHT) -> Kind:
-    """Whether a row is of that way, norm and weights; of several searches, the longest is meant."""
+    """Return a test for rows of that way, norm and weights; of several searches, the longest is meant."""
 
     def is_it(row: Row) -> bool:
         same = (row["w_strokes"], row["w_beta"], row["norm"]) == (strokes, skew, norm)
@@ -56,11 +56,11 @@ CHANGES: Final[dict[str, tuple[str, Kind, Kind]]] = {
     "polyvector": ("greedy, then the PolyVector field", made_by("greedy"), made_by("polyvector")),
     "bend": ("greedy, then the bend field", made_by("greedy"), made_by("bend")),
 }  # fmt: skip
-"""What may buy a better field: in words, before, after."""
+"""Changes that may improve a field: in words, before, after."""
 
 
 def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
-    """What each change does to the error, of drawings or of surfaces."""
+    """Effect of each change on the error, of drawings or of surfaces."""
     chosen = [row for row in usable(rows) if is_surface(row) == surfaces]
     return {name: change(chosen, before, after) for name, (_, before, after) in CHANGES.items()}
 
@@ -68,12 +68,12 @@ def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
 def changes_table(rows: list[Row]) -> str:
     """All changes, for hidden curves and surfaces; those beyond two standard errors are bold."""
     drawn, known = changes(rows, surfaces=False), changes(rows, surfaces=True)
-    cells = [[words, _told(drawn[name]), _told(known[name])] for name, (words, *_) in CHANGES.items()]
+    cells = [[words, _cell(drawn[name]), _cell(known[name])] for name, (words, *_) in CHANGES.items()]
     cells = [line for line in cells if any(line[1:])]
     return markdown(("change", "hidden curves, degrees", "surfaces, degrees"), cells)
 
 
-def _told(found: Change | None) -> str:
+def _cell(found: Change | None) -> str:
     if found is None:
         return ""
     text = f"{found} ({found.pairs} pairs)"
@@ -82,7 +82,7 @@ def _told(found: Change | None) -> str:
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """What changes from the greedy field do on the drawings of docs/fields.md, samples among them."""
+    """Effects of changes from the greedy field on the drawings of docs/fields.md, including samples."""
 
     drawings: int
     others: int
@@ -92,7 +92,7 @@ class Elsewhere:
 
     def __str__(self) -> str:
         parts = [
-            f"{OTHERS[way].format(seconds=self.seconds)} {_told(found)}"
+            f"{OTHERS[way].format(seconds=self.seconds)} {_cell(found)}"
             for way, found in self.changes.items()
         ]
         return (
@@ -125,11 +125,11 @@ OTHERS: Final = {
     "search": "to the search of {seconds:g} s", PROOF: "to the best that `prove` finds",
     "polyvector": "to the PolyVector field", "bend": "to the bend field",
 }  # fmt: skip
-"""Methods of docs/fields.json, and what is said of the change to them."""
+"""Methods of docs/fields.json, and the words for the change to them."""
 
 
 def kind_of(row: Row) -> str:
-    """What a field is called in the plot."""
+    """Name of a field in the plot."""
     if row["way"] == "prove":
         return f"best, {row['norm']:.0f}-norm"
     return "perturbed" if row["way"].startswith("perturbed") else str(row["way"])
@@ -160,7 +160,7 @@ def ways_table(rows: list[Row]) -> str:
 
 
 def proven_text(rows: list[Row]) -> str:
-    """Of how many instances the optimum is known."""
+    """Sentence on the number of instances with a known optimum."""
     best = errors.best_energies([row for row in usable(rows) if is_default(row)])
     closed = sum(proven for _, proven in best.values())
     return (
@@ -170,7 +170,7 @@ def proven_text(rows: list[Row]) -> str:
 
 
 def correlation_text(rows: list[Row]) -> str:
-    """How energy and error go together within an instance."""
+    """Sentence on the correlation of energy and error within an instance."""
     parts = []
     for surfaces, words in ((False, "drawings"), (True, "surfaces")):
         for most, which in ((np.inf, "all fields"), (NEAR, f"those within {percent(NEAR)} of the optimum")):
@@ -187,7 +187,7 @@ def correlation_text(rows: list[Row]) -> str:
 
 
 def harmless(rows: list[Row]) -> str:
-    """Between which gaps fields of drawings become worse than the optimum, in words."""
+    """Sentence on the gaps between which fields of drawings become worse than the optimum."""
     found = [each for each in errors.differences(errors.gaps(rows)) if not is_surface(each[0])]
     gap, more = errors.medians([each[1] for each in found], [each[2] for each in found])
     if not gap:
@@ -205,7 +205,7 @@ def harmless(rows: list[Row]) -> str:
 
 
 HARM: Final = 0.5
-"""Degrees by which a field is worse."""
+"""Degrees from which a field counts as worse."""
 
 
 def weight_lines(rows: list[Row], which: str) -> dict[str, plots.Bars]:

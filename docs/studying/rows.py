@@ -1,7 +1,7 @@
-"""A run and its row, and the CSV files that rows are appended to.
+"""A run and its row, and the CSV files with the rows.
 
-A row is one line, flushed to the disk before the next run is handed out. What a kill leaves of a line is cut
-off when the file is read again, and that run is done again.
+A row is one line, flushed to the disk before the next run starts. After a kill, an incomplete line is cut
+off when the file is read again, and that run is repeated.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from typing import Any, Final
 PARTS: Final = ("proofs", "solvers", "quality", "practice")
 """One file each."""
 NOT_RUN: Final = "not run"
-"""Status of a row that stands for all runs of a rung which a rule leaves out."""
+"""Status of a row about all runs of a rung that a rule skips."""
 EVERY: Final = "*"
 """The instance of such a row."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What is done: one field from one instance.
+    """One run: one field from one instance.
 
-    instance: what makes it (studying/instances.py). hidden: the curve that is hidden, -1 for none. noise:
-    standard deviation in degrees of what is added to each stroke. way: formulation, or method. start: `cold`
-    or `greedy`. facet: `hull` or `printed`. windows: `gauge`, or `proof` for those that a certificate leaves.
-    norm: of the energy, where the way has a choice. limit: seconds.
+    instance: its name (studying/instances.py). hidden: number of the hidden curve, -1 for none. noise:
+    standard deviation in degrees of the noise on each stroke. way: formulation, or method. start: `cold`
+    or `greedy`. facet: `hull` or `printed`. windows: `gauge`, or `proof` for the windows of a certificate.
+    norm: of the energy, if the way has a choice. limit: seconds.
     """
 
     part: str
@@ -50,7 +50,7 @@ class Run:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """What tells it from all others, as text."""
+        """The fields that identify the run, as text."""
         return tuple(text(getattr(self, field.name)) for field in fields(self))
 
 
@@ -59,7 +59,7 @@ FOUND: Final = (
     "version", "format", "status", "objective", "bound", "energy_2", "energy_1", "violation", "error",
     "off", "seconds", "nodes", "pixels", "pairs", "columns", "rows", "note", "machine", "load",
 )  # fmt: skip
-"""What a run finds. error: degrees to the hidden curve or the true field; off: to the strokes shown."""
+"""Results of a run. error: degrees to the hidden curve or the true field; off: to the strokes shown."""
 COLUMNS: Final = ASKED + FOUND
 NUMBERS: Final = frozenset(
     {"size", "norm", "w_strokes", "w_beta", "hidden", "noise", "limit", "seed", "objective", "bound"}
@@ -70,14 +70,14 @@ Row = dict[str, Any]
 
 
 def text(value: Any) -> str:
-    """A value as it stands in a file: eleven digits of a number, nothing for None."""
+    """A value in a file: eleven digits of a number, an empty text for None."""
     if value is None:
         return ""
     return f"{value:.11g}" if isinstance(value, float) else " ".join(str(value).split())
 
 
 def number(given: str) -> float | None:
-    """A number of a file; None for none."""
+    """A number of a file; None for an empty text."""
     return float(given) if given else None
 
 
@@ -85,7 +85,7 @@ class Table:
     """The rows of a part, in a file that grows by whole lines."""
 
     def __init__(self, path: Path) -> None:
-        """Read what is there, after cutting off what is no whole line."""
+        """Read the file, after cutting off an incomplete line."""
         self._path = path
         self.rows: list[Row] = []
         if path.exists():
@@ -121,7 +121,7 @@ def _line(cells: tuple[str, ...] | list[str]) -> str:
 
 
 def read(path: Path) -> Iterator[Row]:
-    """The rows of a file, numbers as numbers; a last line without an end is not looked at."""
+    """The rows of a file, with numbers as numbers; a last line without an end is ignored."""
     whole = path.read_bytes().rpartition(b"\n")[0].decode()
     head, *lines = csv.reader(io.StringIO(whole, newline="")) if whole else [COLUMNS]
     if tuple(head) != COLUMNS:

@@ -1,4 +1,4 @@
-"""What the page says of formulations and solvers."""
+"""Text of the page on formulations and solvers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Pair = tuple[str, str]
 
 
 def is_cold(row: Row) -> bool:
-    """Whether it is of a run with nothing but the file as it is."""
+    """Whether the row is of a run with only the file as it is."""
     return (row["start"], row["facet"], row["windows"]) == ("cold", "hull", "gauge")
 
 
@@ -36,7 +36,7 @@ def label(pair: Pair) -> str:
 
 @dataclass(frozen=True)
 class Rung:
-    """What a pair did on a rung. left_out: why it was not run, empty where it was."""
+    """Results of a pair on a rung. left_out: the reason if it was not run, else empty."""
 
     runs: tuple[Row, ...]
     left_out: str = ""
@@ -48,7 +48,7 @@ class Rung:
 
     @property
     def share(self) -> float:
-        """Share of the instances that are proven; nothing of what was not run."""
+        """Share of the instances that are proven; none if it was not run."""
         return self.proven / len(self.runs) if self.runs else 0.0
 
     @property
@@ -58,7 +58,7 @@ class Rung:
 
     @property
     def seconds(self) -> float:
-        """Shifted geometric mean of those; what proves nothing counts with its limit."""
+        """Shifted geometric mean of the seconds; runs without a proof count with their limit."""
         return facts.shifted_mean(min(facts.spent(row), row["limit"]) for row in self.tried)
 
     def cell(self) -> str:
@@ -75,7 +75,7 @@ class Rung:
 
 
 def rungs_of(rows: Iterable[Row]) -> dict[Pair, dict[int, Rung]]:
-    """What each pair did cold on each rung that has rows."""
+    """Results of the cold runs of each pair on each rung that has rows."""
     found: dict[Pair, dict[int, Rung]] = {}
     for (way, solver, size), group in facts.grouped(rows, "way", "solver", "size").items():
         runs = tuple(facts.measured(group))
@@ -85,18 +85,18 @@ def rungs_of(rows: Iterable[Row]) -> dict[Pair, dict[int, Rung]]:
 
 
 def _place(pair: Pair) -> tuple[int, int]:
-    """Where a pair stands in the tables of formulations and solvers."""
+    """Place of a pair in the tables of formulations and solvers."""
     return list(FORMULATIONS).index(pair[0]), list(SOLVERS).index(pair[1])
 
 
 def proof_rungs(proofs: list[Row], norm: int) -> dict[int, Rung]:
-    """The same of `prove`."""
+    """Results of `prove`, as from `rungs_of`."""
     chosen = [row for row in proofs if row["way"] == "prove" and row["norm"] == norm]
     return {int(size): Rung(tuple(rows)) for (size,), rows in facts.grouped(chosen, "size").items()}
 
 
 def rank(of: dict[int, Rung]) -> tuple[int, float]:
-    """What the best of several pairs has most of: proofs, then speed."""
+    """Key that ranks pairs: by proofs, then by speed."""
     return (
         sum(each.proven for each in of.values()),
         -sum(each.seconds for each in of.values() if each.tried),
@@ -104,7 +104,7 @@ def rank(of: dict[int, Rung]) -> tuple[int, float]:
 
 
 def best_solvers(standing: dict[Pair, dict[int, Rung]]) -> dict[str, Pair]:
-    """Of each formulation the pair that proves most."""
+    """The pair with most proofs for each formulation."""
     return {
         way: max((pair for pair in standing if pair[0] == way), key=lambda pair: rank(standing[pair]))
         for way in dict.fromkeys(pair[0] for pair in standing)
@@ -143,7 +143,7 @@ def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> st
 
 
 def kinds_table(rows: list[Row]) -> str:
-    """Of each kind of instance and problem how many are proven by any solver, by size."""
+    """Proven instances by kind of instance, problem and size, for any solver."""
     sizes = sorted({int(row["size"]) for row in rows})
     cells = []
     for problem in facts.PROBLEMS:
@@ -168,7 +168,7 @@ KINDS: Final = {
 
 
 def open_table(rows: list[Row], known: facts.Optima) -> str:
-    """What pairs leave where they prove nothing: points, how far they are above the optimum, and gaps."""
+    """Results of pairs without a proof: points, their excess over the optimum, and gaps."""
     given_up = {TOO_LARGE, FAILED}
     left = [row for row in rows if not facts.is_proven(row) and row["status"] not in given_up]
     sizes = sorted({int(row["size"]) for row in left})
@@ -195,7 +195,7 @@ Both = list[tuple[Row, Row]]
 
 
 def variants(rows: list[Row]) -> dict[str, dict[Pair, Both]]:
-    """Of each variant and pair the runs beside the cold ones, on instances that are not too large."""
+    """The runs of each variant and pair with their cold runs, on instances that are not too large."""
     cold = {(row["way"], row["solver"], row["instance"], row["size"]): row for row in rows if is_cold(row)}
     found: dict[str, dict[Pair, Both]] = {}
     for row in rows:
@@ -220,7 +220,7 @@ def variant_rungs_table(rows: list[Row]) -> str:
 
 
 def variants_table(rows: list[Row], known: facts.Optima) -> str:
-    """Variants beside the cold runs, pair by pair; then all pairs together."""
+    """Variants compared with the cold runs, pair by pair; then all pairs together."""
     cells = []
     for name, of in variants(rows).items():
         for (way, solver), both in of.items():
@@ -235,7 +235,7 @@ def variants_table(rows: list[Row], known: facts.Optima) -> str:
 
 
 def helped(rows: list[Row]) -> str:
-    """What a start and windows do for the number of proofs, in a sentence."""
+    """Sentence on the effect of a start and windows on the number of proofs."""
     parts = []
     for name, of in variants(rows).items():
         both = [each for pairs in of.values() for each in pairs]
@@ -247,7 +247,7 @@ def helped(rows: list[Row]) -> str:
 
 
 def _beside(both: Both, known: facts.Optima) -> list[str]:
-    """Cells of that table: runs, proofs, seconds, and means over the instances of which both have a point."""
+    """Cells of that table: runs, proofs, seconds, and means where both runs have a point."""
     before, after = (Rung(tuple(each[i] for each in both)) for i in (0, 1))
     shares = [pair for a, b in both if None not in (pair := (facts.over(a, known), facts.over(b, known)))]
     above = " / ".join(percent(float(each)) for each in np.mean(shares, axis=0)) if shares else "-"
@@ -259,7 +259,7 @@ PRINTED: Final = "with facet (26) as printed"
 
 
 def variant(row: Row) -> str:
-    """What differs from a cold run, in words."""
+    """The difference from a cold run, in words."""
     if row["start"] != "cold":
         return f"from the {row['start']} field"
     return PRINTED if row["facet"] != "hull" else f"in the windows of a {row['windows']}"
@@ -272,35 +272,35 @@ def percent(share: float) -> str:
     return f"{100 * share:,.0f} %" if abs(share) >= _WHOLE else f"{100 * share:.2g} %"
 
 
-_NONE: Final = 5e-6  # what is less is rounding
+_NONE: Final = 5e-6  # smaller values are rounding
 _WHOLE: Final = 0.1
 
 
 def contradictions_text(rows: list[Row], known: facts.Optima) -> str:
-    """How many claims of optimality there are, and which of all claims cannot be."""
+    """Numbers of claims of optimality, and of claims that are contradicted."""
     claims = [row for row in rows if facts.is_proven(row) and row["facet"] == "hull"]
     judged = [r for r in claims if (facts.problem_of(r), r["instance"], r["size"]) in known]
     found = facts.contradictions(rows, known)
     kinds = Counter((row["solver"], row["way"], what.split(" ")[0]) for row, what in found)
-    said = (
+    summary = (
         f"Of {len(claims):,} optima that solvers claim, {len(judged):,} can be held against what `prove` has "
         "shown, or against the best point that any solver has of the mixed problem, which `prove` does not "
         f"know; {len(found)} answers contradict these by more than {facts.WITHIN:g}, relative to 1, or to "
         "the optimum if that is more."
     )
     if not found:
-        return said
+        return summary
     worst = {(row["solver"], row["way"], what.split(" ")[0]): (row, what) for row, what in found}
     cells = [
         [SOLVERS[solver].title, f"`{way}`", str(kinds[solver, way, first]),
          f"{row['instance']}, {row['size']:.0f} pixels: {what}"]
         for (solver, way, first), (row, what) in worst.items()
     ]  # fmt: skip
-    return f"{said}\n\n{markdown(('solver', 'formulation', 'how many', 'one of them'), cells)}"
+    return f"{summary}\n\n{markdown(('solver', 'formulation', 'how many', 'one of them'), cells)}"
 
 
 def doubts_text(rows: list[Row]) -> str:
-    """Answers that the check of points and claims did not let pass, and runs that failed."""
+    """Answers that failed the check of points and claims, and runs that failed."""
     unsure = Counter((row["solver"], row["way"]) for row in rows if row["status"] == "unknown")
     failed = Counter((row["solver"], row["way"]) for row in rows if row["status"] == FAILED)
     parts = [
@@ -318,7 +318,7 @@ def doubts_text(rows: list[Row]) -> str:
 
 
 def times_of(rows: list[Row], proofs: list[Row], problem: str) -> facts.Times:
-    """Seconds of the proofs of a problem by the pairs that prove most, and by `prove`."""
+    """Seconds of the proofs of a problem by the pairs with most proofs, and by `prove`."""
     mine = [row for row in rows if facts.problem_of(row) == problem]
     standing = rungs_of(mine)
     chosen = sorted((p for p in standing if rank(standing[p])[0]), key=lambda p: rank(standing[p]))[-LINES:]
@@ -342,7 +342,7 @@ def times_of(rows: list[Row], proofs: list[Row], problem: str) -> facts.Times:
 def growth_lines(
     standing: dict[Pair, dict[int, Rung]], proofs: list[Row]
 ) -> tuple[dict[str, plots.Line], dict[str, plots.Line]]:
-    """Share and seconds by size: of each formulation at its best solver, and of `prove`."""
+    """Share and seconds by size: for each formulation with its best solver, and for `prove`."""
     of_all = {label(pair): standing[pair] for pair in best_solvers(standing).values()}
     of_all |= {f"{plots.OURS}, {norm}-norm": proof_rungs(proofs, norm) for norm in (2, 1)}
     share: dict[str, plots.Line] = {}
@@ -392,7 +392,7 @@ def section(kept: Kept) -> list[str]:
 
 
 def facts_in_short(kept: Kept) -> dict[str, Any]:
-    """What the answers at the top need: how far solvers reach, and how far `prove` does."""
+    """Facts for the answers at the top: the reach of solvers, and of `prove`."""
     standing = rungs_of([row for row in kept["solvers"] if is_cold(row)])
     return {"helped": helped(facts.measured(kept["solvers"])), "reach": reach(standing), "standing": standing,
             "prove": {norm: proof_rungs(kept["proofs"], norm) for norm in (2, 1)}}  # fmt: skip

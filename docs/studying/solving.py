@@ -1,4 +1,4 @@
-"""Runs of solvers on files, and the proofs that they are judged by."""
+"""Runs of solvers on files, and the reference proofs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .instances import made
 from .rows import Run
 
 GAP: Final = 1e-6
-"""Relative gap up to which an optimum counts as proven, asked of all solvers."""
+"""Relative gap up to which an optimum counts as proven, requested of all solvers."""
 TOO_LARGE: Final = "too large"
 FAILED: Final = "failed"
 JUMPS_GIVEN: Final = "qp-fixed"
@@ -55,13 +55,13 @@ def programs() -> Solvers:
 
 @lru_cache(maxsize=4)
 def greedy(name: str, size: int) -> CrossField:
-    """The greedy field of an instance, with the best angles: where starts and given jumps come from."""
+    """The greedy field of an instance, with the best angles: the source of starts and given jumps."""
     return cf.greedy(made(name, size))
 
 
 @lru_cache(maxsize=4)
 def windows(name: str, size: int, seconds: float) -> Windows:
-    """What a certificate of an instance leaves."""
+    """The windows of a certificate of an instance."""
     with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
         proof = cf.prove(made(name, size), seconds=seconds, jobs=1)
         return windows_left(cf.write_certificate(proof, Path(folder) / "a.certificate.npz"))
@@ -79,11 +79,11 @@ def posed(run: Run) -> Problem:
 
 
 PROOF_SECONDS: Final = 20.0
-"""For a proof, where nothing else is said."""
+"""Seconds for a proof unless stated otherwise."""
 
 
 def solved(run: Run) -> dict[str, Any]:
-    """What a solver finds from a file: its status, and the objective recomputed at its point."""
+    """Result of a solver on a file: its status, and the objective recomputed at its point."""
     problem = posed(run)
     start = greedy(run.instance, run.size) if run.start == "greedy" else None
     facts: dict[str, Any] = {
@@ -114,7 +114,7 @@ def _at_point(found: cf.Solution) -> dict[str, Any]:
 
 
 def proved(run: Run) -> dict[str, Any]:
-    """What a proof says of an instance, or the optimum for the jumps of the greedy field."""
+    """Result of a proof of an instance, or the optimum for the jumps of the greedy field."""
     instance = made(run.instance, run.size)
     facts: dict[str, Any] = {"version": generator(), **sizes(instance)}
     if run.way == ANGLES:
@@ -126,7 +126,7 @@ def proved(run: Run) -> dict[str, Any]:
 
 
 def sizes(instance: Instance) -> dict[str, int]:
-    """How many pixels and pairs an instance has."""
+    """Numbers of pixels and pairs of an instance."""
     return {"pixels": instance.grid.size, "pairs": len(instance.grid.first)}
 
 

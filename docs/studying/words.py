@@ -1,4 +1,4 @@
-"""What docs/study.md says around its tables and plots."""
+"""Text of docs/study.md around its tables and plots."""
 
 from __future__ import annotations
 

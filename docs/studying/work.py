@@ -1,4 +1,4 @@
-"""Doing the runs of a plan: what is in the tables already is not done again."""
+"""Execution of the runs of a plan; runs with a row are skipped."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _FOLDERS: Final = re.compile(r"(?:/[\w.+-]+)+/")  # of this machine
 
 
 def perform(task: tuple[Run, Path | None]) -> dict[str, Any]:
-    """What a run finds; anything that it raises is a failed run, and the study goes on."""
+    """The result of a run; an exception makes a failed run, and the study continues."""
     run, folder = task
     try:
         found = _find(run, folder)
-    except Exception as error:  # noqa: BLE001 - a row says what it was
+    except Exception as error:  # noqa: BLE001 - a row records the exception
         found = {"status": FAILED, "note": f"{type(error).__name__}: {error}"}
     note = _FOLDERS.sub("", str(found.get("note") or ""))
     return found | {"note": note[:_LONGEST], **_machine()}
@@ -41,7 +41,7 @@ def _find(run: Run, folder: Path | None) -> dict[str, Any]:
 
 
 def _machine() -> dict[str, Any]:
-    from proofs import machine  # it loads what draws
+    from proofs import machine  # it loads the drawing library
 
     facts = machine()
     return {"machine": f"{facts['processor']}, {facts['cores']} cores", "load": round(facts["load"], 2)}
@@ -72,13 +72,13 @@ def carry_out(
             runs = left(runs, stage, kept)
             progress(f"{stage.name}: {len(runs)} of {len(stage.runs)} runs")
             tasks = Tasks(chosen, ahead(jobs, scheduler))
-            for run in reversed(runs):  # the last one that is added is the first to be done
+            for run in reversed(runs):  # the last one added is the first to be done
                 tasks.add(perform, (run, folder), partial(_keep, kept[run.part], run))
             tasks.run()
 
 
 def _can_run(run: Run) -> bool:
-    """Whether its solver is here; what has none can run anywhere."""
+    """Whether its solver is installed; runs without one can run anywhere."""
     return not run.solver or not SOLVERS[run.solver].missing
 
 
@@ -87,9 +87,9 @@ def _keep(table: Table, run: Run, found: dict[str, Any]) -> None:
 
 
 def left(runs: list[Run], stage: Stage, kept: dict[str, Table]) -> list[Run]:
-    """The runs of a stage without a row, but for pairs that proved too little of the rung before.
+    """The runs of a stage without a row, except for pairs that proved too little of the rung before.
 
-    For each of these there is one row, which says so.
+    Each of these pairs gets one row that states this.
     """
     found, judged = [], dict[tuple[Any, ...], str]()
     for run in runs:
@@ -115,12 +115,12 @@ def _say(run: Run, why: str, table: Table) -> None:
 
 
 def pair_of(run: Run) -> tuple[Any, ...]:
-    """What a rule leaves out together: formulation, solver and variant."""
+    """The unit that a rule skips: formulation, solver and variant."""
     return (run.way, run.solver, run.start, run.facet, run.windows, run.limit)
 
 
 def reason(kind: tuple[Any, ...], rung: int, table: Table) -> str:
-    """Why a pair is not run on the rung after one; empty where it is."""
+    """The reason why a pair is not run on the next rung; empty if it is."""
     rows = [row for row in table.rows if row["size"] == rung and _pair(row) == kind]
     if any(row["status"] == NOT_RUN for row in rows):
         return next(row["note"] for row in rows if row["status"] == NOT_RUN)

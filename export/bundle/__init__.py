@@ -1,5 +1,5 @@
-"""The set of files that an export leaves.
+"""Sets of files written by an export.
 
-One problem in several formats, the instance and the manifest (with schema) beside them, and starting points
-for each solver. The text of a format is export/formats; solving the files is export/solving.
+One problem in several formats, together with the instance, the manifest (with schema) and starting points
+for each solver. export/formats writes the text of a format; export/solving solves the files.
 """

@@ -1,10 +1,10 @@
-"""Sets of files: one problem in several formats, with the instance and a manifest beside them.
+"""Sets of files: one problem in several formats, with its instance and a manifest.
 
     bottle_n024.instance.json (or .npz)              the instance, once per folder
     bottle_n024.milp-mccormick.{nl,row,col,gms,lp,mps}
-    bottle_n024.milp-mccormick.manifest.json         what these are; reads a solution, with the instance
+    bottle_n024.milp-mccormick.manifest.json         describes them; reads a solution, with the instance
 
-Names come from the instance and the formulation alone, so that a later export replaces an earlier one.
+Names come only from the instance and the formulation, so that a later export replaces an earlier one.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ LARGE: Final = 1 << 16
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a set of files is: the checked document, and where it lies."""
+    """A set of files: its checked document and its path."""
 
     document: dict[str, Any]
     path: Path
@@ -66,7 +66,7 @@ class Manifest:
         return self.path.parent
 
     def instance(self) -> Instance:
-        """The instance beside the manifest. Raises InputError, and InstanceError for another instance."""
+        """The instance next to the manifest. Raises InputError, and InstanceError for another instance."""
         path = self.folder / self.document["instance"]["file"]
         instance = read_instance(path)
         if instance.sha256 != self.document["instance"]["sha256"]:
@@ -96,7 +96,7 @@ class Manifest:
         return problem
 
     def held(self, problem: Problem) -> dict[str, Problem]:
-        """By format, the problem as the files hold it: itself, or with its products lifted."""
+        """The problem in each format, as its files hold it: the same, or with its products lifted."""
         return {
             file["format"]: lifted(problem) if file["lifted"] else problem for file in self.document["files"]
         }
@@ -119,7 +119,7 @@ class Manifest:
 
 
 def read_manifest(path: str | Path) -> Manifest:
-    """The manifest in a file. Raises InputError, and InstanceError when it breaks its schema."""
+    """Read a manifest from a file. Raises InputError, and InstanceError when it breaks its schema."""
     try:
         document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
@@ -140,11 +140,11 @@ def write_problem(
     compress: bool = False,
     jobs: int = 1,
 ) -> Manifest:
-    """The manifest of the files now in the folder: the problem in each of the formats, and the instance.
+    """Write the problem in each of the formats and the instance, and return the manifest.
 
-    What a format cannot carry is listed in the manifest as refused. The other arguments are those of
-    `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no manifest
-    records: with columns fixed, or with products lifted beforehand.
+    Formats that cannot carry the problem are listed in the manifest as refused. The other arguments are those
+    of `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no
+    manifest records: with columns fixed, or with products lifted beforehand.
     """
     if not is_recordable(problem):
         what = f"{problem.name} with columns fixed or products lifted"
@@ -169,15 +169,15 @@ def write_all(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Manifest]:
-    """The manifests of the files now in the folder: every formulation in every format that carries it.
+    """Write every formulation in every format that carries it, and return the manifests.
 
-    start: a field, for starting points, in files of their own too, and for the jumps of `qp-fixed`. jumps_of:
-    one for these jumps alone; without either, `fixed_jumps` says which. windows: narrower ones, for all of
-    them. options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it. dialects: by
-    format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as .gz. jobs:
-    files written at once. progress: called with each name. Raises InputError for an unknown format,
-    FormulationError for an unknown formulation, InstanceError for a start on another instance, and
-    OutputError.
+    start: a field for starting points, also in separate files, and for the jumps of `qp-fixed`. jumps_of: a
+    field for these jumps only; without either, see `fixed_jumps`. windows: narrower ones, for all
+    formulations. options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it.
+    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
+    .gz. jobs: number of files written at once. progress: called with each name. Raises InputError for an
+    unknown format, FormulationError for an unknown formulation, InstanceError for a start on another
+    instance, and OutputError.
     """
     sets = _Sets(
         instance,
@@ -202,7 +202,7 @@ def write_all(
 
 @dataclass(eq=False)
 class _Sets:
-    """What the sets of files of an instance have in common; dialects by format."""
+    """Common settings of the sets of files of an instance; dialects by format."""
 
     instance: Instance
     folder: Path
@@ -223,10 +223,10 @@ class _Sets:
 
     @contextmanager
     def threads(self, jobs: int) -> Iterator[None]:
-        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run side by side.
+        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run in parallel.
 
-        After a failure or Ctrl-C no further file is begun; those at work are finished, so that what stands is
-        whole.
+        After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
+        existing file is complete.
         """
         with ThreadPoolExecutor(checked(jobs)) as self.pool:
             make_folder(self.folder)
@@ -237,16 +237,16 @@ class _Sets:
                 raise
 
     def problem(self, name: str) -> Problem:
-        """A formulation of the instance, with those of the options that it has."""
+        """A formulation of the instance, with the options that it has."""
         unfit = {*Options.__dataclass_fields__} - declaration_of(name).settable
         chosen = {key: value for key, value in self.options.items() if key not in unfit}
         problem = formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.jumps_of), **chosen)
         return _narrowed(problem, self.windows)
 
     def begin(self, problem: Problem) -> Callable[[], Manifest]:
-        """A function that waits for the files of a problem, which the threads now write: their manifest."""
+        """Start writing the files of a problem; return a function that waits for its manifest."""
         stem = f"{self.instance.name}.{problem.name}"
-        problem.complete()  # the threads share it
+        problem.complete()  # threads share the problem
         files = {name: self._submit(problem, stem, name) for name in self.formats}
 
         def manifest() -> Manifest:
@@ -269,15 +269,15 @@ class _Sets:
 
 
 def is_recordable(problem: Problem) -> bool:
-    """Whether formulation, options, jumps and windows say all of a problem; nothing is fixed or lifted."""
+    """Whether formulation, options, jumps and windows determine a problem; nothing is fixed or lifted."""
     plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
     return _narrowed(plain, problem.windows).sha256 == problem.sha256
 
 
-def leave_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
-    """The manifest now in the folder, with the instance, of a problem that was just written in one format.
+def write_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+    """Write manifest and instance for a problem just written in one format; return the manifest.
 
-    Files of the same problem that a manifest there lists stay listed. Raises OutputError.
+    Files of the same problem that an existing manifest lists stay listed. Raises OutputError.
     """
     document = _document(problem, folder, [written], {})
     try:
@@ -305,10 +305,10 @@ def _narrowed(problem: Problem, windows: Windows | None) -> Problem:
 
 
 def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints | None:
-    """The jumps that a formulation takes as data; None where it has them as variables, or FormulationError.
+    """The jumps that a formulation takes as data; None if they are variables. Raises FormulationError.
 
-    They are those of `start`, by default of the first field. Everything that writes or solves a
-    formulation by its name asks here, so that its files and its solutions are of one problem.
+    They come from `start`, by default from the first field. All code that writes or solves a formulation by
+    its name calls this function, so that its files and its solutions belong to one problem.
     """
     if not declaration_of(name).fixed:
         return None
@@ -318,7 +318,7 @@ def fixed_jumps(instance: Instance, name: str, start: CrossField | None) -> Ints
 
 
 def _instance_file(instance: Instance, folder: Path) -> str:
-    """Name of the instance's file in the folder, written unless the very same instance is there."""
+    """Name of the instance's file in the folder, written unless the same instance is there."""
     name = f"{instance.name}.instance.{'npz' if instance.grid.size > LARGE else 'json'}"
     try:
         unchanged = (folder / name).exists() and read_instance(folder / name).sha256 == instance.sha256
@@ -378,12 +378,12 @@ def _document(
 
 
 def _windows(problem: Problem, windows: Windows) -> dict[str, Any]:
-    """What was narrowed: the sentence of the files' headers, and the windows."""
+    """The narrowed windows, and the sentence about them in the files' headers."""
     return {"tightened": problem.tightened, "windows": windows.document()}
 
 
 def _columns(problem: Problem) -> list[dict[str, Any]]:
-    """Blocks of columns in order."""
+    """Blocks of columns in order, for the document."""
     return [
         {"name": block.name, "over": block.over, "first": block.offset, "count": block.count}
         for block in problem.blocks.values()

@@ -1,17 +1,16 @@
-"""Starting points as each solver takes them beside an LP, MPS or .nl file: complete and feasible.
+"""Starting points in the format of each solver for an LP, MPS or .nl file: complete and feasible.
 
     layout
     list    .mst   lines `name value`                                  Gurobi: model.read(...), or InputFile
-    cplex   .mst   XML with one <variable name index value> a column   CPLEX: read file.mst, MIP_starts.read
+    cplex   .mst   XML with one <variable name index value> per column CPLEX: read file.mst, MIP_starts.read
     highs   .sol   style 0: `# Columns n`, lines `name value`          HiGHS: read_solution_file, readSolution
     scip    .sol   lines `name value`                                  SCIP: read file.sol, readSol
     slx     .slx   `NAME`, lines ` C name value`, `ENDATA`             Xpress: readslxsol
 
 Names are those of our files. (.nl and GAMS files hold a starting point themselves.) A start for LP and MPS
-has the columns of these files: with products lifted where they are lifted, and ONE. SCIP reads a nonlinear
-objective as a variable of its own, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl); all
-three are in its file with the value of what is not linear in the objective, and SCIP passes over the ones it
-does not know.
+has the columns of these files, including lifted products and ONE. SCIP reads a nonlinear objective as an
+additional variable, under three names: quadobjvar (LP), qmatrixvar (MPS), nlobjvar (.nl). All three are in
+its file with the value of the nonlinear part of the objective, and SCIP ignores unknown names.
 """
 
 from __future__ import annotations
@@ -51,11 +50,11 @@ class Start:
 
     @property
     def objective(self) -> float:
-        """The objective, recomputed."""
+        """The objective at the point, recomputed."""
         return self.problem.objective_value(self.point)
 
     def lines(self, before: bytes = b"", *, zeros: bool = True) -> Iterator[bytes]:
-        """A line `name value` for every column, shortest round trip; zeros: for those at 0 too."""
+        """A line `name value` for every column, with shortest round-trip numbers; zeros: include zeros."""
         names, values = self.form.names.all, self.point
         if not zeros:
             at = np.nonzero(values)[0]
@@ -113,7 +112,7 @@ def _scip(start: Start) -> Iterator[bytes]:
 
 
 def _objective_variables(start: Start) -> dict[str, float]:
-    """The variables that stand for an objective in SCIP, at what is not linear in it, if anything is."""
+    """The variables that represent an objective in SCIP, at the value of its nonlinear part, if any."""
     problem, point = start.problem, start.point
     if problem.objective_degree < 2:
         return {}
@@ -135,7 +134,7 @@ def _slx(start: Start) -> Iterator[bytes]:
 LAYOUTS: Final[dict[str, Callable[[Start], Iterator[bytes]]]] = {
     "list": _list, "cplex": _cplex, "highs": _highs, "scip": _scip, "slx": _slx,
 }  # fmt: skip
-"""What makes a starting point, by the layout that the table of solvers names."""
+"""Functions that write a starting point, by the layout that the table of solvers names."""
 
 STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solver.start is not None}
 """The files of starting points, by solver."""
@@ -144,8 +143,8 @@ STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solve
 def start_of(problem: Problem, field: CrossField) -> Start:
     """The complete point of a field in the columns of the LP and MPS files.
 
-    In those of the .nl file where LP and MPS hold nothing. Raises InstanceError when the field is on another
-    instance.
+    If LP and MPS cannot hold the problem, in the columns of the .nl file. Raises InstanceError when the field
+    is on another instance.
     """
     try:
         held = carried(problem, FORMATS["mps"])
@@ -155,10 +154,10 @@ def start_of(problem: Problem, field: CrossField) -> Start:
 
 
 def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float:
-    """The objective of the start now in the file, in that solver's format.
+    """Write the start in a solver's format, and return its objective.
 
-    Raises InputError for a solver that has no format of starts, UnsupportedBySolverError for one that does
-    not take the problem; InstanceError when the field is on another instance, OutputError.
+    Raises InputError for a solver without a format of starts, and UnsupportedBySolverError for a solver that
+    does not take the problem. Raises InstanceError when the field is on another instance, and OutputError.
     """
     if solver not in STARTS:
         raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
@@ -171,9 +170,10 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
 
 
 def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
-    """The files now in the folder, by solver that takes the problem: `stem.gurobi.mst` and so on.
+    """Write the starts to the folder, as `stem.gurobi.mst` and so on, for each solver that takes the problem.
 
-    None for a problem without integers, where these files mean nothing. Raises as `write_start`.
+    Returns the files by solver, none for a problem without integers, where they have no use. Raises as
+    `write_start`.
     """
     if not problem.integer.any():
         return {}
@@ -186,7 +186,7 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
 
 
 def _refusal(problem: Problem, start: Start, solver: str) -> str:
-    """Why a solver does not start from a point of the problem, empty where it does."""
+    """Reason why a solver does not start from a point of the problem, empty if it does."""
     taking = takes(problem, solver)
     if taking.answer == "no":
         return f"{solver} does not take {problem.name}: {taking.reason}"

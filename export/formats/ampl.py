@@ -1,4 +1,4 @@
-"""AMPL: a model in the notation of the paper, printed from the declaration, and its data beside it in a .dat.
+"""AMPL: a model in the notation of the paper, printed from the declaration, with its data in a .dat file.
 
     set I dimen 2; set S_c within I;         pixels (r,c) as plain numbers, and those with a stroke
     set E := {(r,c) in I, h in SIDES: ...};  pairs: AMPL finds the upper and the right neighbours itself
@@ -7,14 +7,14 @@
     minimize energy: sum{(r,c,h) in E} ( ...
     subject to c14{(r,c,h) in E}: s[r,c,h] >= ...
 
-What depends on the sketch stands in the .dat: I, S_c with theta and w, the weights, and the jumps where they
-are data. Only what AMPL and GNU MathProg share is used: no `solve`, `param pi` computed, strings in quotes,
-`mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear formulations, and
-evaluates every expression of the others once variables are turned into parameters, as the tests do. AMPL
-itself is not free; no test runs it.
+The .dat holds the data of the sketch: I, S_c with theta and w, the weights, and the jumps where they
+are data. The model uses only features that AMPL and GNU MathProg share: no `solve`, `param pi` computed,
+strings in quotes, `mod` of numbers that are not negative, attributes with commas. So GLPK reads the linear
+formulations. It also evaluates every expression of the others once variables are turned into parameters, as
+the tests do. AMPL itself is not free; no test runs it.
 
 Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
-ends with comments that print an answer under our names, as a solution file that is read back.
+ends with comments that print an answer with our names, as a readable solution file.
 
 Counted while the .dat is written, because columns and rows are sums over sets: pixels, strokes,
 jumps other than 0, and elements with narrowed bounds. The .mod holds no data.
@@ -132,7 +132,7 @@ def _place(instance: Instance, over: IndexSet) -> tuple[Ints, Ints]:
 def _listed(
     instance: Instance, over: IndexSet, values: Pieces, at: NDArray[Any] | None = None
 ) -> Iterator[bytes]:
-    """One element a line, its index and values: `1 2 u 0.3`; only the elements `at`, when they are given."""
+    """One element per line, its index and values: `1 2 u 0.3`; only the elements `at`, if given."""
     rows, columns = _place(instance, over)
     sides = instance.grid.upward.view(np.uint8)
     if at is not None:
@@ -158,7 +158,7 @@ def _variable(variable: Variable, block: Block) -> dict[str, str]:
 
 
 def _label(instance: Instance, block: Block) -> str:
-    """How the names of a block are printed: `alpha_%02d_%02d`."""
+    """Print format of a block's names: `alpha_%02d_%02d`."""
     digits = name_length(instance, "", "pixels") // 2 - 1
     return f"{block.name}_%0{digits}d_%0{digits}d" + "_%s" * (block.over == "pairs")
 

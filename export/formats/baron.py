@@ -2,19 +2,19 @@
 
     // comment
     BINARY_VARIABLES p1_00_00_u;             then INTEGER_VARIABLES, VARIABLES (free by default) (B2)
-    LOWER_BOUNDS{                            every finite bound, those of binaries aside
+    LOWER_BOUNDS{                            every finite bound, except those of binaries
     alpha_00_00: 0;
     }
     UPPER_BOUNDS{ ... }
     EQUATIONS c14_00_00_u, ...;
     c14_00_00_u: s_00_00_u - alpha_00_00 ... >= 0;    constants on the right (B4)
     OBJ: minimize
-     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, one summand a line; (-1) in brackets (B6)
+     + 2*((alpha_00_00 - ...)^2 + ...)       as declared, one summand per line; (-1) in brackets (B6)
     STARTING_POINT{ ... }
 
 Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of
-its own sections, and no rows (B5). No OPTIONS: they are the user's. B-numbers: docs/format-rules.md; sections
-and grammar: BARON's user manual, section 4.
+its own sections, and no rows (B5). There are no OPTIONS, because these belong to the user. B-numbers:
+docs/format-rules.md; sections and grammar: BARON's user manual, section 4.
 
 Counted while writing: declared columns, declared rows, rows with an expression, coefficients and products of
 rows other than 0, and the places of columns in the objective's expression.
@@ -38,7 +38,7 @@ from ..writing.records import Counted, Piece, Tagged, render, scalar_when_consta
 from .gams_scalar import Scalar, declared
 
 WIDTH = 160
-"""Lines are broken about here."""
+"""Approximate length of lines."""
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
@@ -108,7 +108,7 @@ def _rows(family: PlacedFamily, names: Names, counts: Counter[str]) -> Iterator[
 
 
 def _monomial(term: Monomial, names: Names, counts: Counter[str]) -> list[Piece]:
-    """A signed term of a row, a coefficient of 1 left out."""
+    """A signed term of a row, without a coefficient of 1."""
     assert term.degree in {1, 2}  # no declaration has other rows
     what = "coefficients of rows" if term.degree == 1 else "products of rows"
     lead: list[Piece] = [b" ", Counted(counts, what, words(coefficient(term), signed)), b"*"]
@@ -119,7 +119,7 @@ def _monomial(term: Monomial, names: Names, counts: Counter[str]) -> list[Piece]
 
 
 class _Baron(Scalar):
-    """The language of one family: that of scalar GAMS, but for powers."""
+    """The language of one family: scalar GAMS with other powers."""
 
     power = Language.power
 

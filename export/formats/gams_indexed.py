@@ -1,16 +1,16 @@
 """GAMS, indexed layout: sets, data and equations in the paper's notation; only the data grow.
 
     r / 00*05 /, c / 00*07 /                 rows and columns, padded: alpha('01','04') is alpha_01_04
-    I(r,c) / 00.(02*07) ... /                pixels, one run a line; S_c(r,c) stroke pixels, where w > 0
+    I(r,c) / 00.(02*07) ... /                pixels, one run per line; S_c(r,c) stroke pixels, where w > 0
     E(r,c,side)                              pairs, upper or right: s('01','04','u') is s_01_04_u
     north(side), east(side)                  to pixel j: alpha_j is alpha(r-north(side),c+east(side))
     c14(E(r,c,side)).. s(r,c,side) =g= ...   an equation for every family of rows, from its declaration
 
 GAMS computes windows and jump bounds from theta by our formulas, in the same doubles. Lag and lead count
 places in an ordered set, hence the padded labels in their natural order; a neighbour outside the grid has no
-label and no pair. Names are not told apart by case (G4), so the set is S_c and not S. `beta` and `gamma` are
-functions of GAMS, but a declared symbol of that name wins, so that variables keep the names of the paper
-(tested through CONVERT). Type, options, signs, powers, the start and the CSV behind `--RESULTS` are those of
+label and no pair. Names are case-insensitive (G4), so the set is S_c and not S. `beta` and `gamma` are
+functions of GAMS, but a declared symbol of that name takes precedence, so variables keep the names of the
+paper (tested through CONVERT). Type, options, signs, powers, the start and the CSV of `--RESULTS` are as in
 the scalar layout (gams_scalar.py).
 
 Counted while writing, because columns and rows are sums over sets: pixels in the runs, strokes with a
@@ -79,7 +79,7 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
 
 
 def _data_context(problem: Problem) -> dict[str, Any]:
-    """What the template needs to know of the instance."""
+    """Data of the instance for the template."""
     instance, grid = problem.instance, problem.instance.grid
     pairs = len(grid.first) > 0
     digits = _label_width(instance)
@@ -122,7 +122,7 @@ def _label_width(instance: Instance) -> int:
 
 
 def _pixels(instance: Instance, counts: Counter[str]) -> Iterator[bytes]:
-    """The mask, one run of pixels a line: `00.(02*07)`."""
+    """The mask, one run of pixels per line: `00.(02*07)`."""
     grid, pixels, width = instance.grid, keys(instance, "pixels"), _label_width(instance)
     breaks = np.nonzero((np.diff(grid.rows) != 0) | (np.diff(grid.columns) != 1))[0]
     first, last = np.append(0, breaks + 1), np.append(breaks, grid.size - 1)
@@ -135,7 +135,7 @@ def _pixels(instance: Instance, counts: Counter[str]) -> Iterator[bytes]:
 
 
 def _data(listed: Bytes, values: Floats, counts: Counter[str], what: str) -> Iterator[bytes]:
-    """One value per line: `00.02 0.3`. Lines, and those whose value is not 0, are counted."""
+    """One value per line: `00.02 0.3`. Counts lines, and nonzero values."""
     key = Counted(counts, what, Words(listed, None))
     value = Counted(counts, f"{what} other than 0", words(values))
     return render([key, b" ", value, b"\n"], len(listed))
@@ -161,7 +161,7 @@ def _start(problem: Problem, start: Floats) -> Iterator[bytes]:
 
 
 def _results(problem: Problem) -> Iterator[bytes]:
-    """A loop for each block of columns that puts its names and values."""
+    """A loop for each block of columns that prints its names and values."""
     for block in problem.blocks.values():
         if block.count:
             domain, side = DOMAINS[block.over], " '_' side.tl:0" if block.over == "pairs" else ""
@@ -219,7 +219,7 @@ def _exact(constant: sp.Expr) -> str:
 
 
 def _condition(family: PlacedFamily) -> str:
-    """For rows that are needed only for one parity of a bound."""
+    """A condition for rows that are needed only for one parity of a bound."""
     if family.family.only is None:
         return ""
     name, parity = family.family.only

@@ -1,22 +1,22 @@
-"""GAMS, scalar layout, as instance libraries have it: a variable a column, an equation a row, our names.
+"""GAMS, scalar layout, as in instance libraries: one variable per column, one equation per row, our names.
 
-    Variables objvar;                        a free scalar (G10); obj.. objvar =e= one summand a line (G6)
+    Variables objvar;                        a free scalar (G10); obj.. objvar =e= one summand per line (G6)
     Variables alpha_00_00, ...;              Binary only with bounds [0, 1], else Integer; no line of a list
                                              starts with `*`, which would make it a comment (G6)
     c14_00_00_u.. s_00_00_u =g= ...;         sqr(x) and products, never x**3 (G1); (-1) in brackets (G2, G3)
     alpha_00_00.lo = 0; alpha_00_00.up = 1.57;   of every column (G7), -inf and +inf (G12), .fx where equal
     alpha_00_00.l = 0.3;                     the start
-    solve m using minlp minimizing objvar;   the type by what is in the model (G9)
+    solve m using minlp minimizing objvar;   the type follows from the model's content (G9)
     $ifThen set RESULTS ... $endIf           with `--RESULTS=x.csv` the answer as lines name,value
 
 Every expression stays in its declared form: squares of sums are not expanded, nothing is lifted, cos(pi p) is
-a cosine. Numbers are shortest round trip, and `$offDigit` is not used, for it drops digits (G8). No
+a cosine. Numbers are shortest round trip, and `$offDigit` is not used, because it drops digits (G8). No
 `$include`, no `$call`, and `put` only behind the switch RESULTS, because NEOS refuses them (G19).
 
 The CSV starts with model_status, solver_status (GAMS's numbers: 1 optimal, 2 locally optimal, 8 integer
 solution, 4, 5, 10 infeasible, ...; 1 normal completion, 2 iterations, 3 time, ...) and objective; then all
-columns in order. Values have 16 digits, which is what put gives (nr=2, nd=15, nw=24: R7), with a blank where
-a minus would stand. Without a solution they are the start, so look at the status first; the same holds for a
+columns in order. Values have 16 digits, the most that put writes (nr=2, nd=15, nw=24: R7), with a blank in
+place of a minus. Without a solution they are the start, so check the status first. The same holds for a
 column in no term, which is not in GAMS's model (G11).
 
 G-numbers: docs/format-rules.md.
@@ -69,12 +69,12 @@ MODEL_TYPES: Final = {
     "NLP": "nlp",
     "MINLP": "minlp",
 }
-"""Our classes -> GAMS's model types."""
+"""GAMS's model types by our classes."""
 
 SENSES: Final = {">=": b" =g= ", "<=": b" =l= ", "==": b" =e= "}
 
 WIDTH: Final = 160
-"""Lines are broken about here."""
+"""Approximate length of lines."""
 
 
 def generate(form: Canonical, header: list[str], *, start: Floats | None = None) -> Iterator[bytes]:
@@ -113,12 +113,12 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
 
 
 def power(base: list[Piece], exponent: int) -> list[Piece]:
-    """A power as GAMS evaluates it for bases of any sign (G1)."""
+    """A power in a form that GAMS evaluates for bases of any sign (G1)."""
     return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
 
 
 def bracketed(values: Floats) -> Texts:
-    """Numbers, in brackets when negative: `3`, `(-0.5)`."""
+    """Numbers, in brackets if negative: `3`, `(-0.5)`."""
     texts = numbers(values)
     return np.where(values < 0, np.strings.add(np.strings.add(b"(", texts), b")"), texts)
 
@@ -127,7 +127,7 @@ class Scalar(Language):
     """GAMS's language for one family: symbols are column names, data are numbers, one per record."""
 
     def __init__(self, family: PlacedFamily, names: Names, counts: Counter[str]) -> None:
-        """counts: of the places where columns stand."""
+        """Store the counts of places with columns."""
         self._family = family
         self._names = names
         self._counts = counts
@@ -142,17 +142,17 @@ class Scalar(Language):
         return is_data(self._family, expression)
 
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        """One number an element."""
+        """One number per element."""
         return _number_words(self._family.data(expression), signed=signed)
 
     def coefficient(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        """One number an element; raises UnsupportedByFormatError for an extreme one."""
+        """One number per element; raises UnsupportedByFormatError for an extreme one."""
         values = self._family.data(expression)
         check_coefficients(values, f"family {self._family.family.tag}")
         return _number_words(values, signed=signed)
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        """A power as GAMS writes it."""
+        """A power in the form of GAMS."""
         return power(base, exponent)
 
 
@@ -166,7 +166,7 @@ def declared(
 ) -> Iterator[bytes]:
     """A statement that declares names as one wrapped list.
 
-    lists: the names, with their numbers. counts: adds them up under `what`.
+    lists: the names, with their numbers. counts: receives their sum at `what`.
     """
     per_line = WIDTH // (max(name.width for name, _ in lists) + 2)
     total = sum(count for _, count in lists)
@@ -198,7 +198,7 @@ def _equations(problem: Problem, names: Names, counts: Counter[str]) -> Iterator
 
 
 def _objective(problem: Problem, names: Names, counts: Counter[str]) -> Iterator[bytes]:
-    """The terms of the objective, one line an element (more when it is long)."""
+    """The terms of the objective, one line per element (more if it is long)."""
     for family in problem.objective:
         terms = Scalar(family, names, counts).summands(family.family.expression)
         yield from render([*wrapped(terms, WIDTH, b"  "), b"\n"], family.count)

@@ -1,4 +1,4 @@
-"""What indexed GAMS and AMPL share: equations over index sets, in the notation of the paper."""
+"""Common parts of indexed GAMS and AMPL: equations over index sets, in the notation of the paper."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ..writing.expressions import Language, wrapped
 from ..writing.records import Piece, check_coefficients
 
 WIDTH: Final = 110
-"""Lines are broken about here."""
+"""Approximate length of lines."""
 
 
 class Indexed(Language):
-    """The language over an index set: symbols by their name and index, constants as mathematics writes them.
+    """The language over an index set: symbols by name and index, constants in mathematical notation.
 
-    index: labels of an element of each set; second: those of pixel j of a pair; brackets: round an index.
+    index: labels of an element of each set; second: labels of pixel j of a pair; brackets: around an index.
     """
 
     index: ClassVar[Mapping[IndexSet, str]]
@@ -29,7 +29,7 @@ class Indexed(Language):
     brackets: ClassVar[str]
 
     def __init__(self, over: IndexSet, own: str = "") -> None:
-        """own: index of the elements themselves, by default each by its labels."""
+        """Store the index of the elements themselves, `own`, by default their labels."""
         self._over = over
         self._own = own or self.index[over]
 
@@ -46,11 +46,11 @@ class Indexed(Language):
         return f"{name}{self.brackets[0]}{index}{self.brackets[1]}".encode()
 
     def is_data(self, expression: sp.Expr) -> bool:
-        """Whether it is a constant: data have names here."""
+        """Whether it is a constant: data have names in these languages."""
         return not expression.free_symbols
 
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
-        """A constant as mathematics writes it."""
+        """A constant in mathematical notation."""
         negative = bool(expression < 0)
         text = self.exact(-expression if negative else expression)
         if signed:
@@ -67,7 +67,7 @@ class Indexed(Language):
 
 
 def described(language: type[Indexed], family: PlacedFamily, senses: Mapping[str, bytes]) -> dict[str, str]:
-    """A family as templates print it: its tag, where it stands in the paper, and its text."""
+    """A family as templates print it: its tag, its place in the paper, and its text."""
     declared = family.family
     words = language(declared.over)
     if declared.is_row:
@@ -85,7 +85,7 @@ def _text(pieces: list[Piece]) -> str:
 
 
 def narrowed(problem: Problem) -> dict[IndexSet, tuple[str, ...]]:
-    """Names of the data that are bounds where a proof has narrowed them, by index set; else nothing."""
+    """Names of the data that are bounds where a proof has narrowed them, by index set; otherwise empty."""
     if problem.windows is None:
         return {}
     names: dict[IndexSet, tuple[str, ...]] = {"pixels": ("alpha_lo", "alpha_up", "beta_lo", "beta_up")}

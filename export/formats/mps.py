@@ -2,7 +2,7 @@
 
     NAME ring_sha256_1a2b3c4d5e6f FREE   repeated in solutions; FREE is for CBC (M20)
     ROWS                               one N row, always minimised, no OBJSENSE (M5, M6)
-    COLUMNS                            ` column row value`, one pair a line; `obj 0` without a cost (M19);
+    COLUMNS                            ` column row value`, one pair per line; `obj 0` without a cost (M19);
         MARKER 'MARKER' 'INTORG'       one block of markers round each run of integer columns
     RHS                                set name RHS1; no entry for the objective (M4), no RANGES (M11)
     BOUNDS                             set name BND1; both bounds of every column (M1-M3): FX, FR, LO + UP,
@@ -118,17 +118,17 @@ def _entries(
 
 
 def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
-    """Rows of a family in which a column of the term's block stands: (rank, row of each column or -1, term).
+    """Rows of a family that contain a column of the term's block: (rank, row of each column or -1, term).
 
     None where row and column have the same number. Pairs are numbered by their first pixel, the upper before
-    the right one, so that the rows of a pixel are those of its pairs to the left, upwards, to the right and
+    the right one, so the rows of a pixel are those of its pairs to the left, upwards, to the right and
     downwards, in this order.
     """
     instance, kind = family.problem.instance, SLOTS[family.family.over][term.symbols[0]][1]
     if kind == "itself":
         own = None if family.everywhere else _inverse(family.elements, family.block(term.symbols[0]).count)
         return [(0, own, term)]
-    assert family.everywhere  # families on a part of the pairs have terms of those pairs alone
+    assert family.everywhere  # families on a part of the pairs have terms of only those pairs
     if kind == "stroke":
         return [(0, _inverse(instance.stroke_index, instance.grid.size), term)]
     left, upper, right, lower = _pairs_round(instance.grid)
@@ -136,7 +136,7 @@ def _incident(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | No
 
 
 def _inverse(index: Ints, count: int) -> Ints:
-    """Place in `index` of each number below `count`, -1 where it is not there."""
+    """Place in `index` of each number below `count`, -1 if it is missing."""
     place = np.full(count, -1, dtype=np.int32)
     place[index] = np.arange(len(index), dtype=np.int32)
     return place
@@ -151,7 +151,7 @@ def _pairs_round(grid: Grid) -> tuple[Ints, Ints, Ints, Ints]:
 
 
 def _runs(problem: Problem) -> list[tuple[bool, list[Block]]]:
-    """Blocks that follow each other and are alike integer or not; empty blocks are left out."""
+    """Runs of consecutive blocks that are all integer or all not; empty blocks are left out."""
     runs: list[tuple[bool, list[Block]]] = []
     for block in filter(lambda block: block.count, problem.blocks.values()):
         if not runs or runs[-1][0] != block.integer:
@@ -170,7 +170,7 @@ def _right_sides(problem: Problem, names: Names) -> Iterator[bytes]:
 
 
 def _bounds(block: Block, names: Names, counts: Counter[str]) -> Iterator[bytes]:
-    """Bounds kind by kind; within a kind one record a column, two lines where both ends are named."""
+    """Bounds kind by kind; within a kind one record per column, two lines where both ends are named."""
     low, high = np.isfinite(block.lower), np.isfinite(block.upper)
     fixed = block.lower == block.upper
     kinds: list[tuple[Bools, bytes, bytes]] = [

@@ -59,7 +59,7 @@ _FUNCTIONS: Final = {sp.cos: COSINE}
 
 
 class Tokens:
-    """What both forms share: `counts` of what one file holds."""
+    """Common base of both forms: `counts` of the content of one file."""
 
     def __init__(self) -> None:
         self.counts = Counter[str]()
@@ -310,7 +310,7 @@ def _bounds(layout: Layout, code: Encoder) -> Iterator[bytes]:
 
 
 def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
-    """Symbols and coefficients of a row in J: linear terms, and 0 for what is only in nonlinear ones."""
+    """Symbols and coefficients of a row in J: linear terms, and 0 for columns only in nonlinear ones."""
     linear = {term.symbols[0]: coefficient(term) for term in family.of_degree(1)}
     return list((linear | {s: 0.0 for s in family.variables if s not in linear}).items())
 

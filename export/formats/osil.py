@@ -7,11 +7,11 @@
     <linearConstraintCoefficients> <start>, <colIdx>, <value>      row by row, one <el> each
     <quadraticCoefficients>
     <qTerm idx="-1" idxOne="0" idxTwo="0" coef="2"/>               not halved; -1 is the objective (O1, O2)
-    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       what is beyond quadratic, in one <nl> (O2)
+    <nonlinearExpressions> <nl idx="-1"> <sum> <product> ...       terms beyond quadratic, in one <nl> (O2)
 
-What is up to quadratic stands in coefficients; squares of sums and cos(pi p) beyond that stay what they are.
-Indices count from 0, in the order of our columns and rows. Counts stand before the lists. What the file holds
-is said in <description>, not in comments.
+Terms up to quadratic are coefficients; squares of sums and cos(pi p) beyond that keep their form.
+Indices count from 0, in the order of our columns and rows. Counts precede the lists. The content of the file
+is stated in <description>, not in comments.
 
 Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is not added up but replaced, so
 each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
@@ -65,7 +65,7 @@ xsi:schemaLocation="os.optimizationservices.org http://www.optimizationservices.
 
 
 def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
-    """The bytes of the OSiL file, block by block. header: lines that say what it holds."""
+    """The bytes of the OSiL file, block by block. header: lines that describe the content."""
     problem, names, counts = form.problem, form.names, Counter[str]()
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
@@ -107,14 +107,14 @@ def _variables(block: Block, names: Names, kind: str, counts: Counter[str]) -> I
 def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
     """Columns (k, degree), each set once, and coefficients (k,) of the objective's terms up to quadratic."""
     nonlinear = problem.objective_degree > 2
-    index, value = _beside_nonlinear(problem, degree) if nonlinear else problem.merged_objective(degree)
+    index, value = _quadratic_part(problem, degree) if nonlinear else problem.merged_objective(degree)
     if degree:
         check_coefficients(value, "the objective")
     return index, value
 
 
-def _beside_nonlinear(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """The same for an objective that also has terms beyond quadratic: those are left to the tree."""
+def _quadratic_part(problem: Problem, degree: int) -> tuple[Ints, Floats]:
+    """As `_coefficients`, for an objective with terms beyond quadratic, which are left to the tree."""
     at, values = [np.zeros((0, degree + 1), np.int64)], [np.zeros(0)]
     for family in (family for family in problem.objective if family.degree <= 2):
         for term in family.of_degree(degree):
@@ -145,7 +145,7 @@ def _constraints(family: PlacedFamily, names: Names, counts: Counter[str]) -> It
 
 
 def _linear_rows(problem: Problem, counts: Counter[str]) -> Iterator[bytes]:
-    """The matrix row by row: where each row starts, then columns, then values."""
+    """The matrix row by row: the start of each row, then columns, then values."""
     if not problem.rows:
         return
     widths = [(family.count, len(family.of_degree(1))) for family in problem.rows]

@@ -1,9 +1,9 @@
-"""A problem as a Pyomo model: for people who go on in Pyomo, and a second opinion on the files.
+"""A problem as a Pyomo model: for users of Pyomo, and as an independent check of the files.
 
 Every term and row is the declaration itself, evaluated over Pyomo variables. Components are named as in the
 files, `alpha[row, column]`, `p1[row, column, side]` with side `u` (upper neighbour) or `r` (right one), row
-families by their tag, the objective `obj`. Python work grows with the number of pixels here: it is meant for
-small sketches, `write` for large ones.
+families by their tag, the objective `obj`. Python work grows with the number of pixels here: the model is
+meant for small sketches, `write` for large ones.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
 def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
     """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
 
-    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A column without bounds has
-    None there. start: a field whose complete point is set as the value of every variable. Raises
+    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A missing bound is None.
+    start: a field whose complete point is set as the value of every variable. Raises
     InstanceError when it is on another instance.
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
@@ -59,7 +59,7 @@ def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.Concre
 
 
 def places(instance: Instance, over: IndexSet) -> list[Place]:
-    """Where the elements of an index set lie: (row, column), for a pair of its first pixel, and its side."""
+    """Positions of an index set's elements: (row, column), for a pair of its first pixel, and its side."""
     grid = instance.grid
     at = pixel_of(instance, over)
     coordinates = [grid.rows[at].tolist(), grid.columns[at].tolist()]
@@ -69,7 +69,7 @@ def places(instance: Instance, over: IndexSet) -> list[Place]:
 
 
 def _domain(form: Canonical, block: Block) -> Any:
-    """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary, for bounds stand beside."""
+    """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary: bounds are separate."""
     if not block.integer:
         return pyo.Reals
     return pyo.Binary if form.layout.binary[block.columns].all() else pyo.Integers
@@ -100,7 +100,7 @@ def _constraints(family: PlacedFamily, columns: list[Any]) -> pyo.Constraint:
 
 
 def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> Iterator[Any]:
-    """The expression at each element, over Pyomo variables where a symbol means a column."""
+    """The expression at each element, over Pyomo variables where a symbol denotes a column."""
     symbols = sorted(expression.free_symbols, key=str)
     evaluate = sp.lambdify(symbols, expression, modules=[_FUNCTIONS, "math"])
     given = [_arguments(family, symbol, columns) for symbol in symbols]
@@ -110,7 +110,7 @@ def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> It
 
 
 def _arguments(family: PlacedFamily, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
-    """What a symbol means at each element: a Pyomo variable or a number."""
+    """Arguments for a symbol at each element: a Pyomo variable or a number."""
     if symbol in family.variables:
         return [columns[column] for column in family.columns(symbol).tolist()]
     return np.broadcast_to(family.data(symbol), (family.count,)).tolist()  # type: ignore[no-any-return]

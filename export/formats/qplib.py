@@ -1,4 +1,4 @@
-"""QPLIB's own format, for what is at most quadratic: lines of numbers in a fixed order, comments after `#`.
+"""QPLIB's own format, for problems up to quadratic: lines of numbers in a fixed order, comments after `#`.
 
     tiny # ...                     name of the instance; the header stands in comments of the first lines
     CGL # ...                      type of objective (L linear, D convex diagonal, C convex, Q any), of
@@ -17,9 +17,9 @@
     count, then `i name`           names of variables, and of rows
 
 Everything counts from 1. Objective and rows are x'Qx/2 + bx with a *lower triangular* Q, not the triangle of
-a symmetric one: a square's entry and a product's entry are both twice the coefficient. So says
+a symmetric one: a square's entry and a product's entry are both twice the coefficient. See
 qplib.zib.de/doc.html (Q_row,col = 0 for row < col); Jij-Inc/ommx#1207 and #1209 found it so in all 453
-instances against their GAMS models. No line is comment alone and none is empty, for not every reader skips
+instances against their GAMS models. No line is only a comment or empty, because some readers do not skip
 those.
 
 Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic
@@ -87,7 +87,7 @@ def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
 
 
 def _vector(values: Floats, comment: str, counts: Counter[str] | None = None) -> Iterator[bytes]:
-    """A vector: its most frequent value, the number of the others, and these. counts: of linear costs."""
+    """A vector: its most frequent value, the number of other values, and these. counts: of linear costs."""
     finite = np.clip(values, -INFINITY, INFINITY)
     distinct, count = np.unique(finite, return_counts=True)
     usual = float(distinct[count.argmax()])
@@ -119,7 +119,7 @@ def _products(before: list[Any], one: Ints, two: Ints, value: Piece) -> Iterator
 
 
 def _rows(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
-    """Coefficients of the rows: products, when there are any, then linear terms."""
+    """Coefficients of the rows: products, if there are any, then linear terms."""
     problem = form.problem
     for degree in (2, 1) if problem.row_degree == 2 else (1,):
         total = sum(family.count * len(family.of_degree(degree)) for family in problem.rows)

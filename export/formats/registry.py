@@ -1,7 +1,7 @@
 """The table of file formats, and the one function that writes a problem to a file.
 
-A format states what it carries; what it cannot carry is lifted, which is exact for whole jumps and said to be
-a relaxation for others, or refused by name before the first byte.
+A format states what it can carry. Products beyond that are lifted, which is exact for whole jumps and
+declared a relaxation otherwise; any other problem is refused by name before the first byte.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ def _bar(form: Canonical, header: list[str], start: Floats | None, _dialect: str
 
 @dataclass(frozen=True)
 class Format:
-    """A file format: what it carries and how it is written.
+    """A file format: its capabilities and its writer.
 
     degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
-    first; starts: whether a starting point has a place in it; default: whether it is written when no format
-    is asked for.
+    first; starts: whether it has a place for a starting point; default: whether it is written when no format
+    is requested.
     """
 
     name: str
@@ -125,12 +125,12 @@ FORMATS: Final = {
 """The table of formats; command line, docs and tests are generated from it."""
 
 DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.default)
-"""Names of the formats that are written when none is asked for."""
+"""Names of the formats that are written when none is requested."""
 
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: format, dialect, the problem as the file holds it; size and SHA-256 by file name."""
+    """Result of a write: format, dialect, the problem as the file holds it; size and SHA-256 by file name."""
 
     format: str
     dialect: str
@@ -139,13 +139,13 @@ class Written:
 
     @property
     def lifted(self) -> str:
-        """How products were lifted for this format, empty when they were not."""
+        """How products were lifted for this format, empty if they were not."""
         return self.problem.formulation.lifted
 
 
 @cache
 def generator() -> str:
-    """Name and version of this program, as files carry it."""
+    """Name and version of this program, as written to files."""
     try:
         return f"crossfield {version('crossfield')}"
     except PackageNotFoundError:
@@ -164,7 +164,7 @@ def format_of(path: str | Path) -> Format:
 
 
 def _unpacked(path: Path) -> str:
-    """The name of the file that decompression leaves."""
+    """The name of the decompressed file."""
     return path.stem if is_packed(path) else path.name
 
 
@@ -192,7 +192,7 @@ def _degree(problem: Problem) -> int:
 
 
 def header(problem: Problem) -> list[str]:
-    """Lines of comment that say what a file holds."""
+    """Lines of comment that describe the content of a file."""
     formulation, options = problem.formulation, problem.formulation.options
     name, kept = f"{formulation.name} ({formulation.declaration.source})", "kept"
     if options.relax:
@@ -210,15 +210,15 @@ def header(problem: Problem) -> list[str]:
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:
-    """What was written to `path`: its suffix names the format, `.gz` compresses.
+    """Write a problem to `path`: its suffix names the format, `.gz` compresses.
 
-    .nl gets .row and .col beside it, .mod its .dat.
+    .nl gets a .row and a .col file, .mod its .dat.
 
     dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point
-    is the starting point where the format has a place for one. Same problem, same bytes. Each writer counts
-    what it writes; no file appears when a count differs from the problem's. Raises UnsupportedByFormatError
-    before a byte is written, InputError for an unknown suffix or dialect, OutputError, and ConsistencyError
-    for such a difference.
+    is the starting point where the format has a place for one. Equal problems give equal bytes. Each writer
+    counts its records; no file appears when a count differs from the problem's. Raises
+    UnsupportedByFormatError before a byte is written, InputError for an unknown suffix or dialect,
+    OutputError, and ConsistencyError for such a difference.
     """
     path = Path(path)
     entry = format_of(path)
@@ -232,7 +232,7 @@ def write(
     written = Written(entry.name, chosen, held)
     lines = header(held)
     files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
-    with ExitStack() as stack:  # the files take their names together, at its end
+    with ExitStack() as stack:  # the files get their names together, at its end
         for each, content in files:
             try:
                 written.files[each.name] = stack.enter_context(saving(each, content))
@@ -244,7 +244,7 @@ def write(
 def _companions(
     path: Path, name: str, form: Canonical, lines: list[str]
 ) -> Iterator[tuple[Path, Iterator[bytes]]]:
-    """The files beside one: names of an .nl, never compressed, and data of a .mod, compressed as it is."""
+    """Companion files: names of an .nl, never compressed, and data of a .mod, compressed like the model."""
     stem = Path(_unpacked(path)).stem
     if name == "nl":
         yield path.with_name(f"{stem}.row"), form.layout.row_file()

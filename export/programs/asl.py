@@ -1,7 +1,7 @@
-"""The AMPL Solver Library, for .nl: Debian's gjh_asl_json, which tells what it reads as JSON.
+"""The AMPL Solver Library, for .nl: Debian's gjh_asl_json, which reports what it reads as JSON.
 
 It evaluates at the starting point of a file. A segment x at the end of a copy of the file is that point, and
-outweighs an earlier one.
+overrides an earlier one.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from ...models.instance.grid import Floats
 from .protocol import file_names, run_program
 from .reading import Evaluation, Points
 
-_TOLD: Final = 1e-5
-"""It prints bounds with six digits."""
+_ACCURACY: Final = 1e-5
+"""Relative accuracy of its bounds, which it prints with six digits."""
 
 
 def version() -> str:
-    """Its version, and that of the library."""
+    """Its version, and the library's."""
     found = re.search(r"Version (\S+).*ASL\((\d+)\)", run_program("gjh_asl_json", "-v"))
     return f"{found[1]} (ASL {found[2]})" if found else "unknown"
 
 
 def at_start(path: Path) -> dict[str, Any]:
-    """What the library says of an .nl file, with values at its start; leaves a .json beside it."""
+    """The library's report about an .nl file, with values at its start; writes a .json next to the file."""
     run_program("gjh_asl_json", str(path.with_suffix("")), folder=path.parent)
-    said: dict[str, Any] = json.loads(path.with_suffix(".json").read_text("utf-8"))
-    return said
+    report: dict[str, Any] = json.loads(path.with_suffix(".json").read_text("utf-8"))
+    return report
 
 
 def with_start(data: bytes, point: Floats) -> bytes:
@@ -45,16 +45,16 @@ def with_start(data: bytes, point: Floats) -> bytes:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The .nl file as the library reads it; it does not tell which columns are integer, but counts them."""
+    """The .nl file as the library reads it; it reports how many columns are integer, but not which."""
     columns, rows = file_names(path)
     data, copy = path.read_bytes(), Path("point.nl").resolve()
-    told: list[dict[str, Any]] = []
+    reports: list[dict[str, Any]] = []
     for point in points.of(columns):
         copy.write_bytes(with_start(data, point))
-        told.append(at_start(copy))
-    lower, upper = _bounds(told[0]["variable bounds"], len(columns))
-    row_lower, row_upper = _bounds(told[0].get("constraint bounds", {}), len(rows))
-    values = [said["initial evaluations"] for said in told]
+        reports.append(at_start(copy))
+    lower, upper = _bounds(reports[0]["variable bounds"], len(columns))
+    row_lower, row_upper = _bounds(reports[0].get("constraint bounds", {}), len(rows))
+    values = [report["initial evaluations"] for report in reports]
     return Evaluation(
         columns,
         lower,
@@ -67,13 +67,13 @@ def evaluate(path: Path, points: Points) -> Evaluation:
         np.array([[value["constraints"][str(row)] for row in range(len(rows))] for value in values]).reshape(
             len(values), len(rows)
         ),
-        rounding=_TOLD,
-        discrete=_discrete(told[0]["problem statistics"]),
+        rounding=_ACCURACY,
+        discrete=_discrete(reports[0]["problem statistics"]),
     )
 
 
-def _bounds(told: dict[str, list[float]], count: int) -> tuple[Floats, Floats]:
-    ends = np.array([told[str(place)] for place in range(count)], dtype=float).reshape(count, 2)
+def _bounds(stated: dict[str, list[float]], count: int) -> tuple[Floats, Floats]:
+    ends = np.array([stated[str(place)] for place in range(count)], dtype=float).reshape(count, 2)
     return ends[:, 0], ends[:, 1]
 
 

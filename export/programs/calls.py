@@ -12,7 +12,7 @@ from .protocol import FailedError
 def call(program: str, step: str, *arguments: Any) -> Any:
     """Call a function of a program's module: `version`, `read`, `evaluate` or `solve` (see protocol.py).
 
-    Raises what the module raises of its own, and FailedError for errors of the program's interface.
+    Raises the module's own errors, and FailedError for errors of the program's interface.
     """
     try:
         return getattr(import_module(f"{__package__}.{program}"), step)(*arguments)

@@ -1,7 +1,7 @@
 """CasADi as a reader of .nl, and the solvers that come with it: Ipopt and Bonmin.
 
-Bonmin takes no starting point for its integers. A feasible one is therefore its cutoff: it looks for better
-points only, and the start is the answer when there is none.
+Bonmin takes no starting point for its integers. A feasible start therefore serves as its cutoff: it searches
+only for better points, and the start is the answer if there is none.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ _FAILURE: Final = 500
 _LIMIT: Final = 400
 _STOPPED: Final = {"User_Requested_Stop", "USER_INTERRUPT"}
 _NO_POINT: Final = 1e49
-"""Bonmin's objective when it has no incumbent is 1e50."""
+"""Least objective that means no incumbent: Bonmin then reports 1e50."""
 
 
 class Watch(ca.Callback):
     """Callback of Ipopt at every iterate: keeps the best feasible point and passes on a request to stop.
 
-    best: the lowest feasible point so far, the start to begin with; None where there is none. value: its
+    best: the lowest feasible point so far, initially the start; None without one. value: its
     objective.
     """
 
@@ -64,7 +64,7 @@ class Watch(ca.Callback):
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
-        """Number of inputs, as CasADi asks for it."""
+        """Number of inputs, as required by CasADi."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
@@ -84,7 +84,7 @@ class Watch(ca.Callback):
         return ca.Sparsity.dense(self.sizes[str(ca.nlpsol_out(i))], 1)
 
     def eval(self, arguments: Sequence[Any]) -> list[int]:
-        """1 to stop, 0 to go on."""
+        """Return 1 to stop, 0 to continue."""
         by_name = dict(zip(self.sizes, arguments, strict=True))
         self.see(*(np.array(by_name[name]).ravel() for name in ("x", "f", "g")))
         return [int(stopped())]
@@ -111,7 +111,7 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
             "ipopt.tol": 1e-10,
             "ipopt.max_iter": 10000,
             # Fixed integers make equations of the facets.
-            # Without a little room Ipopt then stops early and says optimal.
+            # Without this tolerance Ipopt then stops early and reports an optimum.
             "ipopt.bound_relax_factor": 1e-9,
             "ipopt.honor_original_bounds": "yes",
             "ipopt.sb": "yes",
@@ -120,7 +120,7 @@ def options(solver: str, seconds: float, gap: float) -> dict[str, Any]:
         "bonmin.time_limit": seconds,
         "bonmin.allowable_fraction_gap": gap,
         "bonmin.algorithm": "B-BB",
-        # These two start a search in the search, which heeds neither a limit nor an interrupt.
+        # These two start a search in the search, which ignores limits and interrupts.
         "bonmin.heuristic_dive_MIP_fractional": "no",
         "bonmin.heuristic_dive_MIP_vectorLength": "no",
     }
@@ -160,7 +160,7 @@ def solve(job: Job) -> Outcome:
 
 
 def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> AmplAnswer:
-    """Solve a model in the main thread of a process of its own, for SIGINT interrupts Bonmin.
+    """Solve a model in the main thread of a separate process, because SIGINT interrupts Bonmin.
 
     Raises RefusedError for an error inside the solver.
     """
@@ -174,7 +174,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     run = ca.nlpsol("solver", solver, model.problem, chosen)
     ends = {"lbx": model.lower, "ubx": model.upper, "lbg": model.row_lower, "ubg": model.row_upper}
     size = f"{len(model.start)} columns, {len(model.row_lower)} rows"
-    print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - it goes to the log
+    print(f"{solver}: {size}, at most {seconds:.3g} s", flush=True)  # noqa: T201 - the output is the log
     hook: Callable[[], object] = stopped
     if solver == "bonmin":
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Bonmin handles it once its search has begun
@@ -182,7 +182,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
     try:
         with on_stop(hook):
             answer = run(x0=model.start, **ends)
-    except RuntimeError as error:  # CasADi names places in its source first
+    except RuntimeError as error:  # CasADi first names places in its source
         why = str(error).rpartition(": ")[2]
         raise RefusedError(f"{solver.title()} ended with an error, {why!r}") from error
     words = str(run.stats()["return_status"])
@@ -199,7 +199,7 @@ def solve_model(solver: str, model: NlModel, seconds: float, gap: float) -> Ampl
 
 
 def _without_better(words: str, code: int, watch: Watch) -> AmplAnswer:
-    """The answer of a search by Bonmin that found nothing: the start, where it is feasible."""
+    """The answer of a search by Bonmin without a result: the start, if it is feasible."""
     if watch.best is None:
         return AmplAnswer(words, 470 if code == _LIMIT else code, np.zeros(0))
     return AmplAnswer(f"{words}, nothing better than the start", 0 if code == 220 else code, watch.best)

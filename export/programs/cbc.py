@@ -1,7 +1,7 @@
-"""CBC's executable as a reader of LP and MPS. It knows nothing of products: hand it linear models only.
+"""CBC's executable as a reader of LP and MPS, for linear models only: it ignores products.
 
-What it read is told by its own export to MPS, twelve characters a number and no names, which HiGHS reads; the
-names, in the same order, by its table of all rows and columns.
+CBC reports what it read by its own export to MPS, with twelve characters per number and no names, which HiGHS
+reads. The names, in the same order, come from its table of all rows and columns.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def _fresh(name: str) -> Path:
 def read(path: Path) -> Meaning:
     """The file as CBC reads it."""
     copy, listed = _fresh("cbc.mps"), _fresh("cbc.txt")
-    said = _run(str(path), "export", copy.name, "printi", "all", "solution", listed.name)
-    if re.search(r"ERROR|too many errors|not valid", said) or not copy.exists():
-        raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', said)[:1])}")
+    output = _run(str(path), "export", copy.name, "printi", "all", "solution", listed.name)
+    if re.search(r"ERROR|too many errors|not valid", output) or not copy.exists():
+        raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', output)[:1])}")
     model = highs_program.read(copy)
     names = [line.removeprefix("**").split()[1] for line in listed.read_text("utf-8").splitlines()[1:]]
     if len(names) != len(model.rows) + len(model.columns):
@@ -48,9 +48,9 @@ def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of CBC's command `solution`, which has eight digits."""
     gaps = ("ratio", f"{job.gap:g}", "allow", "1e-9", "primalT", "1e-9", "integerT", "1e-9")
     limits = (*gaps, "sec", f"{job.seconds:g}", "timem", "elapsed")
-    said = _run(str(job.model), *limits, "solve", "solution", str(job.solution))
+    output = _run(str(job.model), *limits, "solve", "solution", str(job.solution))
     if not job.solution.exists():
-        raise RefusedError(f"CBC wrote no solution: {' '.join(said.split())[-200:]}")
-    bound = re.search(r"^Lower bound: +(\S+)$", said, re.MULTILINE)
-    nodes = re.search(r"^Enumerated nodes: +(\d+)$", said, re.MULTILINE)
+        raise RefusedError(f"CBC wrote no solution: {' '.join(output.split())[-200:]}")
+    bound = re.search(r"^Lower bound: +(\S+)$", output, re.MULTILINE)
+    nodes = re.search(r"^Enumerated nodes: +(\d+)$", output, re.MULTILINE)
     return Outcome(bound=float(bound[1]) if bound else None, nodes=int(nodes[1]) if nodes else None)

@@ -39,11 +39,11 @@ def _load(path: Path, *, log: bool = False) -> Any:
 
 
 def read(path: Path) -> Meaning:
-    """The file as CPLEX reads it, quadratic rows last; its parser of decimals is an ulp off at times."""
+    """The file as CPLEX reads it, quadratic rows last; its parser of decimals sometimes errs by an ulp."""
     model = _load(path)
     columns, goal = model.variables, model.objective
     if goal.get_sense() != goal.sense.minimize or goal.get_offset() != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     plain, products = model.linear_constraints, model.quadratic_constraints
     senses = np.array([*plain.get_senses(), *products.get_senses()])
     limits = np.array([*plain.get_rhs(), *products.get_rhs()])
@@ -95,8 +95,8 @@ def solve(job: Job) -> Outcome:
         (settings.mip.tolerances.mipgap, job.gap),
         (settings.mip.tolerances.absmipgap, 1e-9),
         (settings.mip.tolerances.integrality, 0.0),
-        # Of some 100 runs of `minlp-quartic` two have bounds above the optimum with this, and two claim
-        # optima that are none with the default. Numerical emphasis may be the remedy; it is not measured.
+        # With this, two of some 100 runs of `minlp-quartic` have bounds above the optimum; by default, two
+        # claim false optima. Numerical emphasis may be the remedy; it is not measured.
         (settings.simplex.tolerances.feasibility, 1e-9),
         (settings.simplex.tolerances.optimality, 1e-9),
         (settings.barrier.convergetol, 1e-12),

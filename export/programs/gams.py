@@ -1,8 +1,8 @@
 """GAMS: the free gamspy_base compiles a model, CONVERT translates it, its solvers solve it.
 
-CONVERT writes an .nl file of its own, which CasADi evaluates: an independent way from our GAMS text to
-numbers. BARON comes as gamspy_baron, whose files have to lie among those of gamspy_base: both are linked into
-a folder of the child process.
+CONVERT writes its own .nl file, which CasADi evaluates: an independent path from our GAMS text to numbers.
+BARON comes as gamspy_baron, whose files have to be in the folder of gamspy_base: both are linked into a
+folder of the child process.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def _package(name: str) -> Path | None:
 
 
 def version() -> str:
-    """Its version, and that of CasADi, which evaluates what CONVERT writes."""
+    """Its version, and the version of CasADi, which evaluates CONVERT's file."""
     from importlib.metadata import version as installed
 
     return f"{installed('gamspy_base')} (demo; CONVERT, read by CasADi {casadi_program.version()})"
 
 
 def _system(solver: str) -> Path:
-    """The folder of GAMS; for BARON a copy, by links where that works, with BARON's files and its entry."""
+    """The folder of GAMS; for BARON a copy, by links where possible, with BARON's files and its entry."""
     base, baron = _package("gamspy_base"), _package("gamspy_baron")
     assert base is not None
     if solver != "baron" or baron is None:
@@ -100,12 +100,12 @@ def _text(path: Path) -> str:
 
 
 def our_name(name: str) -> str:
-    """The name of an indexed symbol as ours: `s(00,01,u)` is `s_00_01_u`."""
+    """Our name of an indexed symbol: `s(00,01,u)` is `s_00_01_u`."""
     return re.sub(r"[(,]", "_", name).rstrip(")")
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The GAMS model as CONVERT translates it and CasADi reads it; columns in no term are not there."""
+    """The GAMS model as CONVERT translates it and CasADi reads it, without columns in no term."""
     Path("out.nl").unlink(missing_ok=True)
     _run(path, "convert")
     if not Path("out.nl").exists():
@@ -130,29 +130,29 @@ _NORMAL: Final = 1
 def solve(job: Job) -> Outcome:
     """Solve the file with one of GAMS's solvers; the solution is the CSV that our models write.
 
-    The gap stands in the model itself.
+    The model itself contains the gap.
     """
     solver = job.solver.removeprefix("gams-")
     threads = (f"threads={job.threads}",) if job.threads else ()
-    said = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={job.solution}")
+    log = _run(job.model, solver, f"reslim={job.seconds:g}", *threads, f"--RESULTS={job.solution}")
     model, state = (
-        int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", said)) else 0
+        int(found[1]) if (found := re.search(rf"\*\*\*\* {kind} STATUS +(\d+)", log)) else 0
         for kind in ("MODEL", "SOLVER")
     )
     words = f"model status {model}, solver status {state}"
-    used = re.search(r"^ +SOLVER +(\w+) +FROM LINE", said, re.MULTILINE)
+    used = re.search(r"^ +SOLVER +(\w+) +FROM LINE", log, re.MULTILINE)
     if used and used[1].lower() != solver:
         raise RefusedError(f"it is of a type that GAMS gives to {used[1]}")
-    refusal = re.search(r"\*\*\* (Cannot handle function .*)", said)
+    refusal = re.search(r"\*\*\* (Cannot handle function .*)", log)
     if refusal:
         raise RefusedError(refusal[1])
     status = _MODEL_STATUS.get(model, Status.ERROR)
     if model == _INTEGER_SOLUTION and state == _NORMAL:
         status = Status.OPTIMAL_GLOBAL
     if status in {Status.ERROR, Status.INFEASIBLE}:
-        job.solution.unlink(missing_ok=True)  # its values are no answer
+        job.solution.unlink(missing_ok=True)  # its values are not an answer
         return Outcome(status, words)
     if not job.solution.exists():
         raise RefusedError(f"GAMS wrote no solution: {words}")
-    bound = re.search(r"^Best possible *[=:] *(\S+)$", said, re.MULTILINE)
+    bound = re.search(r"^Best possible *[=:] *(\S+)$", log, re.MULTILINE)
     return Outcome(status, words, float(bound[1]) if bound else None)

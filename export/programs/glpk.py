@@ -1,7 +1,7 @@
 """GLPK's executable as a reader of LP, MPS and AMPL models with their data. It takes linear models only.
 
-What it read is told by its own dump of the model (--wglp), in fifteen digits. Of an AMPL model the objective
-is a row there as well, and columns are indexed: alpha[1,2].
+GLPK reports what it read by its own dump of the model (--wglp), with fifteen digits. For an AMPL model the
+dump also contains the objective as a row, and indexed columns: alpha[1,2].
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def read(path: Path) -> Meaning:
         (int(i), int(j), float(value)) for key, i, j, value in (line for line in lines if line[0] == "a")
     ]
     if any(not j for _, j, _ in entries):
-        raise RefusedError("it has a constant beside ONE")
+        raise RefusedError("it has a constant besides ONE")
     costs = np.zeros(len(names["j"]))
     for _, j, value in (entry for entry in entries if not entry[0]):
         costs[j - 1] = value
@@ -79,7 +79,7 @@ def read(path: Path) -> Meaning:
 
 
 def evaluate(path: Path, points: Points) -> Evaluation:
-    """The AMPL model as GLPK reads it; it leaves columns out that are in no term, as AMPL does."""
+    """The AMPL model as GLPK reads it, without columns in no term, as in AMPL."""
     model = read(path)
     given = points.of(model.columns)
     return Evaluation(
@@ -98,7 +98,7 @@ def evaluate(path: Path, points: Points) -> Evaluation:
 
 
 def _without_objective(model: Meaning, path: Path) -> Meaning:
-    """The model under our names, its objective not among the rows."""
+    """The model with our names, without the objective among the rows."""
     goal = model.rows.index(_OBJECTIVE)
     kept = model.matrix_at[model.matrix_at[:, 0] != goal]
     return replace(
@@ -113,7 +113,7 @@ def _without_objective(model: Meaning, path: Path) -> Meaning:
 
 
 def _ours(names: list[str], path: Path) -> list[str]:
-    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with as many digits as it prints."""
+    """Names of an AMPL model in our style: p1[1,2,u] is p1_01_02_u, with the printed number of digits."""
     printed = re.search(r"_%0(\d+)d", path.read_text("utf-8"))
     assert printed
     return [_our_name(name, int(printed[1])) for name in names]
@@ -127,7 +127,7 @@ def _our_name(name: str, digits: int) -> str:
 def _limits(lines: list[list[str]], kind: str, count: int, at: int) -> tuple[Any, Any]:
     """Bounds of rows or columns: a letter (free, lower, upper, double, s: fixed) at place `at`, and numbers.
 
-    Rows without a line are free; columns have at least 0, and at most 1 in a model with integers.
+    Rows without a line are free; columns are at least 0, and at most 1 in a model with integers.
     """
     lower, upper = np.zeros(count), np.full(count, 1.0 if at == 3 else np.inf)
     if kind == "i":

@@ -1,4 +1,4 @@
-"""Gurobi as a reader of LP and MPS, through gurobipy. Its free licence ends at 2000 columns and rows."""
+"""Gurobi as a reader of LP and MPS, through gurobipy. Its free licence allows 2000 columns and rows."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def read(path: Path) -> Meaning:
     """The file as Gurobi reads it; quadratic rows come after the others."""
     with _loaded(path) as model:
         if model.ModelSense != gurobipy.GRB.MINIMIZE or model.ObjCon != 0:
-            raise RefusedError("it is not minimised, or has a constant beside ONE")
+            raise RefusedError("it is not minimised, or has a constant besides ONE")
         variables, plain, products = model.getVars(), model.getConstrs(), model.getQConstrs()
         senses = np.array([r.Sense for r in plain] + [r.QCSense for r in products])
         limits = np.array([r.RHS for r in plain] + [r.QCRHS for r in products])

@@ -17,7 +17,7 @@ from .reading import Meaning, finite
 _RAW: Final = 0
 """The style of solution files that HiGHS reads and writes with all digits."""
 _TICK: Final = 0.1
-"""Seconds between two looks at a running solver."""
+"""Seconds between two checks of a running solver."""
 
 
 def version() -> str:
@@ -43,7 +43,7 @@ def set_options(highs: Any, **options: str | float) -> None:
     for option, value in options.items():
         highs.setOptionValue(option, value)
     if options.get("threads"):
-        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - else that of the earlier solve is kept
+        highspy.Highs.resetGlobalScheduler(True)  # noqa: FBT003 - otherwise the old number is kept
 
 
 def solved(highs: Any, path: Path) -> Any:
@@ -53,7 +53,7 @@ def solved(highs: Any, path: Path) -> Any:
     return highs
 
 
-def leave(highs: Any, solution: Path) -> None:
+def write_solution(highs: Any, solution: Path) -> None:
     """Write the solution file. Raises OutputError."""
     beside = solution.with_suffix(".part")
     if highs.writeSolution(str(beside), _RAW) == highspy.HighsStatus.kError:
@@ -67,7 +67,7 @@ def read(path: Path) -> Meaning:
     highs = loaded(path)
     lp, hessian = highs.getLp(), highs.getModel().hessian_
     if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     given: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
     given |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
     if len(lp.integrality_):
@@ -97,7 +97,7 @@ def solve(job: Job) -> Outcome:
     _run(highs)
     if highs.getModelStatus() == highspy.HighsModelStatus.kNotset:
         raise RefusedError("HiGHS answers with an error (model status Not Set)", file=job.model)
-    leave(highs, job.solution)
+    write_solution(highs, job.solution)
     if not len(highs.getLp().integrality_):
         return Outcome()
     info = highs.getInfo()

@@ -25,7 +25,7 @@ FEASIBLE: Final = 1e-6
 class NlModel:
     """A .nl file in its own order: limits of columns (n,) and rows (m,), start (n,), integrality (n,).
 
-    start: zeros where the file has none. problem: CasADi's expressions, `x`, `f` and `g`.
+    start: zeros if the file has none. problem: CasADi's expressions, `x`, `f` and `g`.
     """
 
     problem: dict[str, Any]
@@ -52,7 +52,7 @@ class NlModel:
         return objective if whole and self.holds(point, rows) else None
 
     def holds(self, point: Floats, rows: Floats) -> bool:
-        """Whether a point (n,) and the values of its rows (m,) keep their limits."""
+        """Whether a point (n,) and the values of its rows (m,) respect their limits."""
         excess = (self.lower - point, point - self.upper, self.row_lower - rows, rows - self.row_upper)
         return all(float(part.max(initial=0.0)) <= FEASIBLE for part in excess)
 

@@ -1,4 +1,4 @@
-"""What the module of a program offers, and what it raises.
+"""Interface of the module of a program, and its errors.
 
 The table of solvers lists the programs. Each has a module here, which is imported in a child process only:
 
@@ -34,7 +34,7 @@ class RefusedError(CrossfieldError):
 
 
 class FailedError(CrossfieldError):
-    """An error of a program or of its interface that says nothing about the file."""
+    """An error of a program or of its interface that does not concern the file."""
 
 
 class NotReportedError(CrossfieldError):
@@ -46,12 +46,12 @@ class TooLargeError(CrossfieldError):
 
 
 class Job(NamedTuple):
-    """A solve that a program is asked for.
+    """A request to a program to solve a file.
 
     solver: name in the table of solvers. model: the file to solve; solution: the file to write, in the
     solver's own layout. start: a file with a starting point, or None. limit: most seconds for the search;
     deadline: when it has to end, the solution written. gap: relative gap at which a discrete search may stop.
-    threads: 0 for the solver's choice. precise: whether tolerances are as tight as the solver takes them.
+    threads: 0 for the solver's choice. precise: whether tolerances are as tight as the solver allows.
     stamp: names the problem, for files that can hold a message.
     """
 
@@ -68,14 +68,14 @@ class Job(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """Seconds for the search: the limit, or what is left less the time to write the solution."""
+        """Seconds for the search: the limit, or the time left minus the time to write the solution."""
         return max(min(self.limit, self.deadline.left() - _WRITING), _LEAST)
 
 
 class Outcome(NamedTuple):
-    """What a solution file does not hold: status, the solver's message, dual bound and number of nodes.
+    """Facts that a solution file lacks: status, the solver's message, dual bound and number of nodes.
 
-    status: None where the file states it. bound and nodes: None where the solver reports none.
+    status: None if the file states it. bound and nodes: None if the solver reports none.
     """
 
     status: Status | None = None
@@ -85,9 +85,9 @@ class Outcome(NamedTuple):
 
 
 def run_program(name: str, *arguments: str, folder: Path | None = None) -> str:
-    """Run an executable and return what it prints. Raises RefusedError if it ends with an error.
+    """Run an executable and return its output. Raises RefusedError if it ends with an error.
 
-    When this process is asked to stop, the program receives SIGINT.
+    When the parent requests a stop, the program receives SIGINT.
     """
     done = run_command([shutil.which(name) or name, *arguments], folder)
     if done.returncode:
@@ -110,7 +110,7 @@ def run_command(command: list[str], folder: Path | None = None) -> subprocess.Co
         on_stop(lambda: process.send_signal(signal.SIGINT)),
     ):
         text, _ = process.communicate()
-    print(text, flush=True)  # noqa: T201 - what a child prints is its log
+    print(text, flush=True)  # noqa: T201 - the output of a child is its log
     return subprocess.CompletedProcess(command, process.returncode, text)
 
 
@@ -120,6 +120,6 @@ def interrupt_self() -> None:
 
 
 def file_names(path: Path) -> tuple[list[str], list[str]]:
-    """Names of columns and rows of an .nl file, from the .col and .row beside it, the objective left out."""
+    """Names of columns and rows of an .nl file, from its .col and .row files, without the objective."""
     columns, rows = (path.with_suffix(suffix).read_text("utf-8").split() for suffix in (".col", ".row"))
     return columns, [name for name in rows if name != "obj"]

@@ -1,8 +1,8 @@
-"""What a model file means to the program that read it, as plain arrays.
+"""The content of a model file as its program reads it, as plain arrays.
 
-Comparison.py says how that differs from the problem. Two forms. A `Meaning` is the algebra: costs, quadratic
-terms and rows by coefficient, as readers of LP and MPS give it. An `Evaluation` is the behaviour: values of
-objective and rows at points, as readers of .nl and GAMS give it.
+export/verify/comparison.py states how it differs from the problem. There are two forms. A `Meaning` is the
+algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS report it. An `Evaluation`
+is the behaviour: values of objective and rows at points, as readers of .nl and GAMS report it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Meaning:
 
 
 def places(have: list[str], wanted: list[str]) -> Ints:
-    """Where each of the wanted names stands among those there are."""
+    """Position of each wanted name among the existing ones."""
     number = {name: place for place, name in enumerate(have)}
     return np.array([number[name] for name in wanted], dtype=np.int64)
 
@@ -96,8 +96,8 @@ def places(have: list[str], wanted: list[str]) -> Ints:
 class Evaluation:
     """Columns and rows of a model, and the values of objective (k,) and rows (k, rows) at k points.
 
-    integer is None where the program does not tell it, discrete then counts them. What is not told of the
-    values is NaN. rounding: relative accuracy to which bounds are told; may_lack: whether columns in no term
+    integer is None if the program does not report it; then discrete counts these columns. Values that are not
+    reported are NaN. rounding: relative accuracy of reported bounds; may_lack: whether columns in no term
     are left out.
     """
 
@@ -117,7 +117,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points by column name, values (k, columns); the first `random` of them are anywhere, the rest feasible.
+    """Points by column name, values (k, columns); the first `random` are arbitrary, the rest feasible.
 
     objective: our values there (k,), for programs that judge a point instead of evaluating it.
     """
@@ -133,11 +133,11 @@ class Points:
 
 
 def infinite(values: Sequence[float]) -> Floats:
-    """Bounds, infinite from 1e20 on, as CPLEX and Xpress have it."""
+    """Bounds with infinity from 1e20 on, as in CPLEX and Xpress."""
     given = np.array(values, dtype=float)
     return np.where(np.abs(given) >= _INFINITY, np.copysign(np.inf, given), given)
 
 
 def finite(value: float | None) -> float | None:
-    """Return the number, or None for one that stands for infinity."""
+    """Return the number, or None for a number that represents infinity."""
     return None if value is None or abs(value) >= _INFINITE_BOUND else float(value)

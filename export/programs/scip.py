@@ -1,8 +1,8 @@
 """SCIP as a reader of LP, MPS, .nl and OSiL, through PySCIPOpt.
 
-A quadratic or nonlinear objective is a row with a variable of its own there, and the constant of OSiL a fixed
-variable. SCIP evaluates no nonlinear row at a point, but it judges points: at a feasible one the objective is
-within a hair of ours when a hair more is feasible and a hair less is not.
+SCIP represents a quadratic or nonlinear objective by a row with an additional variable, and the constant of
+OSiL by a fixed variable. It evaluates no nonlinear row at a point, but it judges points. At a feasible one
+the objective is accurate to a small amount if slightly more is feasible and slightly less is not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _HAIR: Final = 1e-5
 
 
 def version() -> str:
-    """Its version, and that of PySCIPOpt."""
+    """Its version, and PySCIPOpt's."""
     return f"{pyscipopt.Model().version()} (PySCIPOpt {installed('pyscipopt')})"
 
 
@@ -37,7 +37,7 @@ def _load(path: Path) -> Any:
     scip.hideOutput()
     try:
         scip.readProblem(str(path))
-    except Exception as error:  # PySCIPOpt raises plain ones
+    except Exception as error:  # PySCIPOpt raises plain exceptions
         raise RefusedError(f"SCIP cannot read it: {error}") from error
     if scip.getObjectiveSense() != "minimize":
         raise RefusedError("it is not minimised")
@@ -48,7 +48,7 @@ def read(path: Path) -> Meaning:
     """The LP or MPS file as SCIP reads it."""
     scip = _load(path)
     if scip.getObjoffset() != 0:
-        raise RefusedError("it has a constant beside ONE")
+        raise RefusedError("it has a constant besides ONE")
     variables = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     rows = [row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS]
     goals = [row for row in scip.getConss() if row.name in _OBJECTIVE_ROWS]
@@ -56,7 +56,7 @@ def read(path: Path) -> Meaning:
     matrix, cubes = _terms(scip, rows, number)
     beside, squares = _terms(scip, goals, number)
     if len(beside.value):
-        raise RefusedError("its quadratic objective has linear terms beside the costs")
+        raise RefusedError("its quadratic objective has linear terms besides the costs")
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in variables])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in rows])
     return Meaning.of(
@@ -80,7 +80,7 @@ def _limits(ends: list[tuple[float, float]]) -> tuple[Any, Any]:
 
 
 def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, Terms]:
-    """Linear and quadratic terms of rows; the variable that stands for the objective is left out."""
+    """Linear and quadratic terms of rows, without the variable that represents the objective."""
     linear: list[tuple[int, int, float]] = []
     square: list[tuple[int, int, int, float]] = []
     for place, row in enumerate(rows):
@@ -99,7 +99,7 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
 
 def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
     """The columns of a file as SCIP reads them: whether each is discrete, and its bounds."""
-    scip = _load(path)  # its variables die with it
+    scip = _load(path)  # its variables do not outlive it
     ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
     ends = zip(lower.tolist(), upper.tolist(), strict=True)
@@ -147,7 +147,7 @@ def _activity(scip: Any, row: Any, columns: list[str], given: Any) -> Any:
 
 
 def _agreed(scip: Any, variables: dict[str, Any], columns: list[str], point: Any, claim: float) -> float:
-    """The claimed objective at a feasible point when SCIP agrees to within a hair, else infinity."""
+    """The claimed objective at a feasible point if SCIP agrees within a small amount, else infinity."""
     extra = [v for name, v in variables.items() if name in _OBJECTIVE_COLUMNS - {_CONSTANT}]
     rest = sum(variables[name].getObj() * value for name, value in zip(columns, point, strict=True))
     solution = scip.createSol()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-with warnings.catch_warnings(action="ignore"):  # it tells which licence it uses
+with warnings.catch_warnings(action="ignore"):  # it prints which licence it uses
     import xpress
 
 from ...models.processes.control import on_stop
@@ -47,7 +47,7 @@ def read(path: Path) -> Meaning:
     """The file as Xpress reads it."""
     model = _load(path)
     if model.attributes.objsense != 1 or model.attributes.objrhs != 0:
-        raise RefusedError("it is not minimised, or has a constant beside ONE")
+        raise RefusedError("it is not minimised, or has a constant besides ONE")
     n, m = model.attributes.cols, model.attributes.rows
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
@@ -102,7 +102,7 @@ def solve(job: Job) -> Outcome:
         *((("threads", job.threads), ("concurrentthreads", job.threads)) if job.threads else ()),
     ):  # fmt: skip
         model.setControl(option, value)
-    # Before the search: one that is cut short has the names of the presolved model, but values of the whole.
+    # Before the search: an interrupted search has the presolved model's names, but the whole model's values.
     names = list(model.getNameList(_COLUMNS, 0, model.attributes.cols - 1))
     try:
         with on_stop(model.interrupt):
@@ -119,7 +119,7 @@ def solve(job: Job) -> Outcome:
 
 
 def _write_slx(job: Job, names: list[str], values: list[float]) -> None:
-    """Write an .slx; Xpress' own method refuses points of a search that was cut short."""
+    """Write an .slx; Xpress' own method refuses points of an interrupted search."""
     lines = (f"  C {name} {value!r}\n" for name, value in zip(names, map(float, values), strict=True))
     with replacing(job.solution) as stream:
         stream.write(f"NAME {job.stamp}\n{''.join(lines)}ENDATA\n".encode())

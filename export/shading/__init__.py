@@ -1,1 +1,1 @@
-"""Pictures of surfaces, in light."""
+"""Shaded pictures of surfaces."""

@@ -1,4 +1,4 @@
-"""A surface in the light of a lamp far away: Lambert's law and light from all sides."""
+"""A surface in the light of a distant lamp: Lambert's law and light from all sides."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ...models.instance.grid import Floats
 from .raster import Raster
 
 CLAY: Final = (0.80, 0.77, 0.73)
-"""Part of red, green and blue light that the surface gives back."""
+"""Share of red, green and blue light that the surface reflects."""
 _AMBIENT: Final = 0.04  # light from all sides, on any surface
 _VIEWER: Final = 0.10  # light from the viewer
 _LAMP: Final = 0.95
-_FILL: Final = 0.08  # from the other side than the lamp, so that forms in its shade are seen
+_FILL: Final = 0.08  # from the side opposite to the lamp, so that forms in its shade are visible
 
 
 @dataclass(frozen=True)
 class Light:
-    """Where a lamp far away is.
+    """Position of a distant lamp.
 
     azimuth: radians counter-clockwise from the right, as the tilt of a normal; by default upper left.
     elevation: radians above the plane of the drawing, 0 to pi/2, which is straight from the viewer.
-    Raises InputError for another elevation and what is no number.
+    Raises InputError for another elevation and for values that are not finite.
     """
 
     azimuth: float = np.radians(130.0)
@@ -52,13 +52,13 @@ class Light:
 
 
 UPPER_LEFT: Final = Light()
-"""The lamp unless another one is given."""
+"""The default lamp."""
 
 
 def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, float] = CLAY) -> Floats:
     """Red, green, blue and opacity (h, w, 4) in [0, 1], encoded for screens (sRGB), of a dull surface.
 
-    What comes back of the lamp is the cosine between its direction and the normal, 0 in its own shade.
+    The reflected light of the lamp is the cosine between its direction and the normal, 0 in its own shade.
     """
     lamp = np.maximum(raster.normals @ light.direction, 0.0)
     fill = np.maximum(raster.normals @ light.opposite.direction, 0.0)
@@ -67,7 +67,7 @@ def lit(raster: Raster, light: Light = UPPER_LEFT, colour: tuple[float, float, f
 
 
 def with_opacity(energy: Floats, raster: Raster) -> Floats:
-    """Energies of light (h, w, 3), from 0 to 1, encoded for screens, with the opacity as fourth."""
+    """Energies of light (h, w, 3), from 0 to 1, encoded for screens, with the opacity as fourth value."""
     light = np.clip(energy, 0.0, 1.0)
     encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     return np.concatenate([encoded, raster.opacity[..., None]], axis=-1)

@@ -1,7 +1,7 @@
-"""A surface in a material that a ball shows: each colour is that of the ball where it has the same normal.
+"""A surface in the material of a ball: each colour is the ball's colour at the same normal.
 
-The ball is computed, a glazed one between a large window and a blue wall; it shows forms better than a lamp
-does, because every normal has its own colour.
+The ball is computed, a glazed one between a large window and a blue wall. It shows forms better than a lamp,
+because every normal has its own colour.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _KEY_COLOUR: Final = np.array([1.05, 0.98, 0.88])
 _FILL: Final = np.array([0.75, -0.40, 0.53])  # of the wall
 _FILL_COLOUR: Final = np.array([0.10, 0.18, 0.34])
 _FLOOR: Final = np.array([0.05, 0.04, 0.04])
-_ROUND: Final = 0.25  # how far a window reaches round the ball
-_SHINE: Final = 38.0  # how narrow the gloss is
-_RIM: Final = 3.0  # how narrow the light along the border of the ball is
+_ROUND: Final = 0.25  # extent of a window around the ball
+_SHINE: Final = 38.0  # sharpness of the gloss
+_RIM: Final = 3.0  # sharpness of the light along the border of the ball
 
 
 def matcap(raster: Raster) -> Floats:
@@ -31,7 +31,7 @@ def matcap(raster: Raster) -> Floats:
 
 
 def ball(normals: Floats) -> Floats:
-    """Light (..., 3) that comes to the viewer from the ball where it has these unit normals (..., 3)."""
+    """Light (..., 3) from the ball to the viewer at these unit normals (..., 3)."""
     key, fill = (vector / np.linalg.norm(vector) for vector in (_KEY, _FILL))
     viewer = np.array([0.0, 0.0, 1.0])
     half = (key + viewer) / np.linalg.norm(key + viewer)

@@ -13,10 +13,10 @@ Bytes = NDArray[np.uint8]
 
 
 def normal_map(instance: Instance, normals: Floats, scale: int = 1) -> Bytes:
-    """Red, green, blue and opacity, uint8 (h, w, 4), in the manner of OpenGL and Blender (green up).
+    """Red, green, blue and opacity, uint8 (h, w, 4), as in OpenGL and Blender (green up).
 
-    normals: (n, 3) at the pixels. scale: 1: one texel for each pixel of the grid, its own normal, opaque in
-    the mask alone; more: normals in between, and a smooth outline. Outside it looks at the viewer. Raises
+    normals: (n, 3) at the pixels. scale: 1: one texel per pixel of the grid, with its own normal, opaque only
+    in the mask; more: normals in between, and a smooth outline. Outside it points to the viewer. Raises
     InputError for another scale.
     """
     if scale_of(instance, scale) > 1:
@@ -33,5 +33,5 @@ def coloured(found: Raster) -> Floats:
 
 
 def eight_bit(values: Floats) -> Bytes:
-    """Numbers in [0, 1] as the nearest of 256."""
+    """Numbers in [0, 1] rounded to one of 256 values."""
     return np.round(255 * values).astype(np.uint8)

@@ -1,9 +1,9 @@
 """A surface on a finer raster: smooth normals inside of a smooth outline.
 
-Normals of the pixels are spread by cubic B-splines over the pixels of the mask alone, so that nothing from
-outside of it tints the border. The same splines of the mask itself say how much of a place is inside; where
-that is a half runs the outline. The stairs of the mask are smoothed by a wider blur, which may move the
-outline by half a pixel, and by less where the mask or a gap in it is thin, so that these stay.
+Normals of the pixels are interpolated by cubic B-splines over the pixels of the mask only, so that no values
+from outside tint the border. The same splines of the mask itself give the share of a place that is inside;
+the outline is where it is one half. A wider blur smooths the stairs of the mask. It may move the outline by
+half a pixel, and by less where the mask or a gap in it is thin, so that these stay.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from ...models.instance.grid import Bools, Floats
 from ...models.instance.instance import Instance
 
 SIDE: Final = 1000
-"""About as many pixels has the longer side of a picture unless a scale is given."""
-_BLUR: Final = 2.0  # pixels of the grid by which stairs are smoothed
-_MOVED: Final = 0.33  # at most, of the inside of a place
-_MOVED_THIN: Final = 0.12  # where something is one or two pixels thin
+"""Approximate number of pixels of a picture's longer side unless a scale is given."""
+_BLUR: Final = 2.0  # pixels of the grid over which stairs are smoothed
+_MOVED: Final = 0.33  # at most, of the share of a place that is inside
+_MOVED_THIN: Final = 0.12  # where the mask or a gap is one or two pixels thin
 _SLOPE: Final = 2 / 3
-"""By how much the inside of a place changes a pixel across a straight outline."""
+"""Change of the inside share from a pixel to the next across a straight outline."""
 _BLURRED_SLOPE: Final = 1 / (_BLUR * np.sqrt(2 * np.pi))
-_DRAWN: Final = 0.4  # pixels that strokes at the border are within it: they run through its pixels' middles
-_TIP: Final = 8  # pixels of a tip at most; what is thin and larger is a part
+_DRAWN: Final = 0.4  # pixels from the border to strokes on it, which pass through the middles of pixels
+_TIP: Final = 8  # most pixels of a tip; larger thin regions are parts
 _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 
 
@@ -35,7 +35,7 @@ _REACH: Final = 2  # pixels of the grid to each side that a cubic B-spline has
 class Raster:
     """Normals and opacity on the pixels of a picture that covers the grid of a surface.
 
-    normals: unit vectors (h, w, 3), x right, y up, z towards the viewer; (0, 0, 1) where nothing is near.
+    normals: unit vectors (h, w, 3), x right, y up, z towards the viewer; (0, 0, 1) far from the mask.
     opacity: (h, w) in [0, 1], the part of each picture pixel inside of the outline.
     """
 
@@ -44,9 +44,9 @@ class Raster:
 
 
 def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Raster:
-    """The normals of a surface, (n, 3) at the pixels, with `scale` x `scale` pixels for each of the grid.
+    """The normals of a surface, (n, 3) at the pixels, with `scale` x `scale` pixels per pixel of the grid.
 
-    scale: 1 or more; None: as many as make the longer side about SIDE. Raises InputError for another one.
+    scale: 1 or more; None: chosen so that the longer side is about SIDE. Raises InputError for another one.
     """
     scale = scale_of(instance, scale)
     mask = np.pad(instance.mask, _REACH)
@@ -67,7 +67,7 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
 
 
 def scale_of(instance: Instance, scale: int | None) -> int:
-    """The pixels of a picture a pixel of the grid. Raises InputError for a scale that cannot be."""
+    """Picture pixels per pixel of the grid. Raises InputError for a scale out of range."""
     height, width = instance.mask.shape
     if scale is None:
         return max(1, round(SIDE / int(max(height, width))))
@@ -108,7 +108,7 @@ def _blurred(mask: Bools) -> Floats:
 
 
 def _thin(mask: Bools) -> Bools:
-    """Pixels in or beside a part of the mask, or a gap in it, too thin for 3 x 3 pixels and no mere tip."""
+    """Pixels in or next to a part of the mask, or a gap in it, too thin for 3 x 3 pixels, but not a tip."""
     from scipy import ndimage
 
     block = np.ones((3, 3), dtype=bool)
@@ -121,7 +121,7 @@ def _thin(mask: Bools) -> Bools:
 
 
 def _moved(thin: Floats) -> tuple[Floats, Floats]:
-    """How far the inside may be corrected, down and up; less where something is thin, a number in [0, 1]."""
+    """Greatest corrections of the inside share, down and up, in [0, 1]; smaller at thin places."""
     most = _MOVED + thin * (_MOVED_THIN - _MOVED)
     return -most, most
 
@@ -136,7 +136,7 @@ def drawn_border(instance: Instance) -> float:
 
 
 def _opacity(level: Floats) -> Floats:
-    """The part of each pixel inside of the outline, which runs where the level is a half."""
+    """The part of each pixel inside of the outline, where the level is one half."""
     depth = np.pad(level - 0.5, 1, mode="edge")
     steepness = np.hypot(*np.gradient(depth))
     part: Floats = np.clip(0.5 + depth / np.maximum(steepness, 1e-9), 0.0, 1.0)

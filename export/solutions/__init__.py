@@ -1,5 +1,5 @@
 """From a solver's answer to a field.
 
-The Solution: a point mapped back by name, what is recomputed of it, and what in the file that contradicts.
-No reader runs a solver; the running is export/solving.
+The Solution: a point mapped back by name, its recomputed values, and contradictions with the file's claims.
+No reader runs a solver; that belongs to export/solving.
 """

@@ -1,4 +1,4 @@
-"""What a point, computed again, says against the claims of the file that holds it."""
+"""Contradictions between a recomputed point and the claims of its file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ...models.formulations.problem import Problem, Violation
 from .readers.text import Status
 
 TOLERANCE: Final = 1e-5
-"""How far a point may be off before it contradicts its claims, in units of a column (radians, jumps).
+"""Largest error of a point that does not contradict its claims, in units of a column (radians, jumps).
 
-Solvers leave, by default: HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6 in the
-objective; CPLEX, Gurobi and Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
+By default, solvers leave these errors: HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6
+in the objective; CPLEX, Gurobi and Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
 """
 
 _DIGITS: Final = 1e-13
-"""Rounding of an objective that is summed in doubles, as a part of its coefficients' sum."""
+"""Rounding of an objective that is summed in doubles, relative to the sum of its coefficients."""
 
 
 class Claims(NamedTuple):
-    """What a file claims of its point, None where it is silent; and how far integers were rounded."""
+    """Claims of a file about its point, None for missing ones, and the largest rounding of integers."""
 
     status: Status
     objective: float | None
@@ -33,11 +33,12 @@ class Claims(NamedTuple):
 def contradictions(
     problem: Problem, claims: Claims, objective: float, violation: Violation, tolerance: float = TOLERANCE
 ) -> tuple[str, ...]:
-    """What is wrong with the claims about a point, in words; empty when they agree.
+    """Contradictions of the claims about a point, in words; empty when they agree.
 
-    A status that promises a point is contradicted by a violation beyond the tolerance, `infeasible` by a
-    point without one; an objective by another one, and a dual bound by an objective below it. tolerance:
-    times the largest coefficient of the rows, or 1; and of the objective a part of its size, or of 1.
+    A violation beyond the tolerance contradicts a status that promises a point, and a point without one
+    contradicts `infeasible`. Another objective contradicts an objective, and an objective below it a dual
+    bound. tolerance: times the largest coefficient of the rows, or 1; for the objective, relative to its
+    size, or to 1.
     """
     broken = list(_broken(problem, claims, violation, tolerance))
     if not claims.status.promises_point:
@@ -59,10 +60,10 @@ def _broken(problem: Problem, claims: Claims, found: Violation, tolerance: float
 
 
 def _wrong_values(problem: Problem, claims: Claims, objective: float, tolerance: float) -> Iterator[str]:
-    """Whether the objective is another one than the file tells, or below its dual bound."""
+    """Contradictions of the claimed objective and dual bound."""
     sizes = sum(float(np.sum(family.scale)) for family in problem.objective)
     allowed = tolerance * max(1.0, abs(objective)) + _DIGITS * sizes
     if claims.objective is not None and not abs(claims.objective - objective) <= allowed:
-        yield f"it tells the objective {claims.objective:.9g} and its point has {objective:.9g}"
+        yield f"it states the objective {claims.objective:.9g}, but its point has {objective:.9g}"
     if claims.bound is not None and claims.bound > objective + allowed:
         yield f"the dual bound {claims.bound:.9g} lies above the objective {objective:.9g} of the point"

@@ -1,7 +1,7 @@
-"""A solution: what a solver's file says, mapped by name onto a problem and checked against the instance.
+"""A solution: the content of a solver's file, mapped by name to a problem and checked against the instance.
 
-Nothing in the file is believed: integers are rounded, objective and violations are computed again from the
-declaration, and a claim that they contradict is not passed on.
+Integers are rounded, objective and violations are computed again from the declaration, and a claim that they
+contradict is not passed on.
 """
 
 from __future__ import annotations
@@ -26,23 +26,22 @@ from .readers.registry import read_raw
 from .readers.text import RawSolution, Status, values_for, values_in_order
 
 ROUND: Final = 1e-5
-"""An integer column this close to an integer is rounded; beyond, its value is kept and reported."""
+"""Largest distance from an integer at which an integer column is rounded; other values are kept."""
 
 LARGEST: Final = 1e8
-"""Largest size of a value: no column's angle or jump is beyond it, nor fits squares and 32 bits."""
+"""Largest absolute value: no angle or jump exceeds it, and larger ones do not fit squares and 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A point of a problem with what was claimed and what was recomputed.
+    """A point of a problem with its claimed and recomputed properties.
 
-    problem: as the file's columns have it (with products lifted, where the format needed it); point: float
-    (columns,), or None.
-    claimed, message, reported: what the file says, its status, words and objective; bound: the solver's dual
-    bound, where one is known. status is what remains of the claim. rounded: the furthest that rounding moved
-    an integer column. tolerance: how far the point may be off before it contradicts the claim, in units of a
+    problem: as the file's columns have it (with products lifted, if the format needed it); point: float
+    (columns,), or None. claimed, message, reported: status, words and objective in the file; bound: the
+    solver's dual bound, if known. status is the remaining claim. rounded: the largest change of an integer
+    column by rounding. tolerance: largest error of a point that does not contradict the claim, in units of a
     column. interrupted: whether the user ended the search. start_returned: whether the point is the start
-    that the solver was given; None where that is not known. nodes: of the search tree, where they are told.
+    that the solver was given; None if unknown. nodes: of the search tree, if reported.
     """
 
     problem: Problem
@@ -62,11 +61,11 @@ class Solution:
 
     def __repr__(self) -> str:
         numbers = {"objective": self.objective, "bound": self.bound, "gap": self.gap}
-        told = "".join(f", {name} {value:.6g}" for name, value in numbers.items() if value is not None)
-        return f"<Solution of {self.problem.name} on {self.problem.instance.name}: {self.status}{told}>"
+        shown = "".join(f", {name} {value:.6g}" for name, value in numbers.items() if value is not None)
+        return f"<Solution of {self.problem.name} on {self.problem.instance.name}: {self.status}{shown}>"
 
     def _repr_html_(self) -> str:
-        """A table of what is claimed and what is so, with the field, for notebooks."""
+        """A table of claims and recomputed values, with the field, for notebooks."""
         facts = {
             "problem": self.problem.summary,
             "status": self.status,
@@ -88,7 +87,7 @@ class Solution:
 
     @cached_property
     def contradictions(self) -> tuple[str, ...]:
-        """What the recomputed point says against the file's claims; empty when they agree."""
+        """Contradictions between the recomputed point and the file's claims; empty when they agree."""
         if self.objective is None or self.violation is None:
             return ()
         claims = Claims(self.claimed, self.reported, self.bound, self.rounded)
@@ -96,16 +95,16 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """What is claimed, or UNKNOWN when the point contradicts it."""
+        """The claim, or UNKNOWN when the point contradicts it."""
         return Status.UNKNOWN if self.contradictions else self.claimed
 
     @property
     def doubt(self) -> str:
-        """Why the point is no answer to go on with; empty when it is one."""
+        """Reason why the point cannot be used; empty if it can."""
         if self.contradictions:
-            return f"says {self.claimed}, but {'; '.join(self.contradictions)}"
+            return f"claims {self.claimed}, but {'; '.join(self.contradictions)}"
         if self.point is not None and not self.claimed.promises_point:
-            return f"says {self.claimed} ({self.message or 'and no more'}): the values in it are no answer"
+            return f"claims {self.claimed} ({self.message or 'no message'}): its values are not a solution"
         return ""
 
     @cached_property
@@ -115,7 +114,7 @@ class Solution:
 
     @property
     def gap(self) -> float | None:
-        """How far the dual bound is below the objective, relative to the objective; None without either."""
+        """Relative distance of the dual bound below the objective; None without either."""
         if self.objective is None or self.bound is None:
             return None
         apart = max(self.objective - self.bound, 0.0)
@@ -128,7 +127,7 @@ class Solution:
 
     @cached_property
     def field(self) -> CrossField:
-        """The cross field of the point. Raises SolutionError when there is none."""
+        """The cross field of the point. Raises SolutionError without a point."""
         if self.point is None:
             raise SolutionError(
                 f"there is no point in the solution ({self.status}): {self.message or 'no message'}"
@@ -143,34 +142,34 @@ def read_solution(
     held: Mapping[str, Problem] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Solution:
-    """The solution that a file holds for the problem; the format is found by content.
+    """Read the solution of the problem from a file; the format is detected by content.
 
     Named values are mapped by name, positional ones by the column order of the .nl, LP or MPS file. A file
     without a point gives a Solution without one.
-    held: by format, the problem as the file that the solver was given holds it, with its products lifted or
-    not: `Manifest.held`. Without it, positional values are taken to follow a file as it is written today, and
-    names of lifted products tell that they were.
-    tolerance: how far the point may be off, in units of a column, before its status is no longer what the
-    file claims.
-    Where the solver repeated the problem's stamp, that decides whether it is of this very problem.
+    held: the problem by format, as the file for the solver holds it, with its products lifted or
+    not: `Manifest.held`. Without it, positional values follow a file as it is written today, and
+    names of lifted products show that they were lifted.
+    tolerance: largest error of a point, in units of a column, that does not contradict the file's
+    claims.
+    If the solver repeated the problem's stamp, it decides whether the file is of this problem.
     Raises InputError when the file cannot be read, and SolutionError, naming it, when it is malformed or of
     another problem.
     """
     raw = read_raw(path)
     if raw.stamp and raw.stamp != problem.stamp:
         raise SolutionError(
-            f"is a solution of another problem: it says {raw.stamp}, and this one is {problem.stamp}; "
-            "instance, options or fixed jumps differ, give the manifest that lies beside the solver's model",
+            f"is a solution of another problem: it states {raw.stamp}, and this one is {problem.stamp}; "
+            "instance, options or fixed jumps differ, give the manifest next to the solver's model",
             file=path,
         )
     if not raw.has_point:
-        return _told(raw, problem, None, tolerance)
+        return _solution(raw, problem, None, tolerance)
     with naming(path):
         return _mapped(raw, _form(raw, problem, held or {}), tolerance)
 
 
 def _form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> Canonical:
-    """What the solver was given: by the manifest, or else by the names of lifted products."""
+    """The problem that the solver was given: by the manifest, or else by the names of lifted products."""
     if raw.names is None:
         return Canonical(held[raw.order] if raw.order in held else _carried(problem, raw.order))
     forms = {each.sha256: each for each in held.values()}
@@ -188,9 +187,9 @@ def _carried(problem: Problem, name: str) -> Problem:
         raise SolutionError(f"is of an .{name} file, and {error}; it is of another problem") from error
 
 
-def _told(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
-    told = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
-    return Solution(problem, point, *told, tolerance=tolerance)
+def _solution(raw: RawSolution, problem: Problem, point: Floats | None, tolerance: float) -> Solution:
+    claims = (raw.status, raw.message, raw.reader, raw.objective, raw.bound)
+    return Solution(problem, point, *claims, tolerance=tolerance)
 
 
 def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
@@ -198,7 +197,7 @@ def _mapped(raw: RawSolution, form: Canonical, tolerance: float) -> Solution:
     point, unknown = (_by_position(raw, form), 0) if raw.names is None else _by_name(raw, form)
     _check_range(point, problem)
     point, moved = _rounded(point, problem)
-    return replace(_told(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
+    return replace(_solution(raw, problem, point, tolerance), rounded=moved, unknown=unknown)
 
 
 def _check_range(point: Floats, problem: Problem) -> None:
@@ -214,7 +213,7 @@ def _check_range(point: Floats, problem: Problem) -> None:
 
 
 def _by_position(raw: RawSolution, form: Canonical) -> Floats:
-    """The point of a file without names; a column in no term, which the solver's model lacks, is anything."""
+    """The point of a file without names; columns in no term, missing in the solver's model, are arbitrary."""
     problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
     point[order] = values_in_order(len(order), form.row_count(raw.order), raw)

@@ -1,6 +1,6 @@
-"""What proofs need is compiled once on a machine, in a child process that a deadline can cut off.
+"""Compilation of the functions of proofs, once per machine, in a child process that a deadline can cut off.
 
-Two such processes wait for one another, and the second finds everything compiled.
+Two such processes wait for each other, and the second finds everything compiled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...models.storage import make_folder
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Compile in the background what proofs need, unless it is compiled; the end of the context ends that."""
+    """Compile the functions of proofs in the background, unless they are; stop at the end of the context."""
     if is_compiled():
         yield
         return
@@ -31,12 +31,12 @@ def compiling() -> Iterator[None]:
 
 
 def _compile_in(child: Child) -> None:
-    with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs it
+    with suppress(CrossfieldError):  # the child was ended, or fails again when a proof needs the functions
         child.call(compile_all)
 
 
 def compile_proofs(folder: Path, deadline: Deadline) -> None:
-    """Compile the functions of proofs unless they are; what is done stays when the deadline cuts it off.
+    """Compile the functions of proofs unless they are; finished ones stay when the deadline cuts it off.
 
     It takes some 10 s. Raises SolverError when they are not compiled by the deadline.
     """
@@ -57,13 +57,13 @@ def compile_proofs(folder: Path, deadline: Deadline) -> None:
 def is_compiled() -> bool:
     """Whether all functions of proofs are compiled."""
     from ...models.processes.compiled import all_compiled
-    from ...models.proof import prove  # noqa: F401 - with it all of them are imported
+    from ...models.proof import prove  # noqa: F401 - it imports all of them
 
     return all_compiled()
 
 
 def compile_all() -> None:
-    """Compile what proofs need, by a proof of a few pixels."""
+    """Compile the functions of proofs by a proof of a few pixels."""
     from ...models.processes.compiled import place
     from ...models.proof.prove import prove
     from ...models.sketch.samples import sample

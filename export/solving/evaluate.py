@@ -1,4 +1,4 @@
-"""The honest measure of methods: hide each curve of a drawing in turn, and ask the field for it."""
+"""Evaluation of methods on data that they do not see: each curve of a drawing is hidden in turn."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from .methods import METHODS, Request
 
 DEFAULT_METHODS: Final = ("greedy", "search")
 CURVES: Final = 8
-"""Curves of a drawing that are hidden, the longest ones."""
+"""Number of curves of a drawing that are hidden, the longest ones."""
 SECONDS: Final = 5.0
-"""Time limit of a field: there are as many as curves times methods."""
+"""Time limit of one field: there are as many fields as curves times methods."""
 
 
 @dataclass(frozen=True)
 class CurveDeviation:
-    """What the methods made of a hidden curve.
+    """Deviations of the methods from a hidden curve.
 
     curve: its number; pixels: its stroke pixels; degrees: by method, the mean angle in [0, 90] degrees
-    between the curve and the nearer line of the field; failures: by method, why there is no field.
+    between the curve and the nearer line of the field; failures: by method, the reason why there is no field.
     """
 
     curve: int
@@ -46,7 +46,7 @@ class CurveDeviation:
 class Evaluation:
     """The methods' angles to the hidden curves of an instance, the longest curve first.
 
-    drawn: whether the curves are those of the sketch; else they are chains of stroke pixels. interrupted:
+    drawn: whether the curves come from the sketch; otherwise they are chains of stroke pixels. interrupted:
     whether Ctrl-C ended it; then these are the curves done before.
     """
 
@@ -58,11 +58,11 @@ class Evaluation:
     interrupted: bool = False
 
     def summary(self, method: str) -> Summary | None:
-        """Mean, median and standard error in degrees over the curves; None where the method always failed."""
+        """Mean, median and standard error in degrees over the curves; None if the method always failed."""
         return summary(np.array([each.degrees[method] for each in self.curves if method in each.degrees]))
 
     def document(self) -> dict[str, Any]:
-        """The evaluation as JSON. No clock is in it but what methods do with their time."""
+        """The evaluation as JSON. It depends on the clock only through the methods' use of their time."""
         return {
             "format": "crossfield-evaluation",
             "version": 1,
@@ -105,15 +105,15 @@ def evaluate(
     curvature: Iterable[str] = (),
     view: str | None = None,
 ) -> Evaluation:
-    """How far the fields of methods are from curves that they were not shown.
+    """Measure how far the fields of methods are from curves that they were not shown.
 
-    Each of the `curves` longest curves is hidden in turn: its stroke pixels go, as far as no other curve runs
-    through them, the mask and the other strokes stay. The measure is the mean angle between the curve and the
-    nearer line of the crosses on it; crosses at random have 22.5 degrees.
+    Each of the `curves` longest curves is hidden in turn: its stroke pixels are removed, except where another
+    curve passes through them; the mask and the other strokes stay. The measure is the mean angle between the
+    curve and the nearer line of the crosses on it; random crosses have 22.5 degrees.
 
-    sketch: the file that the instance was read from, or the name of its sample, for what is a curve there;
+    sketch: the file that the instance was read from, or the name of its sample, which define its curves;
     without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
-    methods. limits: of each field, 5 seconds by default. curvature, view: those with which the sketch was
+    methods. limits: of each field, 5 seconds by default. curvature, view: as given when the sketch was
     read. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
     Raises InputError for unknown methods, and when no curve can be hidden.
     """
@@ -125,7 +125,7 @@ def evaluate(
     hidden = hidden_curves(instance, curves_of(instance, sketch, choice), curves)
     if not hidden:
         raise InputError(
-            f"{instance.name} has no curve of {SHORTEST} pixels or more beside others that could be hidden; "
+            f"{instance.name} has no curve of {SHORTEST} pixels or more besides others that could be hidden; "
             "choose a larger size, or a drawing of more curves"
         )
     done, interrupted = _in_turn(hidden, methods, limits, progress)
@@ -135,16 +135,16 @@ def evaluate(
 def _in_turn(
     hidden: list[HiddenCurve], methods: tuple[str, ...], limits: Limits, progress: Progress
 ) -> tuple[list[CurveDeviation], bool]:
-    """What the methods make of one curve after the other; whether Ctrl-C ended that."""
+    """Deviations of the methods for one curve after the other, and whether Ctrl-C ended them."""
     done: list[CurveDeviation] = []
     try:
         with interruptible() as interrupted, TemporaryDirectory(prefix="crossfield-") as folder:
             for number, curve in enumerate(hidden, start=1):
 
-                def tell(line: str, at: int = number) -> None:
+                def report(line: str, at: int = number) -> None:
                     progress(f"curve {at} of {len(hidden)}: {line}")
 
-                request = Request(curve.rest, Path(folder), limits, progress=tell)
+                request = Request(curve.rest, Path(folder), limits, progress=report)
                 done.append(_measured(curve, methods, request, interrupted))
     except KeyboardInterrupt:
         if not done:
@@ -156,7 +156,7 @@ def _in_turn(
 def _measured(
     curve: HiddenCurve, methods: tuple[str, ...], request: Request, interrupted: Callable[[], bool]
 ) -> CurveDeviation:
-    """The methods' angles to a curve. KeyboardInterrupt after Ctrl-C: half a curve compares nothing."""
+    """The methods' angles to a curve. Raises KeyboardInterrupt after Ctrl-C: half a curve has no use."""
     found = CurveDeviation(curve.number, len(curve.stroke), {}, {})
     for method in methods:
         try:

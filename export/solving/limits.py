@@ -12,7 +12,7 @@ from ...models.processes.deadline import Deadline
 from ...models.processes.side_by_side import checked
 
 LEAST: Final = 0.01
-"""Seconds of a solve for which no time is left: its starting point still comes back."""
+"""Seconds of a solve without time left: it still returns its starting point."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""Solving with any program of the table that is installed: one way for all of them.
+"""Solving with any installed program of the table: one way for all of them.
 
-The problem is written to a file, the program solves that file in a child process and writes a solution file,
-and the solution is read back like one that somebody else made. So a solve tests the files too.
+The problem is written to a file. The program solves that file in a child process and writes a solution file,
+which is read like any external solution file. So a solve tests the files too.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Deadline
 from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
-from ..bundle.manifest import is_recordable, leave_manifest
+from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
 from ..programs.calls import call
@@ -47,7 +47,7 @@ FEASIBLE: Final = 1e-6
 """Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
 VERSION_SECONDS: Final = 60.0
 """Seconds in which a program has to report its version."""
-_LATE: Final = "left no answer within its time; give it more, or a start"
+_LATE: Final = "returned no answer within its time; give it more, or a start"
 _NO_BETTER: Final = "nothing better than the start"
 
 
@@ -59,10 +59,10 @@ def solve(
     limits: Limits | None = None,
     start: CrossField | None = None,
 ) -> Solution:
-    """Solve a problem with a solver that is installed, within the time limit, and check the answer.
+    """Solve a problem with an installed solver, within the time limit, and check the answer.
 
-    solver: a name of the table of solvers; None: HiGHS, Ipopt or Bonmin, by the problem's class. folder:
-    where the written file, log and solution stay, with the manifest that reads the solution back; None: they
+    solver: a name in the table of solvers; None: HiGHS, Ipopt or Bonmin, by the problem's class. folder:
+    keeps the written file, log and solution, with the manifest that reads the solution; None: they
     are deleted. start: a field whose complete point is the incumbent or starting point. Ctrl-C ends the
     solver and returns its best point so far.
 
@@ -77,22 +77,22 @@ def solve(
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
     """Return the solver of that name, or the preferred one of those that come with crossfield.
 
-    One whose format holds a weaker relaxation of the problem comes after the others. Raises InputError for an
-    unknown name, UnsupportedBySolverError when the solver does not take the problem, MissingSolverError when
-    its program is not installed.
+    A solver whose format holds a weaker relaxation of the problem comes after the others. Raises InputError
+    for an unknown name, UnsupportedBySolverError when the solver does not take the problem,
+    MissingSolverError when its program is not installed.
     """
     if name is not None and name not in SOLVERS:
         raise InputError(f"there is no solver {name!r}; choose one of {', '.join(SOLVERS)}")
-    asked = (
+    candidates = (
         [SOLVERS[name]] if name else [s for s in BUNDLED.values() if problem.problem_class not in s.not_for]
     )
-    taking = {solver.name: format_for(problem, solver.name) for solver in asked}
-    willing = [solver for solver in asked if taking[solver.name].answer == "yes"]
+    taking = {solver.name: format_for(problem, solver.name) for solver in candidates}
+    willing = [solver for solver in candidates if taking[solver.name].answer == "yes"]
     if not willing:
         reasons = ", ".join(f"{solver} ({found.reason})" for solver, found in taking.items())
         raise UnsupportedBySolverError(
             f"{problem.name} is {_described(problem)}, which is not for {reasons}; "
-            "`crossfield list` shows which solver takes what; or relax it"
+            "`crossfield list` shows the problems that each solver takes; or relax it"
         )
     present = [solver for solver in willing if not solver.missing]
     if not present:
@@ -102,7 +102,7 @@ def solver_for(problem: Problem, name: str | None = None) -> Solver:
 
 
 def format_for(problem: Problem, solver: str) -> Taking:
-    """Return the format in which a solver gets a problem here, or why it does not take the problem.
+    """Return the format in which a solver gets a problem, or the reason why it does not take the problem.
 
     An answer without proof is accepted only from a solver that never proves anything.
     """
@@ -129,7 +129,7 @@ class Files(NamedTuple):
     start: Path
 
     @classmethod
-    def beside(cls, model: Path, solver: str) -> Self:
+    def for_model(cls, model: Path, solver: str) -> Self:
         """Return the files of a solve in the folder of the model."""
         start = STARTS[solver].suffix if solver in STARTS else ""
         suffixes = (f".{solver}{SOLVERS[solver].answers}", f".{solver}.log", f".{solver}.start{start}")
@@ -137,19 +137,19 @@ class Files(NamedTuple):
 
 
 class Solvers:
-    """Solvers at work: a child process for each program, started when it is first needed.
+    """Running solvers: a child process for each program, started at its first use.
 
     A context that ends the processes. For many solves it saves the time to start a process for each.
     """
 
     def __init__(self) -> None:
-        """Start nothing yet."""
+        """Prepare without starting a process."""
         self._stack = ExitStack()
         self._children: dict[str, Child] = {}
         self._versions: dict[str, str] = {}
 
     def __enter__(self) -> Self:
-        """Make the folder in which programs keep files of their own."""
+        """Create the folder for the programs' own files."""
         self._folder = Path(self._stack.enter_context(_folder()))
         return self
 
@@ -165,7 +165,7 @@ class Solvers:
         return self._children[program]
 
     def version(self, solver: str) -> str:
-        """Return the version of a solver, or that of the package that contains it, with its name.
+        """Return the version of a solver, or of the package that contains it, with its name.
 
         Raises SolverError when the program does not report it.
         """
@@ -183,12 +183,12 @@ class Solvers:
         return self.program_version(program.name)
 
     def ask(self, program: str, step: str, *arguments: Any, seconds: float) -> Any:
-        """Return the result of a step (see protocol.py) of a program. Raises what it raises."""
+        """Run a step (see protocol.py) of a program and return its result. Raises its errors."""
         log, deadline = self._folder / f"{program}.log", Deadline.after(seconds)
         return self.child(program).call(call, program, step, *arguments, deadline=deadline, log=log).value
 
     def program_version(self, program: str) -> str:
-        """Return what a program reports as its version. Raises SolverError."""
+        """Return the version that a program reports. Raises SolverError."""
         try:
             return str(self.ask(program, "version", seconds=VERSION_SECONDS))
         except (WorkerError, RefusedError, FailedError) as error:
@@ -209,10 +209,10 @@ class Solvers:
         with _folder(folder) as place:
             taking = format_for(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
-            files = Files.beside(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
+            files = Files.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
             written = write(problem, files.model, start=start)
             if folder is not None and is_recordable(problem):
-                leave_manifest(problem, written, place)
+                write_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.
             search = deadline.later(deadline.left() - limits.seconds)
             return self.solve_file(written.problem, solver, files, limits, search, start=start)
@@ -230,8 +230,9 @@ class Solvers:
     ) -> Solution:
         """Solve a model file that was written for a solver, and read the answer.
 
-        held: the problem as the file holds it. deadline: when a solver that does not end by itself is asked
-        to; `limits` hold for the search. precise: whether tolerances are as tight as the solver takes them.
+        held: the problem as the file holds it. deadline: time of the request to stop, for a solver that does
+        not end by itself; `limits` hold for the search. precise: whether tolerances are as tight as the
+        solver allows.
         """
         entry = SOLVERS[solver]
         for stale in (files.solution, files.log, files.start):
@@ -283,7 +284,7 @@ class Solvers:
 
 @contextmanager
 def _folder(given: str | Path | None = None) -> Iterator[Path]:
-    """The folder that was given, or one that is deleted afterwards."""
+    """The given folder, or one that is deleted afterwards."""
     if given is not None:
         yield make_folder(given).resolve()
         return
@@ -292,7 +293,7 @@ def _folder(given: str | Path | None = None) -> Iterator[Path]:
 
 
 def _start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:
-    """Write the starting point for a solver that takes one beside the model; None for the others.
+    """Write the starting point for a solver that takes it as a separate file; None for the others.
 
     Files of .nl and GAMS hold the point themselves.
     """
@@ -319,7 +320,7 @@ def _start_as_answer(
 
 
 def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Solution:
-    """Read the solution file; what the solver reported besides outweighs what the file states."""
+    """Read the solution file; other reports of the solver override the file."""
     if not files.solution.exists():
         status = outcome.status or Status.NO_POINT
         return Solution(
@@ -328,7 +329,7 @@ def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Sol
     try:
         found = read_solution(files.solution, held)
     except SolutionError:
-        files.solution.unlink(missing_ok=True)  # cut off, by a full disk for instance: it must not be used
+        files.solution.unlink(missing_ok=True)  # cut off, for example by a full disk: it must not be used
         raise
     reported: dict[str, Any] = {
         "claimed": outcome.status, "message": outcome.message, "bound": outcome.bound, "nodes": outcome.nodes
@@ -337,7 +338,7 @@ def _answer(held: Problem, files: Files, outcome: Outcome, entry: Solver) -> Sol
 
 
 def _is_start(point: Floats | None, start: Floats | None) -> bool | None:
-    """Whether the answer is the start but for rounding; None without the one or the other."""
+    """Whether the answer is the start up to rounding; None without either of them."""
     if point is None or start is None:
         return None
     return bool(np.abs(point - start).max(initial=0.0) <= FEASIBLE)

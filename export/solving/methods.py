@@ -1,4 +1,4 @@
-"""The ways to a field: one table for `crossfield solve --method`, `crossfield run` and the docs."""
+"""The table of methods for fields, for `crossfield solve --method`, `crossfield run` and the docs."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from .two_stage import find_jumps, fit_angles, jumps_until
 if TYPE_CHECKING:
     from ...models.proof.record import Proof
 
-_STARTING: Final = 0.5  # share of the seconds that the field may take from which solvers start
+_STARTING: Final = 0.5  # share of the seconds for the field from which solvers start
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A field and how it was found: method, seconds, counts, and the solution where a solver gave it.
+    """A field and how it was found: method, seconds, counts, and the solution if a solver returned it.
 
-    proof: what the method has proven of the field, if it proves anything.
+    proof: the method's proof about the field, if it proves anything.
     """
 
     method: str
@@ -50,7 +50,7 @@ class Candidate:
     proof: Proof | None = None
 
     def facts(self) -> dict[str, Any]:
-        """What a report says of it: the facts of its field, seconds, claims beside values."""
+        """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""
         facts: dict[str, Any] = {
             "method": self.method,
             **field_facts(self.field),
@@ -62,7 +62,7 @@ class Candidate:
 
 
 def field_facts(field: CrossField) -> dict[str, Any]:
-    """What is told of a field wherever one comes out: energies, singularities, skew, and its shape."""
+    """Facts about a field in every report: energies, singularities, skew, and its shape."""
     shape = field.shape
     return {
         "energy_2_norm": field.energy(2).total,
@@ -78,7 +78,7 @@ def field_facts(field: CrossField) -> dict[str, Any]:
 
 
 def solution_facts(solution: Solution) -> dict[str, Any]:
-    """What a solution file claims, beside what was recomputed from the instance."""
+    """Claims of a solution file, with the values recomputed from the instance."""
     violation = solution.violation
     facts = {
         "formulation": solution.problem.name,
@@ -103,15 +103,15 @@ def solution_facts(solution: Solution) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """The value; None for an infinity, which JSON has not."""
+    """The value; None for an infinity, which JSON cannot hold."""
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What a method is asked: instance, folder for files of solvers, limits of the whole, and options.
+    """Input of a method: instance, folder for files of solvers, limits of the whole, and options.
 
-    start: a field to go on from, for methods that start from one; None: their own, the greedy field. clock:
+    start: a field for methods that start from one; None: their own, the greedy field. clock:
     measures the time limit.
     """
 
@@ -134,9 +134,9 @@ class Request:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to a field. find: the fields it comes to, one by one, for a later one may fail.
+    """A way to a field. find: the fields that it finds, one by one, because a later one may fail.
 
-    The last one is its answer. timed: whether it goes on up to the time limit, or ends when it is done.
+    The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done.
     """
 
     name: str
@@ -185,13 +185,13 @@ def _search(request: Request) -> Iterator[Candidate]:
         seconds=deadline,
         jobs=_processes(request),
         start=request.start,
-        progress=_teller(request, deadline, "search", "rounds"),
+        progress=_progress_line(request, deadline, "search", "rounds"),
     )
     yield _searched("search", found, begin, rounds=found.rounds)
 
 
 def _searched(method: str, found: Search, begin: float, **counts: int) -> Candidate:
-    """What a search came to that began at a time of the performance counter."""
+    """The candidate from a search that began at a time of the performance counter."""
     seconds, interrupted = time.perf_counter() - begin, found.ended == "interrupted"
     return Candidate(method, found.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
 
@@ -200,24 +200,26 @@ def _processes(request: Request) -> int:
     return request.limits.threads or cores()
 
 
-def _teller(request: Request, deadline: Deadline, method: str, things: str) -> Callable[[int, float], None]:
-    """What tells how far a search is: how many of the things it counts, the energy, and the time left."""
+def _progress_line(
+    request: Request, deadline: Deadline, method: str, things: str
+) -> Callable[[int, float], None]:
+    """A progress callback of a search: its count of things, the energy, and the time left."""
 
-    def tell(count: int, energy: float) -> None:
+    def report(count: int, energy: float) -> None:
         request.progress(
             f"{method}: energy {energy:.5g} after {count} {things}, at most {deadline.left():.0f} s more; "
             "Ctrl-C keeps the best field so far"
         )
 
-    return tell
+    return report
 
 
 def _prove(request: Request) -> Iterator[Candidate]:
     begin, deadline = time.perf_counter(), request.deadline()
-    from ...models.proof.prove import prove  # it loads what is compiled
+    from ...models.proof.prove import prove  # it loads compiled functions
 
     if not is_compiled():
-        request.progress("prove: compiling what proofs need, once on this machine")
+        request.progress("prove: compiling the functions of proofs, once on this machine")
         compile_proofs(request.folder, deadline)
     request.progress("prove: starting fields")
     proof = prove(
@@ -247,7 +249,7 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
     milp = find_jumps(request.instance, request.folder, limits=limits, start=start, **request.options)
     yield _of("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
-    if deadline.left() <= files:  # those of the second stage take about as long
+    if deadline.left() <= files:  # the files of the second stage take about as long
         return
     request.progress("Ipopt: angles for the jumps of the MILP")
     yield _of("two-stage", fit_angles(milp.field, request.folder, limits=request.limits.until(deadline)))

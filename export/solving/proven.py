@@ -1,4 +1,4 @@
-"""What is proven of the fields of a run: a bound of the problem, with the certificate that holds it."""
+"""Proven bounds for the fields of a run, with the certificate that holds them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 NOTHING: Final = "nothing was proven within the time limit: the bound is 0, and there is no certificate"
 """Statement of a proof without a result."""
 
-_CHECKING: Final = 0.9  # share of the time for a certificate; in the rest it is packed
+_CHECKING: Final = 0.9  # share of the time for a certificate; packing takes the rest
 
 
 @dataclass(frozen=True)
 class Proven:
-    """That no field of the instance has a 2-norm energy below `bound`, as the file `certificate` shows."""
+    """The claim that no field has a 2-norm energy below `bound`, with its proof in the file `certificate`."""
 
     bound: float
     certificate: Path
 
     @classmethod
     def by(cls, proof: Proof | None, path: Path, deadline: Deadline) -> Proven | None:
-        """Return what a proof proves, with its certificate at `path`; None if that is nothing.
+        """Return the claim of a proof, with its certificate at `path`; None if it proves nothing.
 
         Errors are those of `certified`.
         """
@@ -36,13 +36,13 @@ class Proven:
         return None if found is None else cls(found.bound, path)
 
     def facts(self, energy: float) -> dict[str, Any]:
-        """Bound, relative gap, and whether it is none, of a field with that 2-norm energy."""
+        """Bound and relative gap of a field with that 2-norm energy, and whether the gap is zero."""
         optimal = energy - self.bound <= EXACT * (1 + energy)
         gap = 0.0 if optimal else (energy - self.bound) / energy
         return {"bound_2_norm": self.bound, "gap_2_norm": gap, "proven_optimal": optimal}
 
     def document(self, energy: float) -> dict[str, Any]:
-        """The same of the best field, with the status and the certificate's name, for a report."""
+        """The facts of the best field, with the status and the certificate's name, for a report."""
         facts = self.facts(energy)
         status = "optimal" if facts.pop("proven_optimal") else "gap"
         return {"status": status, **facts, "certificate": self.certificate.name}
@@ -52,8 +52,8 @@ def certified(proof: Proof | None, path: Path, deadline: Deadline, stop: Over = 
     """Write the certificate of a proof to `path`, if it proves something.
 
     With little time the certificate proves less. If nothing is proven or no time is left, there is none, and
-    a file of an earlier call is removed. stop: whether the user asks to end. Raises InputError for a proof
-    that the checker refuses, and OutputError when the file cannot be written.
+    a file of an earlier call is removed. stop: returns whether the user requests the end. Raises InputError
+    for a proof that the checker refuses, and OutputError when the file cannot be written.
     """
     path.unlink(missing_ok=True)
     if proof is None or proof.norm != 2 or not proof.levels:

@@ -1,4 +1,4 @@
-"""Everything at once: an instance, its files, every field that can be had here, pictures, a report."""
+"""The whole pipeline: an instance, its files, fields by all methods that can run here, pictures, a report."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
 """The field over its drawing: layers in the drawing's coordinates, and the same as a picture."""
 LONGEST_LIFT: Final = 10.0
-"""Seconds after which the surface is what it has become; grids up to 64 pixels take a few."""
+"""Seconds after which the surface's present heights are kept; grids up to 64 pixels take a few."""
 REPORT: Final = "report.json"
 MASK: Final = "mask.png"
 KEPT: Final = "bend"
-"""The field that is kept; docs/fields.md has the measurements."""
+"""The method whose field is kept; docs/fields.md has the measurements."""
 LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
-"""What the field is called that the methods of a run start from: `first_field`, or the one given."""
+"""Name of the field from which the methods of a run start: `first_field`, or the given one."""
 
 
 def facts_with_energies(solution: Solution) -> dict[str, Any]:
-    """The facts of a solution and, where it has a point, those of its field."""
+    """The facts of a solution, with the facts of its field if it has a point."""
     facts = solution_facts(solution)
     if solution.point is None:
         return facts
@@ -56,12 +56,12 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a run found. candidates: every field, the lowest 2-norm energy first.
+    """Results of a run. candidates: every field, the lowest 2-norm energy first.
 
     Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate`,
-    `drawing` or `surface`, that Ctrl-C ended, and the run with it; empty when none did. proven: a bound of
-    the 2-norm energy of all fields, None where there is none. stages: the seconds of each stage, in turn.
-    surface: over the kept field, None where it was not come to.
+    `drawing` or `surface` that Ctrl-C ended, and the run with it; empty without an interrupt. proven: a bound
+    of the 2-norm energy of all fields, None without one. stages: the seconds of each stage, in turn. surface:
+    over the kept field, None if the run stopped earlier.
     """
 
     instance: Instance
@@ -80,16 +80,16 @@ class Report:
 
     @property
     def kept(self) -> Candidate:
-        """The field that is kept and drawn: the bend field, or the best one where there is none."""
+        """The field that is kept and drawn: the bend field, or the best one without it."""
         return next((each for each in self.candidates if each.method == KEPT), self.best)
 
     @property
     def shaded(self) -> bool:
-        """Whether the surface can be trusted, and so is drawn."""
+        """Whether the surface can be trusted, and is therefore drawn."""
         return self.surface is not None and not self.surface.doubts
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
-        """What the report says of a field: its own facts, and the bound and the gap where they are proven."""
+        """Facts of a field in the report: its own, and bound and gap if they are proven."""
         facts = candidate.facts()
         return facts if self.proven is None else facts | self.proven.facts(facts["energy_2_norm"])
 
@@ -101,7 +101,7 @@ class Report:
 
     @property
     def seconds(self) -> float:
-        """All seconds of the run until its report was written: those of the stages together."""
+        """All seconds of the run until its report was written: the sum of the stages."""
         return round(sum(self.stages.values()), 3)
 
     def document(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class Report:
 
 
 def plan(limits: Limits) -> str:
-    """How long the searches of a run may take in all, and each."""
+    """A sentence on the time limit of a run's searches, in all and each."""
     timed = [method.name for method in METHODS.values() if method.timed]
     each = ", ".join(f"{name} {limits.seconds:g}" for name in timed)
     return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures on top"
@@ -164,27 +164,27 @@ def run(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Report:
-    """The report of a run.
+    """Run all methods on an instance, write files and pictures, and return the report.
 
     The folder then holds instance, solver files, fields, pictures and report.json. The field that is kept is
-    the bend field: it is nearer to curves that were hidden from it than fields of less energy
+    the bend field: its error on hidden curves is smaller than that of fields of less energy
     (docs/fields.md).
         DIR/models     every formulation in every format, starting points, manifests, the instance
-        DIR/solve      what the local solvers read and left
+        DIR/solve      files read and written by the local solvers
         DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
         DIR/overview.png, ... pictures of it; overlay.svg, .png: over the drawing
-        DIR/shaded.png the surface over it, where that can be trusted; report.json says why not
+        DIR/shaded.png the surface over it, if it can be trusted; report.json states the reason if not
         DIR/lowest.npz the field of least 2-norm energy
-        DIR/mask.png   what is solved for, as read_sketch takes it; not for an instance that came from a file
-        DIR/certificate.npz   of the bound that is proven, with the field of the method `prove`
-        DIR/report.json   written last: where it is, the run is complete, or says what interrupted it
+        DIR/mask.png   the solved region, as read_sketch takes it; not for an instance from a file
+        DIR/certificate.npz   of the proven bound, with the field of the method `prove`
+        DIR/report.json   written last: if it exists, the run is complete, or it states what interrupted it
 
     options: as for `formulate`; dialects, jobs: as for `write_all`. drawing: file or sample that the instance
-    was read from, read first. limits: for each method that searches; `progress` is first told what that makes
-    in all. A method that fails is noted in the report; the fields that were found stand. Ctrl-C ends the
+    was read from, read first. limits: for each method that searches; `progress` first receives the total.
+    A method that fails is recorded in the report; the other fields stay. Ctrl-C ends the
     present method with its best field and the run with it: no further method is tried and nothing drawn.
-    Before the solver files are there it goes on as KeyboardInterrupt. Raises OutputError, and InputError for
-    a drawing that is unreadable or lies elsewhere.
+    Before the solver files exist it is raised as KeyboardInterrupt. Raises OutputError, and InputError for
+    a drawing that is unreadable or does not match the instance.
     """
     below = None if drawing is None else read_drawing(drawing, on=instance)
     folder, limits = make_folder(folder), limits or Limits()
@@ -206,7 +206,7 @@ def run(
         )
         watch.lap("models")
         request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
-        found = _tried_in_turn(request, start, watch)
+        found = _all_methods(request, start, watch)
     proven = _certified(found, folder / CERTIFICATE, limits, progress)
     watch.lap("certificate")
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
@@ -228,7 +228,7 @@ def run(
 
 
 def _clear(folder: Path) -> None:
-    """Take away what an earlier run has left that this one may not come to."""
+    """Remove files of an earlier run that this run may not write."""
     for stale in (REPORT, CERTIFICATE, MASK, LOWEST, SHADED, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
@@ -243,12 +243,12 @@ class _Found:
 
     @property
     def ranked(self) -> tuple[Candidate, ...]:
-        """The lowest 2-norm energy first; of those equal but for rounding the one that was found first."""
+        """The fields by 2-norm energy, lowest first; of those equal up to rounding, the first found."""
         return tuple(sorted(self.candidates, key=lambda each: float(f"{each.field.energy(2).total:.9g}")))
 
 
-def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
-    """The start, and what the methods of a run find in turn, until one of them is interrupted."""
+def _all_methods(request: Request, start: CrossField, watch: Stopwatch) -> _Found:
+    """The start, and the fields that the methods of a run find in turn, until one is interrupted."""
     found = _Found([Candidate(START, start, watch.stages[START])])
     for method in METHODS.values():
         try:
@@ -266,9 +266,9 @@ def _tried_in_turn(request: Request, start: CrossField, watch: Stopwatch) -> _Fo
 
 
 def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) -> Proven | None:
-    """What is proven, with its certificate at the path; a refusal or Ctrl-C is noted.
+    """The proven bound, with its certificate at the path; a refusal or Ctrl-C is recorded.
 
-    It has the time that its method has left of its own.
+    It takes the time that its method has left.
     """
     by = next((each for each in found.candidates if each.proof is not None), None)
     if by is None:
@@ -284,7 +284,7 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
 
 
 def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress) -> Report:
-    """The report, its pictures drawn, or marked where Ctrl-C ended that."""
+    """The report, with its pictures drawn, or marked if Ctrl-C ended that."""
     from ..pictures.draw import LAYERS, draw
 
     try:
@@ -301,7 +301,7 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
 
 
 def _shaded(report: Report, folder: Path, progress: Progress) -> Report:
-    """The report with the surface over its field, which is drawn if nothing speaks against it."""
+    """The report with the surface over its field, which is drawn if there are no doubts."""
     over = Deadline.after(LONGEST_LIFT).passed
     try:
         progress("surface over the kept field")

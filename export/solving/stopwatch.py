@@ -1,4 +1,4 @@
-"""Where the time of a run goes: seconds by stage, of which none is lost."""
+"""Seconds of a run by stage, complete up to rounding."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...models.processes.deadline import Clock
 
 @dataclass
 class Stopwatch:
-    """The seconds of one stage after the other, to 3 decimals: together all the time until the last lap."""
+    """The seconds of consecutive stages, to 3 decimals: their sum is the whole time until the last lap."""
 
     clock: Clock = time.perf_counter
     stages: dict[str, float] = field(default_factory=dict)
@@ -20,6 +20,6 @@ class Stopwatch:
         self._begin = self.clock()
 
     def lap(self, stage: str) -> None:
-        """End a stage and begin the next one; what rounding leaves goes to the next one too."""
+        """End a stage and begin the next one; the rounding error goes to the next one too."""
         passed = self.clock() - self._begin - sum(self.stages.values())
         self.stages[stage] = round(self.stages.get(stage, 0.0) + max(passed, 0.0), 3)

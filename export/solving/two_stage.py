@@ -17,14 +17,14 @@ from .limits import Limits
 from .local import solve
 
 _ANGLES: Final = 0.2
-"""Share of the time that the second stage keeps, and least seconds: its process has to start."""
+"""Share of the time, and least seconds, reserved for the second stage: its process has to start."""
 _ANGLES_LEAST: Final = 2.0
-_STARTING: Final = 0.5  # share of the time of the first stage that its start may take
+_STARTING: Final = 0.5  # share of the time of the first stage for its start
 
 
 @dataclass(frozen=True, eq=False)
 class TwoStage:
-    """Both solutions; `field` is that of the second stage, or of the first where the second left no point."""
+    """Both solutions; `field` comes from the second stage, or from the first if the second has no point."""
 
     milp: Solution
     qp: Solution
@@ -38,10 +38,10 @@ class TwoStage:
 def fit_angles(
     field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None
 ) -> Solution:
-    """The solution of `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage.
+    """Solve `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage.
 
-    It is the field of least 2-norm energy for these jumps within the windows (section 5 of the paper; a
-    convex QP). folder, limits and errors: as for `solve`.
+    The result is the field of least 2-norm energy for these jumps within the windows (section 5 of the paper;
+    a convex QP). folder, limits and errors: as for `solve`.
     """
     return solve(
         formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field
@@ -56,10 +56,11 @@ def find_jumps(
     start: CrossField | None = None,
     **options: Any,
 ) -> Solution:
-    """The solution of `milp-mccormick` by HiGHS: the first stage.
+    """Solve `milp-mccormick` by HiGHS: the first stage.
 
-    start: the incumbent handed to HiGHS, the first field when None: cold, HiGHS is lost beyond 10 x
-    10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
+    start: the incumbent passed to HiGHS, the first field when None: without a start HiGHS finds no good field
+    beyond 10 x 10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError,
+    SolutionError.
     """
     limits = limits or Limits()
     deadline = Deadline.after(limits.seconds)
@@ -77,11 +78,11 @@ def two_stage(
     start: CrossField | None = None,
     **options: Any,
 ) -> TwoStage:
-    """The solutions of `milp-mccormick` by HiGHS and, its jumps fixed, of `qp-fixed` by Ipopt.
+    """Solve `milp-mccormick` by HiGHS and, with its jumps fixed, `qp-fixed` by Ipopt.
 
-    `.milp` and `.qp` are the two, `.field` the one with the jumps of the first and the angles of the second
-    (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the first field
-    when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
+    The result's `.milp` and `.qp` are the two solutions, `.field` has the jumps of the first and the angles
+    of the second (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the first
+    field when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
     MissingSolverError, SolverError, SolutionError.
     """
     limits = limits or Limits()
@@ -91,6 +92,6 @@ def two_stage(
 
 
 def jumps_until(deadline: Deadline) -> Deadline:
-    """When the first stage has to end: a fifth or 2 s before the deadline, but not sooner than half way."""
+    """Deadline of the first stage: a fifth or 2 s before the whole deadline, but not before half the time."""
     left = deadline.left()
     return deadline.later(-min(max(_ANGLES * left, _ANGLES_LEAST), left / 2))

@@ -1,1 +1,1 @@
-"""The files that a surface leaves."""
+"""Files of a surface."""

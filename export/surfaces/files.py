@@ -40,9 +40,9 @@ FILES: Final = {
     MESH: "mesh with texture coordinates and normals",
     MATERIALS: "its material",
     DRAWING: "the strokes on paper, its texture",
-    REPORT: "what can be said of it",
+    REPORT: "facts, doubts and freedom",
 }
-"""The files of a surface, and what each holds."""
+"""The files of a surface, and the content of each."""
 
 
 def write_surface(
@@ -54,14 +54,14 @@ def write_surface(
     scale: int | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """The folder, which now holds all of FILES: pictures, heights, a mesh and a report.
+    """Write all of FILES to a folder, pictures, heights, a mesh and a report, and return the folder.
 
-    Same surface, same bytes.
+    Equal surfaces give equal bytes.
     drawing: file or sample that the instance was read from, for the strokes; None: pieces of line at the
-    stroke pixels. scale: pixels of a picture a pixel of the grid; None: one in the normal map, and in the
+    stroke pixels. scale: pixels of a picture per pixel of the grid; None: one in the normal map, and in the
     others as many as make about 1000 on the longer side. about: facts for the report on how the surface was
-    made. Every file stands whole or not at all; the report is written last. Raises InputError for a drawing
-    that is unreadable or lies elsewhere and a scale that cannot be, and OutputError.
+    made. Every file is complete or absent; the report is written last. Raises InputError for a drawing
+    that is unreadable or does not match the instance and for a scale out of range, and OutputError.
     """
     if drawing is not None and not isinstance(drawing, Drawing):
         drawing = read_drawing(drawing, on=surface.instance)
@@ -83,12 +83,12 @@ def write_surface(
 
 
 def write_shaded(surface: Surface, path: str | Path) -> Path:
-    """The path of the PNG that now shows the surface in the light of a lamp. Raises OutputError."""
+    """Write a PNG of the surface in the light of a lamp, and return its path. Raises OutputError."""
     return write_bytes(path, png_of(eight_bit(lit(raster(surface.instance, surface.normals)))))
 
 
 def png_of(picture: NDArray[np.uint8]) -> bytes:
-    """A picture (h, w, 3 or 4) of red, green, blue and, if it has one, opacity as PNG."""
+    """A picture (h, w, 3 or 4) of red, green, blue and optional opacity as PNG."""
     from PIL import Image
 
     stream = io.BytesIO()

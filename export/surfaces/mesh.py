@@ -1,8 +1,8 @@
 """A surface as a mesh (.obj): a quad for each pixel, with texture coordinates and normals.
 
 x runs to the right, y up, z towards the viewer, all in pixels; the lower left corner of the grid is at
-x = y = 0. Texture coordinates cover the grid, so that any picture of the grid lies on the mesh where it was
-drawn. Pixels that meet in a corner only have a vertex each there.
+x = y = 0. Texture coordinates cover the grid, so any picture of the grid fits the mesh. Pixels that meet only
+in a corner each have their own vertex there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _WALK: Final = [2, 3, 1, 0]
 
 
 def to_obj(surface: Surface, materials: str) -> bytes:
-    """The mesh as text. materials: name of the .mtl file beside it that has the one material."""
+    """The mesh as text. materials: name of the .mtl file in its folder, which has the one material."""
     instance = surface.instance
     places, corners = vertices_of(instance.grid)
     height, width = instance.mask.shape
@@ -43,12 +43,12 @@ def to_obj(surface: Surface, materials: str) -> bytes:
 
 
 def to_mtl(texture: str) -> bytes:
-    """The material as text: dull, with a picture beside it as its colour."""
+    """The material as text: dull, with a picture in the same folder as its colour."""
     return (f"newmtl {MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {texture}\n").encode()
 
 
 def vertex_normals(surface: Surface, corners: Ints, count: int) -> Floats:
-    """Unit normals (count, 3) at the vertices: the mean of those of the pixels round each.
+    """Unit normals (count, 3) at the vertices: the mean of the normals of the pixels round each.
 
     corners: the vertex at each corner of each pixel, (n, 4).
     """

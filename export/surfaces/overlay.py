@@ -17,9 +17,9 @@ PAPER: Final = (0.93, 0.91, 0.88)
 
 
 def strokes(instance: Instance, drawing: Drawing | None, scale: int) -> Floats:
-    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes, `scale` pixels a pixel of the grid.
+    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes, `scale` pixels per pixel of the grid.
 
-    They are those of the drawing, or pieces of line at the stroke pixels where there is none.
+    They come from the drawing, or are pieces of line at the stroke pixels without one.
     """
     height, width = (side * scale for side in instance.mask.shape)
     with own_settings():
@@ -28,7 +28,7 @@ def strokes(instance: Instance, drawing: Drawing | None, scale: int) -> Floats:
 
 
 def over(above: Floats, below: Floats) -> Floats:
-    """One picture (h, w, 4) laid over another, both with opacity as fourth."""
+    """One picture (h, w, 4) laid over another, both with opacity as fourth value."""
     front, back = above[..., 3:], below[..., 3:] * (1 - above[..., 3:])
     opacity = front + back
     colour = (front * above[..., :3] + back * below[..., :3]) / np.maximum(opacity, 1e-9)
@@ -36,5 +36,5 @@ def over(above: Floats, below: Floats) -> Floats:
 
 
 def on_paper(drawn: Floats) -> Floats:
-    """Red, green and blue (h, w, 3) of the strokes on paper, as what a mesh is covered with."""
+    """Red, green and blue (h, w, 3) of the strokes on paper, as the texture of a mesh."""
     return over(drawn, np.broadcast_to((*PAPER, 1.0), drawn.shape))[..., :3]

@@ -1,4 +1,4 @@
-"""What is said of a surface: how well it fits its crosses, why it may be wrong, and what stays open."""
+"""Report of a surface: its fit to the crosses, its doubts, and what they do not determine."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -
 
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
-    """Whether a surface can be trusted, why not, and what stays open; pixels and degrees."""
+    """Whether a surface can be trusted, doubts, and freedom; in pixels and degrees."""
     off = np.degrees(off_right_angles(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     return {
@@ -53,5 +53,5 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> float:
-    """A number to four digits behind the point, so that files are short."""
+    """A number to four decimals, so that files are short."""
     return round(float(value), 4)

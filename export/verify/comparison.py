@@ -1,4 +1,4 @@
-"""What a model file means to a program, compared with the problem: in its algebra, or at points."""
+"""Comparison of the model that a program reads with the problem: in its algebra, or at points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..writing.names import ONE, column_names, row_names
 from ..writing.terms import terms
 
 VALUES: Final = 1e-9
-"""Relative difference up to which values at a point agree: sums are taken in another order."""
+"""Relative difference up to which values at a point agree: sums may have another order."""
 
 
 def names_of(matrix: np.ndarray[Any, Any]) -> list[str]:
@@ -29,7 +29,7 @@ def names_of_rows(problem: Problem) -> list[str]:
 
 
 def of_problem(problem: Problem) -> Meaning:
-    """What an LP or MPS file of the problem should mean, from its arrays: ONE is the last column."""
+    """The intended content of an LP or MPS file of the problem, from its arrays: ONE is the last column."""
     form = Canonical(problem)
     one = [ONE.decode()] * form.has_one
     n, ones = problem.columns, np.ones(len(one))
@@ -75,7 +75,7 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
 
 
 def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
-    """What first differs between the algebra of a file and the problem; empty when nothing does.
+    """First difference between the algebra of a file and the problem; empty without one.
 
     tolerance: relative difference of numbers, 0 for equal to the bit. points: (k, columns), where values are
     compared as well.
@@ -133,8 +133,8 @@ def _close(found: Any, expected: Any, tolerance: float) -> Bools:
 
 
 def _value_difference(what: str, found: Floats, expected: Floats, accuracy: float) -> str:
-    told = ~np.isnan(found)
-    wrong = told & ~np.isclose(found, expected, rtol=accuracy, atol=accuracy)
+    reported = ~np.isnan(found)
+    wrong = reported & ~np.isclose(found, expected, rtol=accuracy, atol=accuracy)
     if not wrong.any():
         return ""
     place = tuple(np.argwhere(wrong)[0])
@@ -142,7 +142,7 @@ def _value_difference(what: str, found: Floats, expected: Floats, accuracy: floa
 
 
 def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -> str:
-    """What first differs between the behaviour of a file and the problem; empty when nothing does."""
+    """First difference between the behaviour of a file and the problem; empty without one."""
     columns, rows = names_of(column_names(problem)), names_of_rows(problem)
     lacking = set(columns) - set(found.columns) if found.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _unused(problem, columns)]
@@ -172,7 +172,7 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
 
 
 def _unused(problem: Problem, columns: list[str]) -> set[str]:
-    """Names of columns that stand in no term."""
+    """Names of columns that occur in no term."""
     used = np.zeros(problem.columns, dtype=bool)
     for family in (*problem.objective, *problem.rows):
         for symbol in family.variables:

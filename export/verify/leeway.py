@@ -1,8 +1,8 @@
-"""What a point can have saved by the rows that it breaks: an upper bound, column by column.
+"""Upper bound of the objective that a point saves by breaking rows, column by column.
 
-A solver keeps rows to a tolerance, and a weight makes more of it in the objective. Angles and jumps say which
-field a point is; its other columns follow from them, by rows that say how small each may be. One that is too
-small breaks such a row by as much. So the broken rows tell what the objective can lack, and no more.
+A solver keeps rows to a tolerance, and a weight amplifies it in the objective. Angles and jumps determine the
+field of a point. Its other columns follow from them, by rows that bound each from below. A column that is too
+small breaks such a row by the same amount. So the broken rows bound the missing part of the objective.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from ...models.formulations.problem import Monomial, PlacedFamily, Problem
 from ...models.instance.grid import Floats
 
 _CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2"})
-"""Blocks of columns that say which field a point is."""
+"""Blocks of columns that determine the field of a point."""
 
 
 def saved(problem: Problem, point: Floats) -> float:
-    """The most by which rows and bounds that a point (columns,) breaks can have lowered its objective.
+    """Greatest reduction of the objective by the rows and bounds that a point (columns,) breaks.
 
-    A column that follows from angles and jumps may be off by the most that one of its bounds and rows is
-    broken. That holds first for those without a cost (z), then for those with one, in whose rows the others
-    stand. The sum of costs times distances is at least what the objective of the point's field is above its
-    own; 0 where no row is broken. Terms of degree 1 and 2 are counted: no other has such a column.
+    The error of a column that follows from angles and jumps is at most the greatest violation of its bounds
+    and rows. That holds first for columns without a cost (z), then for columns with one, whose rows contain
+    the others. The sum of costs times errors is at least the difference between the objective of the point's
+    field and its own; 0 if no row is broken. Terms of degree 1 and 2 are counted: no other has such a column.
     """
     costs, products = problem.merged_objective(1), problem.merged_objective(2)
     block_of = np.repeat(list(problem.blocks), [block.count for block in problem.blocks.values()])
@@ -43,9 +43,9 @@ def saved(problem: Problem, point: Floats) -> float:
 def _spread(
     family: PlacedFamily, point: Floats, off: Floats, wanted: Collection[str], later: Collection[str]
 ) -> None:
-    """Raise `off` of the wanted blocks to what this family's rows let them be off.
+    """Raise `off` of the wanted blocks to the errors that this family's rows allow.
 
-    Rows in which blocks stand that come later say nothing of these.
+    Rows with blocks that come later give no limit for these.
     """
     slacks = [(_block(term), term) for term in family.of_degree(1) if _block(term) not in _CHOSEN]
     own = [term for name, term in slacks if name in wanted]

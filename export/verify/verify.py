@@ -1,11 +1,11 @@
-"""Every written file handed to every free program: read, compared, evaluated, and on request solved.
+"""Verification of every written file with every free program: read, compared, evaluated, optionally solved.
 
-For a folder that `export` wrote: each manifest gives its problem, each file goes to each program of its
-format. What a program reads is compared with the problem by name: sense, constant, costs, quadratic terms,
-types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it: the point is
-checked against the problem, its energy computed again, and the optima of one problem compared with each other
-across formats; where a format holds a relaxation only, its optimum may not be above theirs. Nothing passes
-silently: what was not tried is told as well, with its reason.
+For a folder that `export` wrote, each manifest gives its problem, and each file goes to each program of its
+format. The model that a program reads is compared with the problem by name: sense, constant, costs, quadratic
+terms, types, bounds, rows; and as numbers at random points. With `seconds`, each solver solves it. The point
+is checked against the problem, its energy computed again, and the optima of one problem compared with each
+other across formats. If a format holds a relaxation only, its optimum may not exceed theirs. Every check that
+was not tried is reported, with its reason.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ FEASIBLE: Final = 2
 TOLERANCE: Final = 1e-6
 """Relative difference up to which optima agree (absolute below 1)."""
 READING_SECONDS: Final = 80.0
-"""Seconds in which a program has to read a file."""
+"""Seconds for a program to read a file."""
 LATE: Final = 20.0
-"""Seconds beyond its limit after which a solver that does not look at the clock is asked to stop."""
+"""Seconds after its limit at which a solver that ignores the clock is requested to stop."""
 GAP: Final = 0.0
-"""Relative gap of a solve: none, so that optima can be compared."""
+"""Relative gap of a solve: zero, so that optima can be compared."""
 
 
 class Verdict(StrEnum):
-    """How a file fared with a program."""
+    """Result of a check of a file with a program."""
 
     AGREES = "agrees"
     LIMIT = "time limit"
@@ -72,13 +72,13 @@ _BAD: Final = frozenset({Verdict.DIFFERS, Verdict.FAILED})
 
 @dataclass(frozen=True)
 class Check:
-    """What became of a file at a program: reading it, or solving it with one of its solvers.
+    """A check of a file with a program: reading it, or solving it with one of its solvers.
 
-    problem: instance and formulation. program: its name, or that of the solver. objective: recomputed at the
+    problem: instance and formulation. program: its name, or the solver's. objective: recomputed at the
     solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
-    that follows from angles and jumps; leeway: how much the rows that the point breaks can have lowered its
-    objective (`saved`). group: where it is equal, so is the optimum; relaxes: the group of which the file
-    holds a relaxation, whose optimum is no higher.
+    that follows from angles and jumps; leeway: greatest reduction of the objective by the rows that the point
+    breaks (`saved`). group: equal for problems with the same optimum; relaxes: the group that the file
+    relaxes, whose optimum is at least as high.
     """
 
     problem: str
@@ -99,7 +99,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks, the versions of the programs that took part, and how to install those that are absent."""
+    """All checks, the versions of the programs that took part, and how to install absent ones."""
 
     folder: Path
     checks: list[Check] = field(default_factory=list)
@@ -108,7 +108,7 @@ class Verification:
 
     @property
     def bad(self) -> list[Check]:
-        """The checks that something is wrong with."""
+        """The checks that found a fault."""
         return [check for check in self.checks if check.verdict in _BAD]
 
     @property
@@ -134,7 +134,7 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """A file to be verified: what it should hold, where it lies unpacked, the points to compare at."""
+    """A file to verify: its intended content, its unpacked copy, the points for comparison."""
 
     problem: Problem
     held: Problem
@@ -146,8 +146,8 @@ class _Subject:
     def check(self, program: str, step: str, verdict: Verdict, reason: str = "", **numbers: Any) -> Check:
         own, of = self.held.sha256[:16], self.problem.sha256[:16]
         group, relaxes = (own, of) if self.held.formulation.weakened else (of, "")
-        told = (_title(self.problem), self.name, program, step, verdict, reason)
-        return Check(*told, **numbers, group=group, relaxes=relaxes)
+        facts = (_title(self.problem), self.name, program, step, verdict, reason)
+        return Check(*facts, **numbers, group=group, relaxes=relaxes)
 
 
 def _title(problem: Problem) -> str:
@@ -161,11 +161,11 @@ def verify(
     programs: list[str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Verification:
-    """What became of all the files in a folder at all the programs that are installed.
+    """Check all the files in a folder with all installed programs.
 
-    Also written there as verify.json. seconds: for each solve; None: nothing is solved. programs: names, all
+    Also writes verify.json there. seconds: for each solve; None: nothing is solved. programs: names, all
     by default. progress: called with each file and program. Raises InputError when the folder holds no
-    manifest, and what reading manifests raises.
+    manifest, and the errors of reading manifests.
     """
     folder = Path(folder)
     wanted = [PROGRAMS[name] for name in programs or PROGRAMS]
@@ -190,7 +190,7 @@ def verify(
 
 
 def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject], list[Check]]:
-    """The files that are as the manifests say, and failed checks of those that are not."""
+    """The files that match their manifests, and failed checks of those that do not."""
     subjects: list[_Subject] = []
     broken: list[Check] = []
     for number, manifest in enumerate(manifests):
@@ -208,9 +208,9 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
             if path.suffix != FORMATS[entry["format"]].suffix:
                 continue
             held = carried(problem, FORMATS[entry["format"]])
-            said, holds = entry["lifted"], held.formulation.lifted
-            if said != holds:
-                words = f"the manifest says of it {said!r}, and it holds {holds!r}; export again"
+            stated, holds = entry["lifted"], held.formulation.lifted
+            if stated != holds:
+                words = f"the manifest states {stated!r} for it, but it holds {holds!r}; export again"
                 broken.append(Check(*about, Verdict.DIFFERS, words))
             if len(held.blocks) not in points:
                 points[len(held.blocks)] = _points(held)
@@ -221,7 +221,7 @@ def _subjects(manifests: list[Manifest], temporary: Path) -> tuple[list[_Subject
 
 
 def _unpacked(source: Path, folder: Path) -> Path:
-    """A plain copy of the file."""
+    """An uncompressed copy of the file."""
     path = folder / source.name.removesuffix(".gz")
     if source.suffix == ".gz":
         path.write_bytes(gzip.decompress(read_bytes(source)))
@@ -231,7 +231,7 @@ def _unpacked(source: Path, folder: Path) -> Path:
 
 
 def _points(problem: Problem) -> Points:
-    """Points anywhere, then complete points of random fields, which keep bounds, rows and integrality."""
+    """Arbitrary points, then complete points of random fields, which respect bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
     anywhere = rng.normal(size=(RANDOM, problem.columns))
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
@@ -251,7 +251,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """A program at work: its child process, and the seconds for a solve."""
+    """A running program: its child process, and the seconds for a solve."""
 
     program: Program
     solvers: Solvers
@@ -288,7 +288,7 @@ class _Bench:
         return subject.check(self.program.name, "read", verdict, words)
 
     def _difference(self, subject: _Subject) -> str:
-        """Return how what the program read differs from the problem; empty when it does not."""
+        """Return how the model that the program reads differs from the problem; empty if it does not."""
         program = self.program.name
         if subject.format in self.program.algebra:
             model = self.solvers.ask(program, "read", subject.path, seconds=READING_SECONDS)
@@ -311,7 +311,7 @@ class _Bench:
             return ended(Verdict.NOT_TRIED, local)
         if missing := SOLVERS[solver].missing:
             return ended(Verdict.NOT_TRIED, f"{SOLVERS[solver].title} is not installed: {missing}")
-        files = Files.beside(subject.path, solver)
+        files = Files.for_model(subject.path, solver)
         limits = Limits(seconds, GAP, threads=1)
         try:
             found = self.solvers.solve_file(
@@ -325,13 +325,13 @@ class _Bench:
 
 
 def _refusal(solver: str, subject: _Subject, stage: Stage) -> str:
-    """Why the solver refuses at that stage, as the table of solvers states it; empty when it does not."""
+    """Reason why the solver refuses at that stage, by the table of solvers; empty without a refusal."""
     refusal = SOLVERS[solver].refusal(subject.held, stage) if solver in SOLVERS else None
     return "" if refusal is None else refusal.reason
 
 
 def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
-    """Judge a solver's answer: its point is checked, objective and energy are computed again."""
+    """Judge a solver's answer: check its point, and compute objective and energy again."""
     held, numbers = subject.held, {"seconds": round(found.seconds or 0.0, 2), "bound": found.bound}
     point, objective, worst = found.point, found.objective, found.violation
     if point is None or objective is None or worst is None:
@@ -347,7 +347,7 @@ def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
     proven = found.claimed in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
     claim = found.reported
     if not wrong and claim is not None and not same(claim, objective) and (proven or claim < objective):
-        # Before the end a solver's own variable for it may be loose.
+        # Before the end, a solver's own variable for the objective may differ.
         wrong = f"it reports {claim:.9g} for a point of {objective:.9g}"
     wrong = wrong or _energy_difference(subject.problem, objective, energy, leeway, proven=proven)
     if wrong:
@@ -359,10 +359,10 @@ def _judged(subject: _Subject, solver: str, found: Solution) -> Check:
 def _energy_difference(
     problem: Problem, objective: float, energy: float, leeway: float, *, proven: bool
 ) -> str:
-    """What is wrong with an objective beside its field's; only an optimum has tight slacks."""
+    """Fault of an objective compared with its field's energy; only an optimum has tight slacks."""
     options = problem.formulation.options
     if options.relax or options.facet == "printed":
-        return ""  # z need not be p1 beta, and the field is another point
+        return ""  # z may differ from p1 beta, and then the field is another point
     if same(energy, objective) or (objective < energy and not _above(energy, objective + leeway)):
         return ""
     if not proven and energy < objective:
@@ -381,21 +381,21 @@ def _above(value: float, best: float) -> bool:
 
 
 def compared(checks: list[Check]) -> list[Check]:
-    """The checks; a solve whose optimum or bound contradicts the best of its problem now differs."""
+    """The checks, in which a solve that contradicts the best point of its problem now differs."""
     return [_against(check, checks) for check in checks]
 
 
 def _against(check: Check, checks: list[Check]) -> Check:
     if check.step != "solve" or check.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
         return check
-    wrong = _beside_others(check, checks) or _above_what_it_relaxes(check, checks)
+    wrong = _against_others(check, checks) or _above_what_it_relaxes(check, checks)
     if wrong:
         return replace(check, verdict=Verdict.DIFFERS, reason=wrong)
     return replace(check, reason=_as_relaxation(check, checks)) if check.relaxes else check
 
 
-def _beside_others(check: Check, checks: list[Check]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem; empty when not."""
+def _against_others(check: Check, checks: list[Check]) -> str:
+    """How a proven optimum or a bound contradicts the best point of the same problem; empty if not."""
     best = _best(checks, check.group)
     if best is None:
         return ""
@@ -407,7 +407,7 @@ def _beside_others(check: Check, checks: list[Check]) -> str:
 
 
 def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
-    """How the proven optimum of a relaxation lies above a point of the problem itself; empty when not."""
+    """How the proven optimum of a relaxation exceeds a point of the problem itself; empty if it does not."""
     best = _best(checks, check.relaxes)
     lower = check.objective if check.proven else check.bound
     if best is None or lower is None or not _above(lower, best):
@@ -416,14 +416,16 @@ def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
 
 
 def _as_relaxation(check: Check, checks: list[Check]) -> str:
-    """What is told of the solve of a relaxation, beside the best point of the problem itself, if any."""
-    best, told = _best(checks, check.relaxes), f"; {check.reason}" if check.reason else ""
-    beside = f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
-    return f"a relaxation: products lifted without integrality{beside}{told}"
+    """Note on the solve of a relaxation, with the best point of the problem itself, if any."""
+    best, reason = _best(checks, check.relaxes), f"; {check.reason}" if check.reason else ""
+    comparison = (
+        f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
+    )
+    return f"a relaxation: products lifted without integrality{comparison}{reason}"
 
 
 def _best(checks: list[Check], group: str) -> float | None:
-    """The least objective that was found in a group, each with what its broken rows can have saved."""
+    """The least objective found in each group, with the greatest reduction by its broken rows."""
     found = [each for each in checks if each.group == group]
     values = [each.objective + (each.leeway or 0.0) for each in found if each.objective is not None]
     return min(values, default=None)

@@ -1,5 +1,5 @@
-"""What all writers share.
+"""Common parts of all writers.
 
 Names of columns and rows, blocks of equal records as bytes, expressions as text, and the sink that counts,
-hashes and compresses. Nothing here knows one format: that is export/formats.
+hashes and compresses. Single formats belong to export/formats.
 """

@@ -1,8 +1,8 @@
-"""The canonical form between a problem and what writes its files or reads their answers.
+"""The canonical form of a problem for writers of its files and readers of their answers.
 
-Which columns the files have (ONE among them), of which kind they are, what they cost, what limits the rows,
-in which order each kind of file lists the columns: every answer is given here, once. MathOptInterface's
-bridges and linopy's `matrices` are the model.
+It determines the columns of the files (ONE among them), their kinds and costs, the limits of the rows, and
+the order of columns in each kind of file, once for all. It follows MathOptInterface's bridges and linopy's
+`matrices`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ and of a .mod GLPK numbers the columns as it meets them."""
 
 @dataclass(frozen=True, eq=False)
 class Canonical:
-    """A problem as files hold it, with products lifted where the format needs that (`registry.carried`)."""
+    """A problem as files hold it, with products lifted if the format needs that (`registry.carried`)."""
 
     problem: Problem
 
@@ -92,17 +92,17 @@ class Canonical:
         return "binary" if _zero_to_one(block).all() else "integer"
 
     def blocks(self, kind: Kind) -> list[Block]:
-        """The blocks of a kind that have columns, in order."""
+        """The nonempty blocks of a kind, in order."""
         return [block for block in self.problem.blocks.values() if block.count and self.kind(block) == kind]
 
     @cached_property
     def row_lower(self) -> Floats:
-        """Left sides of all rows, constants moved there, -inf where there is none, shape (rows,)."""
+        """Left sides of all rows with constants moved there, -inf without one, shape (rows,)."""
         return self._sides("<=", -np.inf)
 
     @cached_property
     def row_upper(self) -> Floats:
-        """Right sides of all rows, inf where there is none, shape (rows,)."""
+        """Right sides of all rows, inf without one, shape (rows,)."""
         return self._sides(">=", np.inf)
 
     def _sides(self, without: str, infinity: float) -> Floats:

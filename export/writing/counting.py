@@ -1,8 +1,8 @@
-"""Check of a written file against its problem: what was counted while writing, and what there should be.
+"""Check of a written file against its problem: counts while writing, and expected counts.
 
 A writer counts columns, rows and coefficients when it makes their bytes (`records.Counted`). At its end it
 compares these counts with `Expected`, which derives them from the declaration and from arrays of its own. A
-difference is an error before the file takes its name.
+difference is an error before the file gets its name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...models.formulations.symbols import elements
 from ...models.instance.grid import Floats
 
 _EXACT = 1e-9
-"""Largest difference of two sums of coefficients, relative to the sum of their sizes."""
+"""Largest difference of two sums of coefficients, relative to the sum of their absolute values."""
 
 
 def check(written: Counter[str], expected: Mapping[str, int]) -> None:
@@ -33,7 +33,7 @@ def check(written: Counter[str], expected: Mapping[str, int]) -> None:
 
 
 class Expected:
-    """Counts of a problem, from a copy of it that shares no computed array with the one that is written.
+    """Counts of a problem, from a copy of it that shares no computed array with the written one.
 
     Up to `degree` the objective's families are written as coefficients; those beyond it as declared.
     """
@@ -72,16 +72,16 @@ class Expected:
         return [family for family in self._problem.objective if family.degree <= self._degree]
 
     def costs(self, *, noise: bool = False) -> int:
-        """Number of columns with a linear cost other than 0. noise: count sums that are rounding, too."""
+        """Number of columns with a nonzero linear cost. noise: also count sums that are only rounding."""
         by_block: dict[str, list[Monomial]] = {}
         for term in (term for family in self._expanded for term in family.of_degree(1)):
             by_block.setdefault(term.family.block(term.symbols[0]).name, []).append(term)
         return sum(_costs_of(terms, noise=noise) for terms in by_block.values())
 
     def products(self, merged: Floats) -> int:
-        """Number of the objective's products, whose coefficients after merging equal ones are `merged`.
+        """Number of the objective's products; `merged` are their coefficients after merging equal ones.
 
-        Raises ConsistencyError when their sum is not that of the products before merging.
+        Raises ConsistencyError when their sum differs from the sum of the products before merging.
         """
         terms = [term for family in self._expanded for term in family.of_degree(2)]
         values = [np.broadcast_to(term.coefficient, (term.family.count,)) for term in terms]
@@ -94,7 +94,7 @@ class Expected:
         return len(merged)
 
     def nonzeros(self, degree: int) -> int:
-        """Number of coefficients other than 0 of the rows' terms of that degree."""
+        """Number of nonzero coefficients of the rows' terms of that degree."""
         return sum(
             self._elements(family) if not value.free_symbols else self._nonzero(family, value)
             for family in self._problem.formulation.rows
@@ -121,7 +121,7 @@ class Expected:
         }
 
     def as_coefficients(self, products: Floats) -> dict[str, int]:
-        """Counts of a file of coefficients. products: those of the objective's merged products."""
+        """Counts of a file of coefficients. products: coefficients of the objective's merged products."""
         return {
             "columns": self.columns,
             "linear costs": self.costs(),
@@ -130,7 +130,7 @@ class Expected:
         }
 
     def data(self) -> dict[str, int]:
-        """Counts of the data that layouts over sets list: pixels, strokes, jumps other than 0."""
+        """Counts of the data that layouts over sets list: pixels, strokes, nonzero jumps."""
         instance, jumps = self._problem.instance, self._problem.jumps
         return {
             "pixels": int(np.count_nonzero(instance.mask)),
@@ -140,12 +140,12 @@ class Expected:
 
     @property
     def declared(self) -> int:
-        """Number of times that the objective's declared families name a column."""
+        """Number of occurrences of columns in the objective's declared families."""
         return self._places(each.family for each in self._problem.objective if each.degree > self._degree)
 
     @property
     def declared_rows(self) -> int:
-        """Number of times that the rows as declared name a column."""
+        """Number of occurrences of columns in the declared rows."""
         return self._places(self._problem.formulation.rows)
 
     def _places(self, families: Iterable[Family]) -> int:
@@ -182,5 +182,5 @@ def _costs_of(terms: list[Monomial], *, noise: bool) -> int:
 
 @cache
 def _occurrences(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> int:
-    """Number of places of an expression at which one of the symbols stands."""
+    """Number of places in an expression that hold one of the symbols."""
     return sum(node in symbols for node in sp.preorder_traversal(expression))

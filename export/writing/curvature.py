@@ -1,4 +1,4 @@
-"""Curvature of objective and rows, from the declaration, and QPLIB's three letters that sum it up."""
+"""Curvature of objective and rows, from the declaration, and its summary by QPLIB's three letters."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ...models.formulations.problem import PlacedFamily, Problem
 from .canonical import Canonical
 
 NEGLIGIBLE: Final = 1e-9
-"""An eigenvalue this small beside the largest counts as zero."""
+"""Eigenvalues this small relative to the largest count as zero."""
 
 
 def of_objective(problem: Problem) -> tuple[str, str]:
-    """Curvature of the objective (linear, convex, indefinite or nonconvex) and how it is known."""
+    """Curvature of the objective (linear, convex, indefinite or nonconvex) and its reason."""
     degree = problem.objective_degree
     if degree <= 1:
         return "linear", "the objective is linear: its Hessian is zero"
@@ -62,7 +62,7 @@ def of_rows(problem: Problem) -> str:
 
 
 def probtype(problem: Problem) -> str | None:
-    """QPLIB's three letters, of objective, variables and constraints; None for what is beyond quadratic.
+    """QPLIB's three letters, of objective, variables and constraints; None beyond quadratic problems.
 
     L linear, D convex and diagonal, C convex, Q any; C continuous, B binary, M with binaries, I integer, G
     with integers; N none, B bounds, L linear, C convex, Q any.

@@ -1,9 +1,9 @@
 """Expressions of a declaration as text, in their factored form: one walk for every algebraic language.
 
-The walk knows precedence, signs and brackets. A language says how symbols, constants and powers look. What
-holds no variable is *data*: the walk hands its largest such pieces over as a whole, so that a language may
-print them or evaluate them. The result is a list of pieces, bytes for what all records share and parts
-(records.py) for what differs.
+The walk handles precedence, signs and brackets. A language defines the form of symbols, constants and powers.
+Expressions without variables are *data*: the walk passes its largest such pieces as a whole, so that a
+language may print them or evaluate them. The result is a list of pieces, bytes for text that all records
+share and parts (records.py) for text that differs.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .records import Piece, Pieces
 
 
 class Language(ABC):
-    """How an algebraic language writes the leaves of an expression."""
+    """The form of the leaves of an expression in an algebraic language."""
 
     @abstractmethod
     def symbol(self, symbol: sp.Symbol) -> Piece:
@@ -27,7 +27,7 @@ class Language(ABC):
 
     @abstractmethod
     def is_data(self, expression: sp.Expr) -> bool:
-        """Whether an expression is handed to `constant` and `coefficient` as a whole."""
+        """Whether an expression is passed to `constant` and `coefficient` as a whole."""
 
     @abstractmethod
     def constant(self, expression: sp.Expr, *, signed: bool) -> Piece:
@@ -48,7 +48,7 @@ class Language(ABC):
         return [piece for place, term in enumerate(terms) for piece in self._term(term, signed=place > 0)]
 
     def alone(self, expression: sp.Expr) -> list[Piece]:
-        """An expression that is no part of another: a negative number needs no brackets."""
+        """An expression that is not part of another: a negative number needs no brackets."""
         negative = not expression.free_symbols and expression.is_negative
         return [b"-", *self.expression(-expression)] if negative else self.expression(expression)
 
@@ -57,7 +57,7 @@ class Language(ABC):
         return [self._term(term, signed=True) for term in self._terms(expression)]
 
     def _terms(self, expression: sp.Expr) -> list[sp.Expr]:
-        """Its terms in a fixed order, those that are data as one, in the place of their first."""
+        """Its terms in a fixed order, with all data as one term, in the place of their first."""
         terms = expression.as_ordered_terms()
         data = [term for term in terms if self.is_data(term)]
         merged = sp.Add(*data)
@@ -79,7 +79,7 @@ class Language(ABC):
         return self._lead(coefficient, signed=signed) + product
 
     def _lead(self, coefficient: sp.Expr, *, signed: bool) -> list[Piece]:
-        """What stands before the variables of a term: its sign and its coefficient, 1 left out."""
+        """The start of a term before its variables: its sign and its coefficient, unless it is 1."""
         if abs(coefficient) == 1:
             minus = coefficient == -1
             return [b" - " if minus else b" + "] if signed else [b"-"] * minus
@@ -99,7 +99,7 @@ class Language(ABC):
 
 
 def _rank(factor: sp.Expr) -> tuple[bool, bool, bool]:
-    """Order of the factors of a product: weights, data, variables, and then what is no symbol."""
+    """Order of the factors of a product: weights, data, variables, and then other expressions."""
     return not factor.is_Symbol, factor not in SCALARS, str(factor) in VARIABLES
 
 
@@ -109,14 +109,14 @@ def is_data(family: PlacedFamily, expression: sp.Expr) -> bool:
 
 
 def split(family: PlacedFamily, chain: sp.Expr) -> tuple[sp.Expr | None, list[sp.Expr]]:
-    """A sum or a product in two: its data as one expression (or None), and its other parts in order."""
+    """The two parts of a sum or a product: its data as one expression (or None), and the rest in order."""
     data = [part for part in chain.args if is_data(family, part)]
     others = [part for part in chain.args if part not in data]
     return (chain.func(*data) if data else None), others
 
 
 def wrapped(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
-    """The summands with line breaks between them, so that a line grows little beyond `width` bytes."""
+    """The summands with line breaks between them, so that a line exceeds `width` bytes only slightly."""
     pieces: list[Piece] = []
     used = 0
     for summand in summands:

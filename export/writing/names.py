@@ -32,7 +32,7 @@ def problem_name(problem: Problem) -> str:
 
 
 class Names:
-    """Names of columns and rows as pieces of records: a tag, and words for where the elements lie.
+    """Names of columns and rows as pieces of records: a tag, and words for the positions of the elements.
 
     The words are the same for all blocks and families over an index set, so that there are few of them and
     each is made once.
@@ -99,7 +99,7 @@ def _digits(instance: Instance) -> int:
 
 
 def stacked(matrices: list[Bytes]) -> Bytes:
-    """Matrices of names below each other, narrower ones padded with NUL on the right."""
+    """Matrices of names one below the other, narrower ones padded with NUL on the right."""
     width = max((matrix.shape[1] for matrix in matrices), default=1)
     out = np.zeros((sum(len(matrix) for matrix in matrices), width), dtype=np.uint8)
     start = 0

@@ -1,6 +1,6 @@
 """Order in an .nl file: nine groups of columns, nonlinear rows first (docs/format-rules.md, N1, N2).
 
-Nonlinear in objective and rows; in rows alone; in the objective alone; linear. The first three are split into
+Nonlinear in objective and rows; only in rows; only in the objective; linear. The first three are split into
 continuous and integer, the last into continuous, binary and integer.
 """
 
@@ -107,7 +107,7 @@ class Layout:
         return places if inside is None else places[inside]
 
     def column_file(self) -> Iterator[bytes]:
-        """The bytes of the .col file: names of columns in file order, one a line. They are counted."""
+        """The bytes of the .col file: names of columns in file order, one per line. They are counted."""
         names, counts = Names(self.problem), Counter[str]()
         for block, run in self.stretches:
             inside = self.order[run] - block.offset
@@ -116,7 +116,7 @@ class Layout:
         check(counts, {"columns": Expected(self.problem).columns})
 
     def row_file(self) -> Iterator[bytes]:
-        """The bytes of the .row file: names of rows in file order, then of the objective, one a line.
+        """The bytes of the .row file: names of rows in file order, then of the objective, one per line.
 
         Rows are counted.
         """

@@ -1,10 +1,10 @@
 """Blocks of equal records as bytes: one template, holes filled by NumPy, no Python per record.
 
 A record is a list of parts: literal bytes, words from a table (names, numbers) or decimal integers. A block
-of records is a matrix of bytes, one row a record. Literals are laid out once; a hole is filled for all
-records of the block by one strided copy of whole words. Where the words of a block differ in length they are
-padded with NUL, and the padding is dropped in one step; names of one family all have one length, so that most
-blocks have none. Memory is one block however many records there are.
+of records is a matrix of bytes, one row per record. Literals are laid out once; a hole is filled for all
+records of the block by one strided copy of whole words. Words of different length in a block are
+padded with NUL, and the padding is dropped in one step. Names of one family all have one length, so most
+blocks have none. Memory is one block for any number of records.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class Part(Protocol):
 
     @property
     def width(self) -> int:
-        """Bytes of the longest one."""
+        """Bytes of the longest text."""
 
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
         """The bytes of these records, one item each, and whether some are padded with NUL."""
 
     def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold no zero; one value when it holds for all."""
+        """Which of these records hold no zero; one value if it holds for all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +84,13 @@ class Words:
         return bool(found[0]) if len(found) and (found == found[0]).all() else found
 
     def nonzero(self, start: int, stop: int) -> Bools | bool:
-        """Which of these records hold a word other than 0, as their table has it."""
+        """Which of these records hold a word other than 0 in the notation of their table."""
         if isinstance(self._nonzero, bool):
             return self._nonzero
         return self._nonzero[start:stop] if self.codes is None else self._nonzero.take(self.codes[start:stop])
 
     def at(self, codes: NDArray[Any]) -> Words:
-        """The same table, read through other codes."""
+        """The same table with other codes."""
         return Words(self.table, codes if self.codes is None else self.codes[codes])
 
 
@@ -106,7 +106,7 @@ class Decimals:
         return len(str(int(self.values.max(initial=0))))
 
     def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
-        """The digits of these records; no padding where all have the same number, as in most blocks."""
+        """The digits of these records; without padding if all have the same number, as in most blocks."""
         values = self.values[start:stop]
         width, least = len(str(int(values.max()))), len(str(int(values.min())))
         out = digits(values, width)
@@ -122,7 +122,7 @@ class Decimals:
 
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Values in their own little-endian bytes, one per record: for binary files."""
+    """Values as little-endian bytes, one per record: for binary files."""
 
     values: NDArray[Any]
 
@@ -154,7 +154,7 @@ class Tagged:
         return len(self.tag) + self.words.width
 
     def at(self, codes: NDArray[Any]) -> Tagged:
-        """The same names, read through other codes."""
+        """The same names with other codes."""
         return Tagged(self.tag, self.words.at(codes))
 
 
@@ -164,7 +164,7 @@ _ZEROS: Final = (b"0", b"+ 0")
 
 @dataclass(frozen=True, eq=False)
 class Counted:
-    """A piece whose records other than 0 are counted in `counts[what]` when their bytes are made.
+    """A piece whose nonzero records are counted in `counts[what]` when their bytes are made.
 
     Without bytes of its own it counts all records.
     """
@@ -230,7 +230,7 @@ def filled(parts: Pieces, count: int) -> Bytes:
 
 
 class _Template:
-    """The pieces of a record and the bytes of the block at hand: literals stay, holes are filled anew.
+    """The pieces of a record and the bytes of the present block: literals stay, holes are filled anew.
 
     A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
     which is rare.
@@ -268,7 +268,7 @@ class _Template:
         return self._chosen(present), padded
 
     def _lay_out(self, cells: dict[int, Cells], rows: int) -> None:
-        """Literals in their places, and where the holes are, when a width has changed."""
+        """Set literals and the positions of holes after a width has changed."""
         widths = [
             len(piece) if isinstance(piece, bytes) else cells[id(piece)].dtype.itemsize
             for piece in self._pieces
@@ -288,13 +288,13 @@ class _Template:
         ]
 
     def _column(self, first: int, kind: Any) -> Cells:
-        """The column of the matrix that begins at a byte, one item a record."""
+        """The column of the matrix that begins at a byte, one item per record."""
         return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
 
     def _chosen(self, present: Sequence[Bools]) -> Bytes:
-        """The bytes of the records at hand without the pieces that they lack.
+        """The bytes of the present records without their missing pieces.
 
-        Few patterns of presence occur: what stands side by side in one of them is moved for all of its
+        Few patterns of presence occur: adjacent bytes of one pattern are moved for all of its
         records at once.
         """
         pattern = sum(where.astype(np.intp) << bit for bit, where in enumerate(present))
@@ -318,7 +318,7 @@ class _Template:
         return line
 
     def _stretches(self, present: Sequence[bool]) -> list[tuple[int, int]]:
-        """First and last byte of what stands side by side in a record that has these optional pieces."""
+        """First and last byte of adjacent pieces in a record that has these optional pieces."""
         cuts = [0]
         for (place, _), there in zip(self._optional, present, strict=True):
             if not there:
@@ -370,7 +370,7 @@ def of_texts(texts: Texts) -> Bytes:
 
 
 def of_bytes(matrix: Bytes) -> Texts:
-    """The texts in the rows of a matrix of bytes padded with NUL: the way back from `of_texts`."""
+    """The texts in the rows of a matrix of bytes padded with NUL: the inverse of `of_texts`."""
     return np.ascontiguousarray(matrix).view(f"S{matrix.shape[1]}").ravel()
 
 
@@ -383,7 +383,7 @@ def number(value: float) -> str:
 
 
 def numbers(values: Floats) -> Texts:
-    """The shortest texts that read back as exactly these doubles, as `number` has them."""
+    """The shortest texts that read back as exactly these doubles, as from `number`."""
     whole = (np.rint(values) == values) & (np.abs(values) < MOST)
     texts = np.zeros(len(values), dtype="S24")
     for chosen, given in ((whole, values[whole].astype(np.int64)), (~whole, values[~whole])):
@@ -411,12 +411,12 @@ def words(values: Floats | float, text: Callable[[Floats], Texts] = numbers) -> 
 
 
 def scalar_when_constant(values: Floats) -> Floats | float:
-    """The one number that all values are, or the values."""
+    """The one number that all values equal, or the values."""
     return float(values[0]) + 0.0 if len(values) and (values == values[0]).all() else values
 
 
 def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
-    """Ascending numbers, all of `values` among them, and the place of each; few whole ones are not sorted."""
+    """Ascending numbers that include all `values`, and the place of each; few whole ones are not sorted."""
     least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, -1.0)
     few = 0 <= most - least < _FEW and max(-least, most) < MOST
     if few and (values == np.rint(values)).all():
@@ -426,7 +426,7 @@ def _distinct(values: Floats) -> tuple[Floats, NDArray[Any]]:
 
 
 def check_coefficients(values: Floats | float, where: str) -> None:
-    """Nothing, when every coefficient but zero lies in [1e-9, 1e15); else raises UnsupportedByFormatError."""
+    """Raise UnsupportedByFormatError unless every nonzero coefficient lies in [1e-9, 1e15)."""
     size = np.abs(np.atleast_1d(np.asarray(values, dtype=np.float64)))
     wrong = ~np.isfinite(size) | (size >= MOST) | ((size < LEAST) & (size > 0))
     if wrong.any():

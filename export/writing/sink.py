@@ -1,11 +1,11 @@
-"""Bytes on their way to a file: counted and hashed as they pass, or compressed, in threads beside the writer.
+"""Bytes on their way to a file: counted and hashed, or compressed, in threads next to the writer.
 
-zlib, hashlib and the system let other threads run while they work, so that a file takes as long as the
-slowest of its steps, or as long as all of them shared by the cores. A small file begins no thread.
+zlib, hashlib and the system let other threads run while they work. So a file takes as long as the
+slowest of its steps, or as long as all of them shared by the cores. A small file starts no thread.
 
-A compressed file is one gzip member without name and time. It is made of pieces that are compressed on their
-own and end on a byte boundary (Z_FULL_FLUSH), as pigz does it, so that the pieces of one file go to all
-cores; piece by piece the bytes depend on the content alone.
+A compressed file is one gzip member without name and time. It consists of pieces that are compressed
+separately and end on a byte boundary (Z_FULL_FLUSH), as in pigz, so that the pieces of one file go to all
+cores. The bytes depend only on the content.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from typing import Any, Final, Self
 from ...models.storage import replacing
 
 LEVEL: Final = 2
-"""Of zlib: twice as fast as its default, and files of one record repeated are no larger for it."""
+"""Level of zlib: twice as fast as its default, and files of repeated records are not larger."""
 
 PIECE: Final = 1 << 22
-"""Bytes that are compressed on their own: enough for the loss at their seams to be nothing."""
+"""Bytes that are compressed separately: enough to make the loss at their seams negligible."""
 
 _AHEAD: Final = 16
-"""Pieces that may wait for another thread: enough to keep it busy, few enough to keep memory flat."""
+"""Pieces that may wait for another thread: enough to keep it busy, few enough to limit memory."""
 
 SHARE: Final = 1 << 21
-"""Bytes that are handed to another thread at once: enough for the handing over to be nothing."""
+"""Bytes that are passed to another thread at once: enough to make the transfer negligible."""
 
 _SHARES: Final = 16
 """Shares that may wait for each thread."""
@@ -56,9 +56,9 @@ def save(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
 
 @contextmanager
 def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
-    """Size and SHA-256 of a file that takes its name at the end of the context, as `save` writes it.
+    """Size and SHA-256 of a file that gets its name at the end of the context, as `save` writes it.
 
-    The bytes are written, beside, when the context begins. An error inside it leaves no file.
+    The bytes are written, under a temporary name, when the context begins. An error inside it leaves no file.
     """
     digest, size = hashlib.sha256(), 0
 
@@ -67,17 +67,17 @@ def saving(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
             digest.update(chunk)
 
     with replacing(path) as stream:
-        with _Beside(hash_all, stream.writelines) as beside:
+        with _Pipeline(hash_all, stream.writelines) as beside:
             for share, length in gathered(gzipped(chunks) if is_packed(path) else chunks, SHARE):
                 beside(share, wait=length < SHARE)
                 size += length
         yield {"bytes": size, "sha256": digest.hexdigest()}
 
 
-class _Beside:
-    """Hands chunks to several tasks, each in order in a thread of its own, which runs a few chunks behind.
+class _Pipeline:
+    """Passes chunks to several tasks, each in order in its own thread, which lags by a few chunks.
 
-    What a task raises comes back from a later call or at the end.
+    Errors of a task are raised by a later call or at the end.
     """
 
     def __init__(self, *tasks: Callable[[list[bytes]], None]) -> None:
@@ -86,7 +86,7 @@ class _Beside:
         self._waiting: deque[Future[None]] = deque()
 
     def __call__(self, chunks: list[bytes], *, wait: bool) -> None:
-        """Hand over chunks. wait: work them off here, so that a small file begins no thread."""
+        """Pass chunks to the tasks. wait: process them here, so that a small file starts no thread."""
         if wait:
             self._settle(0)
             for task in self._tasks:
@@ -98,7 +98,7 @@ class _Beside:
             ]
 
     def _settle(self, most: int) -> None:
-        """Wait until no more than that are under way."""
+        """Wait until at most that many are in progress."""
         while len(self._waiting) > most:
             self._waiting.popleft().result()
 
@@ -128,12 +128,12 @@ def gzipped(chunks: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def joined(chunks: Iterable[bytes], least: int) -> Iterator[bytes]:
-    """The same bytes in pieces of at least that length, the last one aside."""
+    """The same bytes in pieces of at least that length, except the last."""
     return (b"".join(parts) for parts, _ in gathered(chunks, least))
 
 
 def gathered(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes], int]]:
-    """The same chunks in lists of at least that many bytes, the last one aside, and the length of each."""
+    """The same chunks in lists of at least that many bytes, except the last, and the length of each."""
     parts: list[bytes] = []
     length = 0
     for chunk in chunks:

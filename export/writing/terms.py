@@ -1,4 +1,4 @@
-"""Coefficients by index: what a program read, and what OSiL lists."""
+"""Coefficients by index: as programs read them, and as OSiL lists them."""
 
 from __future__ import annotations
 
@@ -36,6 +36,6 @@ def listed(entries: Sequence[tuple[Any, ...]], *, indices: int, products: int = 
 
 
 def of_triangle(row: Ints, column: Ints, value: Floats) -> Terms:
-    """The terms of x'Qx/2, of which one triangle is given."""
+    """The terms of x'Qx/2, given by one triangle."""
     halved = np.where(row == column, value / 2, value)
     return terms(np.stack([row, column], axis=1), halved, indices=2, products=2)

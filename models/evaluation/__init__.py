@@ -1,5 +1,5 @@
-"""How well fields tell what was hidden from them.
+"""Errors of fields on curves that were hidden from them.
 
-A curve of the drawing is hidden, the field is made from the others, and the curve is the judge.
-No energy is consulted.
+Each curve of a drawing is hidden in turn. The field is made from the other curves and compared with the
+hidden one; energies play no part.
 """

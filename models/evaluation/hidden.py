@@ -1,4 +1,4 @@
-"""Curves that are hidden in turn, and how far a field made without one is from it."""
+"""Curves that are hidden in turn, and the error there of a field made without them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ..instance.grid import Floats, Ints
 from ..instance.instance import Instance
 
 SHORTEST: Final = 3
-"""Stroke pixels of the shortest curve that is hidden."""
+"""Fewest stroke pixels of a curve that is hidden."""
 MOST: Final = 0.5
-"""Greatest share of the stroke pixels that one curve may have: beyond, the drawing is hidden and no curve."""
+"""Greatest share of the stroke pixels that a hidden curve may have: a larger one is most of the drawing."""
 
 
 @dataclass(frozen=True, eq=False)
 class HiddenCurve:
     """A curve of an instance to be hidden.
 
-    number: of the curve, as in `curves_of`. stroke: int (k,), the numbers of its stroke pixels.
+    number: number of the curve, as in `curves_of`. stroke: int (k,), numbers of its stroke pixels.
     """
 
     number: int
@@ -32,7 +32,7 @@ class HiddenCurve:
 
     @cached_property
     def rest(self) -> Instance:
-        """The instance without the curve's strokes; its mask and its other strokes are the same."""
+        """The instance without the curve's strokes; its mask and its other strokes stay."""
         kept = np.ones(len(self.instance.theta), dtype=bool)
         kept[self.stroke] = False
         return self.instance.with_strokes(kept)
@@ -40,8 +40,8 @@ class HiddenCurve:
     def deviation(self, field: CrossField) -> float:
         """The mean angle from the curve to the nearer line of the crosses on it, in [0, pi/2] radians.
 
-        Crosses at random with lines at right angles have pi/8 on average.
-        field: on the same grid. Raises InstanceError for another one.
+        Random crosses with lines at right angles have pi/8 on average.
+        field: a field on the same grid. Raises InstanceError for another grid.
         """
         if not np.array_equal(field.instance.mask, self.instance.mask):
             raise InstanceError(f"the field is not on the pixels of {self.instance.name}")
@@ -52,9 +52,9 @@ class HiddenCurve:
 def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurve]:
     """Up to `most` curves that can be hidden, those with most stroke pixels first.
 
-    curve: int (s,), number of the one curve that each stroke pixel belongs to, negative where several run:
-    these are never hidden. Left out are curves of fewer than SHORTEST pixels, of more than MOST of all, and
-    those without which a part of the mask has no stroke that the field could follow.
+    curve: int (s,), number of the only curve at each stroke pixel, negative where several curves meet; those
+    pixels are never hidden. Excluded are curves of fewer than SHORTEST pixels and of more than a share MOST
+    of all. Also excluded are curves whose absence would leave a part of the mask without strokes.
     """
     numbers, count = np.unique(curve[curve >= 0], return_counts=True)
     wanted = (count >= SHORTEST) & (count <= MOST * len(curve))
@@ -70,10 +70,10 @@ def hidden_curves(instance: Instance, curve: Ints, most: int) -> list[HiddenCurv
 
 @dataclass(frozen=True)
 class Summary:
-    """Angles of several curves: how many, mean and median in their unit, and the standard error of the mean.
+    """Statistics of the angles of several curves: count, mean, median, and standard error of the mean.
 
     error: sample deviation over the root of the count; None for a single angle. The curves of one drawing
-    are correlated: between drawings their means differ by more.
+    are correlated, so means differ more between drawings.
     """
 
     count: int
@@ -83,7 +83,7 @@ class Summary:
 
 
 def summary(angles: Floats) -> Summary | None:
-    """Count, mean, median and standard error of angles (k,); None of none."""
+    """Count, mean, median and standard error of angles (k,); None without angles."""
     count = len(angles)
     if not count:
         return None
@@ -92,7 +92,7 @@ def summary(angles: Floats) -> Summary | None:
 
 
 def _parts(instance: Instance) -> Ints:
-    """The number of the 4-connected part of the mask in which each stroke lies, shape (s,)."""
+    """The number of the 4-connected part of the mask that contains each stroke, shape (s,)."""
     from scipy import ndimage
 
     row, column = instance.stroke_pixels.T

@@ -1,5 +1,5 @@
-"""Crosses at every pixel, and what they mean.
+"""Crosses at every pixel, and their meaning.
 
-The CrossField with its jumps, energy, singularities and errors, and its files (.npz, .json, .rawfield,
-schema). How a field is found is models/search and export/solving; how it is drawn is export/pictures.
+CrossField with its jumps, energy, singularities and errors, and its files (.npz, .json, .rawfield,
+schema). models/search and export/solving find fields; export/pictures draws them.
 """

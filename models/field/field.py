@@ -1,4 +1,4 @@
-"""A cross field: two lines at every pixel, the jumps between neighbours, and what they mean.
+"""A cross field: two lines at every pixel, the jumps between neighbours, and their meaning.
 
 A cross has line u at angle alpha + beta and line v at angle alpha + pi/2 - beta. For a pair e = (i, j) with
 jump p the residuals are A = alpha_i - alpha_j + pi/2 p and B = (-1)^p beta_i - beta_j (equation (4) of the
@@ -25,7 +25,7 @@ Norm = Literal[1, 2]
 DEGENERATE: Final = np.radians(2.5)
 """Lines closer than twice this (5 degrees) count as one: |beta| > pi/4 - DEGENERATE."""
 FAR: Final = np.radians(10)
-"""A stroke further than this from both lines was not followed."""
+"""A stroke that deviates more than this from both lines counts as not followed."""
 NARROW: Final = QUARTER
 """Lines that are less than this apart are a narrow cross."""
 MOST: Final = 0.9
@@ -50,13 +50,13 @@ class Energy:
 
 @dataclass(frozen=True)
 class Shape:
-    """What a designer sees of a field, whatever its energy and the weights.
+    """Measures of a field that a designer sees, independent of energy and weights.
 
     mean_deviation, most_deviation: mean and 90 % quantile over the stroke pixels of the angle between the
     stroke and its line, in [0, pi/2] radians (`CrossField.stroke_deviation`).
-    far_strokes: share of the strokes where it is more than 10 degrees. narrow_pixels: share of all pixels
-    whose lines are less than 45 degrees apart; inside the bounds they are pi/2 - 2|beta| apart, so that is
-    where |beta| > pi/8.
+    far_strokes: share of the strokes where this angle exceeds 10 degrees. narrow_pixels: share of all pixels
+    whose lines are less than 45 degrees apart. Inside the bounds lines are pi/2 - 2|beta| apart, so these are
+    the pixels with |beta| > pi/8.
     """
 
     mean_deviation: float
@@ -67,7 +67,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Singularities:
-    """Quads, 2 x 2 pixels, round which the crosses turn.
+    """Quads of 2 x 2 pixels around which the crosses turn.
 
     row, column: int (k,), the quad's common corner is the lower right corner of pixel [row, column].
     index: float (k,), turns of the cross on a counter-clockwise walk (y up): multiples of 1/4.
@@ -94,7 +94,7 @@ class CrossField(Pictured):
     p: Ints
 
     def __post_init__(self) -> None:
-        """Take over read-only copies and check shapes and values."""
+        """Store read-only copies, and check shapes and values."""
         grid = self.instance.grid
         given: dict[str, np.ndarray[Any, Any]] = {
             "alpha": np.array(self.alpha, dtype=np.float64),
@@ -123,9 +123,9 @@ class CrossField(Pictured):
 
         u, v: shape (n,), the pixels in the order of `instance.grid`, radians counter-clockwise from +x with y
         up. They need not be at right angles. Turns by pi and the order of the two lines do not matter: the
-        label is that in the window of the instance's gauge. Under `strokes` its u is the line nearer to the
-        stroke; under `box` it may be the other one, whose distance the energy then counts
-        (docs/mathematics.md, 4). Crosses stay as they are; both lines may be one, with |beta| = pi/4.
+        label is the one in the window of the instance's gauge. Under `strokes`, its u is the line nearer the
+        stroke. Under `box` it may be the other line, whose distance the energy then counts
+        (docs/mathematics.md, 4). The crosses do not change; both lines may coincide, with |beta| = pi/4.
         Raises InstanceError for another shape and for values that are no angles: not finite, or beyond 1e6.
         """
         alpha, beta = label_of(_angles(instance, u, "u"), _angles(instance, v, "v"))
@@ -136,7 +136,7 @@ class CrossField(Pictured):
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
     def check_instance(self, instance: Instance) -> None:
-        """Nothing, when the field is on this instance. Raises InstanceError when it is on another one."""
+        """Raise InstanceError unless the field is on this instance."""
         if self.instance.sha256 != instance.sha256:
             raise InstanceError(
                 f"the field is on another instance ({self.instance.summary}), not on this one "
@@ -196,7 +196,7 @@ class CrossField(Pictured):
 
     @cached_property
     def singularities(self) -> Singularities:
-        """Quads of 2 x 2 pixels with index = -(sum of p on a counter-clockwise walk)/4 that is not zero."""
+        """Quads of 2 x 2 pixels whose index, -(sum of p on a counter-clockwise walk)/4, is not zero."""
         grid = self.instance.grid
         bottom, side, top, left = grid.quads.T
         turn = self.p[bottom] + self.p[side] - self.p[top] - self.p[left]
@@ -221,13 +221,13 @@ class CrossField(Pictured):
         return self.deviation(self.instance.stroke_index, self.instance.theta)
 
     def deviation(self, pixels: Ints, theta: Floats) -> Floats:
-        """Angle between theta and the nearer line at each of some pixels, in [0, pi/2] radians: (k,)."""
+        """Angle between theta and the nearer line at some pixels, in [0, pi/2] radians; shape (k,)."""
         to_u = line_difference((self.alpha + self.beta)[pixels], theta)
         return np.minimum(to_u, line_difference((self.alpha + HALF - self.beta)[pixels], theta))
 
     @property
     def shape(self) -> Shape:
-        """How far the lines are from the strokes, and how many crosses are narrow: no energy, no weights."""
+        """Distances of the lines from the strokes, and the share of narrow crosses."""
         deviation = self.stroke_deviation
         return Shape(
             mean_deviation=float(deviation.mean()),
@@ -268,9 +268,9 @@ class CrossField(Pictured):
 def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the instance's gauge and |beta| <= pi/4.
 
-    alpha and beta may be any real numbers. What fits no window is clipped: |beta| > pi/4, and under the gauge
-    `box` the alpha of a stroke that no label inside the box carries. Then each pair gets its best jump; if
-    nothing was clipped the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
+    alpha and beta may be any real numbers. Values outside every window are clipped: |beta| > pi/4, and under
+    the gauge `box` the alpha of a stroke that no label inside the box has. Then each pair gets its best jump;
+    without clipping the energy does not rise. Step k of the label: (alpha + k pi/2, (-1)^k beta).
     """
     lower = instance.alpha_lower
     steps = _window_steps(instance, alpha)
@@ -287,17 +287,16 @@ def relabelled(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> Cros
 
 
 def _window_steps(instance: Instance, alpha: Floats) -> Ints:
-    """The step of each label into its window, shape (n,)."""
+    """The step that moves each label into its window, shape (n,)."""
     return np.ceil((instance.alpha_lower - alpha) / HALF - _ROUNDING).astype(np.int32)
 
 
 def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label, shape (s,):
-    of three the one with the least clipping and misfit of the stroke.
+    """The step of each stroke pixel's label with the least clipping and misfit of three; shape (s,).
 
-    The label in the window, the next one (on the window's edge both fit), and the one in which u stays
-    nearest to the stroke. In the gauge `box` a label inside the window may give the stroke to v, which the
-    energy punishes.
+    The candidates: the label in the window, the next one (on the window's edge both fit), and the label whose
+    u stays nearest to the stroke. Under the gauge `box` a label inside the window may give the stroke to v,
+    which the energy penalises.
     """
     at = instance.stroke_index
     faithful = 2 * np.round((instance.target - alpha[at] - beta[at]) / np.pi).astype(np.int32)
@@ -307,7 +306,7 @@ def _stroke_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) 
 
 
 def _nearer_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> Ints:
-    """The step of each stroke pixel's label into its window, (s,); of two, on its edge, that nearer to it."""
+    """The step of each stroke pixel's label into its window, (s,); on an edge, nearer to the stroke."""
     at = instance.stroke_index
     candidates = np.stack([steps[at], steps[at] + 1])
     clipped, misfit = _losses(instance, alpha, beta, candidates)
@@ -317,7 +316,7 @@ def _nearer_steps(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) 
 
 
 def _losses(instance: Instance, alpha: Floats, beta: Floats, steps: Ints) -> tuple[Floats, Floats]:
-    """What clipping takes of alpha, and the misfit that is left, for steps (k, s) of strokes; (k, s) each."""
+    """Clipping of alpha and remaining misfit for steps (k, s) of strokes; shape (k, s) each."""
     at = instance.stroke_index
     moved = alpha[at] + HALF * steps
     shifted = np.clip(moved, instance.alpha_lower[at], instance.alpha_upper[at])
@@ -332,7 +331,7 @@ def _cheapest(candidates: Ints, cost: Floats) -> Ints:
 
 
 def _angles(instance: Instance, given: Any, name: str) -> Floats:
-    """The angles (n,). Raises InstanceError."""
+    """The angles as an array (n,). Raises InstanceError."""
     try:
         angles = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -345,7 +344,7 @@ def _angles(instance: Instance, given: Any, name: str) -> Floats:
     wrong = ~(np.abs(angles) <= MOST_ANGLE)
     if wrong.any():
         raise InstanceError(
-            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
+            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is not an angle; "
             f"give radians up to {MOST_ANGLE:g}"
         )
     return angles

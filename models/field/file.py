@@ -1,9 +1,9 @@
-"""Field files: .npz and JSON, with field and instance, and .rawfield beside a mesh (rawfield.py).
+"""Field files: .npz and JSON, with field and instance, and .rawfield with its mesh (rawfield.py).
 
 .npz        alpha, beta (n,) and p (m,) in the order of the grid's pixels and pairs, `head` with format and
             version as JSON text, and the arrays of the instance's own .npz, their names preceded by
-            `instance_`. Nothing else is accepted (models/array_archive.py).
-.json       field.schema.json; one line a pixel. Numbers are the shortest that give back the same doubles.
+            `instance_`. Other content is refused (models/array_archive.py).
+.json       field.schema.json; one line per pixel. Numbers are the shortest that give back the same doubles.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ _Kind = TypeVar("_Kind")
 
 
 def write_field(field: CrossField, path: str | Path) -> Path:
-    """The path of the file that now holds the field; .npz, .json or .rawfield by the ending of its name.
+    """Write the field and return the path; the suffix .npz, .json or .rawfield chooses the format.
 
-    A .rawfield gets its mesh beside it, with the ending .obj, and its singularities, with .sings. Same field,
-    same bytes.
-    Raises InputError for another ending and OutputError when a file cannot be written.
+    A .rawfield gets two companions of the same name: its mesh (.obj) and its singularities (.sings). Equal
+    fields give equal bytes.
+    Raises InputError for another suffix and OutputError when a file cannot be written.
     """
     path = Path(path)
     write = _of_suffix(_WRITERS, path, "written")
@@ -67,13 +67,13 @@ def write_field(field: CrossField, path: str | Path) -> Path:
 
 
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
-    """The field that a .npz, .json or .rawfield file holds, with its instance.
+    """Read a field and its instance from a .npz, .json or .rawfield file.
 
-    on: the instance that it must be on, when one is given. A .rawfield holds no instance and needs it: its
-    faces are the triangles of the .obj that `write_field` leaves, or one for each pixel; its four vectors
+    on: the instance that the field must be on, if given. A .rawfield holds no instance and needs it: its
+    faces are the triangles of the .obj that `write_field` writes, or one per pixel. Its four vectors
     u, v, -u, -v, of any length and in any order, become the two lines of `CrossField.from_lines`.
-    Raises InputError for another suffix, an unreadable file, and a .rawfield without an instance; and
-    InstanceError, with file and place, for a damaged one and another instance.
+    Raises InputError for another suffix, an unreadable file, and a .rawfield without an instance. Raises
+    InstanceError, with file and place, for a damaged file and another instance.
     """
     path = Path(path)
     if path.suffix.lower() == ".rawfield":
@@ -89,7 +89,7 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
 def _read_rawfield(path: Path, on: Instance | None) -> CrossField:
     if on is None:
         raise InputError(
-            "holds no instance, so that nothing says which pixels its rows are; give the instance: "
+            "holds no instance, so the pixels of its rows are unknown; give the instance: "
             "read_field(path, on=instance)",
             file=path,
         )
@@ -128,7 +128,7 @@ def _of_npz(data: bytes) -> CrossField:
 
 
 def _embedded(read: Callable[[_Kind], Instance], source: _Kind) -> Instance:
-    """The instance inside a field file; errors say that they are about it."""
+    """The instance inside a field file; errors state that they concern it."""
     try:
         return read(source)
     except InstanceError as error:
@@ -153,7 +153,7 @@ def field_to_json(field: CrossField) -> bytes:
 
 
 def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
-    """Jump of each pixel's pair in the table, None where there is no pair; shape (n,), objects."""
+    """Jump of each pixel's pair in the table, None without a pair; shape (n,), objects."""
     pair = table[field.instance.mask]
     jumps = np.full(len(pair), None, dtype=object)
     jumps[pair >= 0] = field.p[pair[pair >= 0]]
@@ -161,7 +161,7 @@ def _jumps(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
 
 
 def field_of_json(data: bytes) -> CrossField:
-    """Return the field that a JSON file holds, given as its bytes.
+    """Read a field from the bytes of a JSON file.
 
     Raises InstanceError with the place in the document.
     """
@@ -192,12 +192,12 @@ def _are_pixels(rows: list[Any]) -> bool:
 
 
 def _field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
-    """The field. Raises InstanceError for numbers that are no angles."""
+    """The field. Raises InstanceError for numbers that are not angles."""
     for name, values in (("alpha", alpha), ("beta", beta)):
         size = np.abs(np.asarray(values, dtype=np.float64))
-        if (np.isfinite(size) & (size > MOST_ANGLE)).any():  # CrossField tells of those that are not finite
+        if (np.isfinite(size) & (size > MOST_ANGLE)).any():  # CrossField refuses numbers that are not finite
             raise InstanceError(
-                f"{name} holds numbers beyond {MOST_ANGLE:g}, which are no angles; write it again"
+                f"{name} holds numbers beyond {MOST_ANGLE:g}, which are not angles; write it again"
             )
     return CrossField(instance, alpha, beta, p)
 
@@ -215,7 +215,7 @@ def _check_places(grid: Grid, places: Ints) -> None:
 
 
 def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> None:
-    """Put the jumps of the pixels, NaN where there is none, at their pairs in p."""
+    """Store the jumps of the pixels, NaN where there is none, at their pairs in p."""
     pair = table[grid.mask]
     wrong: Bools = np.isnan(jumps) != (pair < 0)
     if wrong.any():

@@ -1,10 +1,10 @@
-"""Two fields made one: at every pixel the cross of the one or of the other, whichever choice costs least.
+"""Fusion of two fields: at every pixel the cross of one of them, so that the energy is least.
 
-Fields that strategies find for one sketch are alike in most places and differ in some regions, each lower
+Fields that strategies find for one sketch agree in most places and differ in some regions, each being better
 in some of them. The choice of least energy is a minimum cut, the fusion move of Lempitsky, Rother, Roth,
-Blake (Fusion Moves for Markov Random Field Optimization, IEEE PAMI 32, 2010): crosses are not turned, so
-that the energy of a choice is a sum over pixels and pairs of neighbours. Where two of the same field cost
-more beside each other than mixed ones, which a cut cannot say, mixed ones count as much.
+Blake (Fusion Moves for Markov Random Field Optimization, IEEE PAMI 32, 2010). Crosses are not turned, so
+the energy of a choice is a sum over pixels and pairs of neighbours. A cut cannot express that two neighbours
+of the same field cost more than a mixed pair; then the mixed pair counts as much.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ..instance.instance import HALF
 from .field import CrossField
 from .jumps import free_jumps, parity_sign
 
-_APART: Final = 0.02  # radians of cross error up to which two crosses count as one
-_UNITS: Final = 1e6  # into which 1 + energy is divided: flows are whole numbers, whose sums no order changes
-_MOST: Final = 1e9  # units of a pixel's price, far beyond all that a choice can gain: flows have 32 bits
+_APART: Final = 0.02  # radians of cross error up to which two crosses count as equal
+_UNITS: Final = 1e6  # parts of 1 + energy: flows are whole numbers, whose sums do not depend on the order
+_MOST: Final = 1e9  # units of a pixel's price, far more than a choice can gain: flows have 32 bits
 
 
 def fused(one: CrossField, other: CrossField) -> CrossField:
-    """The field of `one` or of `other` at each pixel, whichever lowers the 2-norm energy, with best jumps.
+    """The field that takes each cross from `one` or `other`, at the least 2-norm energy, with best jumps.
 
-    Both are on the same instance. Angles are as in either, jumps in no range. It is `one` where a cut finds
-    no choice that is lower by 1e-6 of 1 + energy. Deterministic.
+    Both fields are on the same instance. Jumps are not limited to a range. Returns `one` if no cut finds a
+    choice that is lower by 1e-6 of 1 + energy. Deterministic.
     """
     grid, energy = one.instance.grid, one.energy().total
     far = one.cross_error(other.alpha + other.beta, other.alpha + HALF - other.beta) > _APART
@@ -54,7 +54,7 @@ def fused(one: CrossField, other: CrossField) -> CrossField:
 
 
 def _of_pixels(field: CrossField) -> Floats:
-    """What each pixel adds to the energy without its neighbours, shape (n,)."""
+    """Contribution of each pixel to the energy without its neighbours, shape (n,)."""
     terms, instance = field.instance.stroke_terms, field.instance
     residual = terms.residuals(field.alpha, field.beta)
     strokes = terms.at_pixels(terms.weight * residual * residual, instance.grid.size)
@@ -63,11 +63,11 @@ def _of_pixels(field: CrossField) -> Floats:
 
 
 def _least_of_pairs(pairs: Ints, first: CrossField, second: CrossField) -> Floats:
-    """What pairs add to the energy with their best jumps, first pixels of one field, second of another."""
+    """Energies of pairs with their best jumps; first pixels from one field, second from another."""
     i, j = first.instance.grid.first[pairs], first.instance.grid.second[pairs]
     turn = first.alpha[i] - second.alpha[j]
     near = np.floor(-turn / HALF).astype(np.int32)
-    # The best even and the best odd jump are the two beside -2 turn / pi.
+    # The best even and the best odd jump are the two next to -2 turn / pi.
     ways = (
         2 * ((turn + HALF * p) ** 2 + (parity_sign(p) * first.beta[i] - second.beta[j]) ** 2)
         for p in (near, near + 1)
@@ -76,8 +76,10 @@ def _least_of_pairs(pairs: Ints, first: CrossField, second: CrossField) -> Float
 
 
 def _least_cut(free: Bools, price: Floats, links: Ints, excess: Floats) -> Bools:
-    """Which free pixels pay: the choice of least price, and of excess for each link from a pixel that does
-    not pay to one that does. All shapes (n,), links (2, k), excess (k,); whole numbers.
+    """The set of free pixels that pay, at the least total of prices and excesses.
+
+    An excess is due for each link from a pixel that does not pay to one that does. Shapes (n,), links (2, k),
+    excess (k,); whole numbers.
     """
     count = int(free.sum())
     number = np.cumsum(free) - 1

@@ -1,4 +1,4 @@
-"""Labels of crosses, and jumps between those of neighbouring pixels: signs of beta, best jumps, steps.
+"""Labels of crosses, and jumps between labels of neighbouring pixels: signs of beta, best jumps, steps.
 
 The label of a cross is (alpha, beta); its step by k is (alpha + k pi/2, (-1)^k beta), which is the same
 cross.
@@ -19,9 +19,9 @@ def parity_sign(p: Ints) -> Floats:
 
 
 def label_of(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """A label (alpha, beta) of the crosses with line angles u, v in radians: alpha + beta is u modulo pi.
+    """Labels (alpha, beta) of the crosses with line angles u, v in radians: alpha + beta is u modulo pi.
 
-    |beta| <= pi/4; it is pi/4 where both lines are one. Shapes that broadcast.
+    |beta| <= pi/4; it is pi/4 where both lines coincide. Shapes are broadcast.
     """
     u = wrap(u, 0.0, np.pi)
     v = wrap(v, u, np.pi)
@@ -29,12 +29,12 @@ def label_of(u: Floats, v: Floats) -> tuple[Floats, Floats]:
 
 
 def best_jumps(instance: Instance, alpha: Floats, beta: Floats, norm: int = 2) -> Ints:
-    """The jump of least energy in [p_min, p_max] of each pair, (m,), of equal ones the smaller."""
+    """The jump of least energy in [p_min, p_max] of each pair, (m,); ties go to the smaller jump."""
     return _best(instance.grid, alpha, beta, (instance.p_min, instance.p_max), norm)[0]
 
 
 def free_jumps(grid: Grid, alpha: Floats, beta: Floats) -> tuple[Ints, Floats]:
-    """The best jump of each pair, in no range, and its energy; ties go to the smaller jump. Shapes (m,)."""
+    """The best jump of each pair without a range, and its energy; ties go to the smaller jump; (m,)."""
     return _best(grid, alpha, beta)
 
 
@@ -44,17 +44,17 @@ def _best(
     difference = alpha[grid.first] - alpha[grid.second]
     near = np.floor(-difference / HALF).astype(np.int32)
     around = np.arange(-1, 3, dtype=np.int32)[:, None]
-    # The best even and the best odd jump are the two beside -2d/pi, unless that is a whole number.
+    # The best even and the best odd jump are the two next to -2d/pi, unless that is a whole number.
     candidates = near + around if within is None else np.clip(np.clip(near, *within) + around, *within)
     a = difference + HALF * candidates
     b = parity_sign(candidates) * beta[grid.first] - beta[grid.second]
     size = np.abs if norm == 1 else np.square
-    cost = np.round(2 * (size(a) + size(b)), 12)  # equal costs must not be told apart by rounding
+    cost = np.round(2 * (size(a) + size(b)), 12)  # rounding must not decide between equal costs
     at = (np.argmin(cost, axis=0), np.arange(len(difference)))
     return candidates[at], cost[at]
 
 
 def stepped(grid: Grid, alpha: Floats, beta: Floats, p: Ints, steps: Ints) -> tuple[Floats, Floats, Ints]:
-    """Angles (n,), jumps (m,) of the crosses after `steps` (n,) of labels; residuals change sign alone."""
+    """Angles (n,) and jumps (m,) of the crosses after `steps` (n,) of labels; residuals only change sign."""
     jumps = p - steps[grid.first] + steps[grid.second]
     return alpha + HALF * steps, parity_sign(steps) * beta, jumps

@@ -1,15 +1,15 @@
 """Directional's raw field of a mesh (.rawfield), its singularities (.sings), and the mesh (.obj).
 
-A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. What is written here goes
-counter-clockwise in every row, because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
+A line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z. Rows are written counter-clockwise,
+because the angle from u to v is pi/2 - 2 beta and |beta| <= pi/4.
 
-The mesh has two triangles a pixel, counter-clockwise with y up, and the field is per face: that is what
-Directional's examples read. Vertices at the pixels' centres would lose every pixel that is in no quad
-of the mask. Pixels that meet in a corner only get a vertex each there, so that the mesh is a manifold. Faces
-2k and 2k + 1 are pixel k. Coordinates are those of the sketch, with y negated and z = 0.
+The mesh has two triangles per pixel, counter-clockwise with y up, and the field is per face, as Directional's
+examples read it. Vertices at the pixels' centres would lose every pixel that is in no quad of the mask.
+Pixels that meet only in a corner each get their own vertex there, so that the mesh is a manifold. Faces
+2k and 2k + 1 are pixel k. Coordinates are the sketch's, with y negated and z = 0.
 
-Fields by others are read: vectors of any length and in any order, as long as there are two pairs of opposite
-ones in the plane of the mesh. Where the two triangles of a pixel differ, the pixel gets the lines between.
+Fields by others are read too: vectors of any length and order that form two pairs of opposite vectors in the
+plane of the mesh. Where the two triangles of a pixel differ, the pixel gets the lines between.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import Instance
 from .field import CrossField
 
-_ROW: Final = 12  # numbers of a face
-_OPPOSITE: Final = 1e-3  # radians by which a line's two vectors may fail to be opposite
-_FLAT: Final = 1e-6  # part of a vector that may point out of the plane
+_ROW: Final = 12  # numbers per face
+_OPPOSITE: Final = 1e-3  # radians by which the two vectors of a line may fail to be opposite
+_FLAT: Final = 1e-6  # share of a vector that may point out of the plane
 _NUMBERS: Final = re.compile(rb"[-+.0-9eE \t]*")
 
 
 def to_rawfield(field: CrossField) -> bytes:
-    """The text of the field's .rawfield: each pixel's row twice."""
+    """The text of the field's .rawfield, with each pixel's row twice."""
     vectors = np.zeros((field.instance.grid.size, 4, 3))
     vectors[:, :, :2] = np.stack([field.u, field.v, -field.u, -field.v], axis=1)
     rows = _lines(np.repeat(vectors.reshape(-1, 12), 2, axis=0) + 0.0)
@@ -42,7 +42,7 @@ def to_rawfield(field: CrossField) -> bytes:
 
 
 def to_obj(instance: Instance) -> bytes:
-    """The mesh: vertices and, 1-based, two triangles a pixel, cut from top left to bottom right."""
+    """The mesh: vertices and, 1-based, two triangles per pixel, cut from top left to bottom right."""
     places, corners = vertices_of(instance.grid)
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
@@ -55,9 +55,9 @@ def to_obj(instance: Instance) -> bytes:
 
 
 def to_sings(field: CrossField) -> bytes:
-    """The text of the field's singularities as Directional has them: a line `4 k`, then vertex and 4 index.
+    """The text of the field's singularities in Directional's format: a line `4 k`, then vertex and 4 index.
 
-    Vertices count from 0 in the order of the .obj; the index, turns of the cross counter-clockwise, follows
+    Vertices count from 0 in the order of the .obj. The index, turns of the cross counter-clockwise, follows
     the field's jumps.
     """
     places, _ = vertices_of(field.instance.grid)
@@ -70,15 +70,15 @@ def to_sings(field: CrossField) -> bytes:
 
 
 def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2); the vertex at each corner of each pixel (n, 4), row by row.
+    """Vertices [row, column] (k, 2), and the vertex at each corner of each pixel (n, 4), row by row.
 
-    Row 0, column 0 is the upper left corner of the grid. Where pixels meet in a corner only, each has a
-    vertex of its own.
+    Row 0, column 0 is the upper left corner of the grid. Pixels that meet only in a corner each have
+    their own vertex there.
     """
     down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
     inside = np.pad(grid.mask, 1)
-    # Pixels round the corner: beyond it across, and on its two sides.
+    # Pixels round the corner: the one diagonally across, and the two at its sides.
     across = inside[row + down, column + right]
     beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
     apart = across & ~beside & (right == 1)
@@ -93,12 +93,12 @@ def _lines(table: np.ndarray[Any, Any], lead: str = "") -> str:
 
 
 def most_bytes(instance: Instance) -> int:
-    """Bytes of the longest .rawfield of the instance that is read."""
+    """Most bytes of a .rawfield that is read for the instance."""
     return (MAX_NUMBER + 1) * (2 + 2 * instance.grid.size * _ROW)
 
 
 def of_rawfield(data: bytes, instance: Instance) -> CrossField:
-    """The field of a .rawfield on the instance, with two faces a pixel, or one.
+    """Read the field of a .rawfield on the instance, with two faces per pixel or one.
 
     Raises InstanceError that names the line.
     """
@@ -106,7 +106,7 @@ def of_rawfield(data: bytes, instance: Instance) -> CrossField:
     rows = _faces(lines[0] if lines else b"", instance)
     body = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
     if len(body) != rows:
-        raise InstanceError(f"has {len(body)} rows of vectors, but its first line says {rows}")
+        raise InstanceError(f"has {len(body)} rows of vectors, but its first line states {rows}")
     vectors = _vectors(body).reshape(rows, 4, 3)
     u, v = _two_lines(vectors, [number for number, _ in body])
     if rows == 2 * instance.grid.size:
@@ -123,18 +123,18 @@ def _faces(head: bytes, instance: Instance) -> int:
         )
     degree, faces = map(int, words)
     if degree != 4:
-        raise InstanceError(f"line 1: has {degree} vectors a face; crosses have 4: u, v, -u, -v")
+        raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
     size = instance.grid.size
     if faces not in (size, 2 * size):
         raise InstanceError(
             f"line 1: has {faces} faces, but {instance.name} has {size} pixels; "
-            f"give {2 * size}, those of its .obj, or {size}, one for each pixel"
+            f"give {2 * size}, as in its .obj, or {size}, one per pixel"
         )
     return faces
 
 
 def _vectors(body: list[tuple[int, bytes]]) -> Floats:
-    """The numbers of all rows, 12 each."""
+    """The numbers of all rows, 12 per row."""
     for number, line in body:
         words = len(line.split())
         if words != _ROW:
@@ -161,11 +161,11 @@ def _shown(line: bytes) -> str:
 
 
 def _two_lines(vectors: Floats, numbers: list[int]) -> tuple[Floats, Floats]:
-    """The angles u, v (k,) in radians of the two lines of four vectors each, (k, 4, 3)."""
+    """The angles u, v (k,) in radians of the two lines given by four vectors each, (k, 4, 3)."""
     largest = np.abs(vectors).max(axis=2, keepdims=True)
     _refuse(~np.isfinite(largest).all(axis=(1, 2)), numbers, "holds a number beyond the range of doubles")
     _refuse((largest == 0).any(axis=(1, 2)), numbers, "holds a vector of length 0, which has no direction")
-    unit = vectors / largest  # squares of the numbers themselves might be beyond the range of doubles
+    unit = vectors / largest  # squares of the numbers themselves might exceed the range of doubles
     unit /= np.linalg.norm(unit, axis=2, keepdims=True)
     _refuse((np.abs(unit[:, :, 2]) > _FLAT).any(axis=1), numbers, "has a vector out of the plane z = 0")
     rows = np.arange(len(unit))
@@ -187,7 +187,7 @@ def _refuse(wrong: Bools, numbers: list[int], reason: str) -> None:
 
 
 def _between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """The lines between those of two crosses, shapes (2, n), paired as they are closest."""
+    """The lines between the lines of two crosses, shapes (2, n), with the closest lines paired."""
     straight = line_difference(u[0], u[1]) + line_difference(v[0], v[1])
     crossed = line_difference(u[0], v[1]) + line_difference(v[0], u[1])
     swap = crossed < straight
@@ -196,6 +196,6 @@ def _between(u: Floats, v: Floats) -> tuple[Floats, Floats]:
 
 
 def _middle(first: Floats, second: Floats) -> Floats:
-    """The line between two lines, (n,), the first where they are the same."""
+    """The line between two lines, (n,); the first where they are equal."""
     middle = line_of(double_angle(first) + double_angle(second))
     return np.where(line_difference(first, second) < _OPPOSITE * 1e-9, first, middle)

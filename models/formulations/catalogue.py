@@ -1,9 +1,9 @@
 """The nine formulations, each one function that reads from top to bottom like the paper.
 
 Each yields the terms of its objective and its rows as SymPy expressions over the pixels I, the stroke pixels
-S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the
-docs are all readings of these expressions. Equation numbers are the paper's. What a formulation is made of:
-declaration.py; the symbols: symbols.py.
+S_c or the neighbour pairs E. Files, NumPy evaluation, Pyomo models and the formulas of the docs are all
+derived from these expressions. Equation numbers are the paper's. Parts of a formulation: declaration.py;
+symbols: symbols.py.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def miqp_exact() -> Families:
     yield from skew(norm=2)
 
 
-# What several formulations share.
+# Parts that several formulations share.
 
 
 def strokes(norm: int) -> Families:
@@ -198,7 +198,7 @@ def strokes(norm: int) -> Families:
 
 
 def skew(norm: int) -> Families:
-    """The skew term, (6) or (21), and for the 1-norm its rows (24), (25). w_beta is meant once."""
+    """The skew term, (6) or (21), and for the 1-norm its rows (24), (25). w_beta enters once."""
     if norm == 2:
         yield term("skew", I, w_beta * beta**2, "(6)")
         return
@@ -208,13 +208,13 @@ def skew(norm: int) -> Families:
 
 
 def jump_bounds() -> Families:
-    """Rows p_min <= p1 + 2 p2 <= p_max, where the bounds of p1 and p2 do not say it already."""
+    """Rows p_min <= p1 + 2 p2 <= p_max, where the bounds of p1 and p2 do not imply them."""
     yield row("jlo", E, p1 + 2 * p2 >= p_min, "(7), bounded", only=("p_min", 1))
     yield row("jup", E, p1 + 2 * p2 <= p_max, "(7), bounded", only=("p_max", 0))
 
 
 def facets_of_z(facet: Facet) -> Families:
-    """The facets of z = p1 beta_i: (26)-(29). With `printed`, (26) is the lower bound of z and no row."""
+    """The facets of z = p1 beta_i: (26)-(29). With `printed`, (26) is the lower bound of z, not a row."""
     if facet == "hull":
         yield row(26, E, z >= -pi / 4 * p1, "(26), corrected")
     yield row(27, E, z <= beta_i - pi / 4 * p1 + pi / 4)
@@ -223,7 +223,7 @@ def facets_of_z(facet: Facet) -> Families:
 
 
 def declare(name: str, **chosen: Any) -> Formulation:
-    """The formulation of that name, full or short, with options: facet, stroke_norm, beta_norm, relax.
+    """The formulation of a name, full or short, with options: facet, stroke_norm, beta_norm, relax.
 
     An option that is None keeps its default. Raises FormulationError for an unknown name, option or value.
     """

@@ -1,8 +1,8 @@
 """Parts of a declared formulation: families of terms and rows, options, and their table.
 
 A formulation is a function that yields its families from top to bottom. Its parameters are its options, the
-first line of its docstring is its summary, and the decorator `formulation` states all else that is known of
-it. Nothing about it stands anywhere else.
+first line of its docstring is its summary, and the decorator `formulation` states everything else about it.
+This is the only place that describes a formulation.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ E: Final[IndexSet] = "pairs"
 class Family:
     """One expression over one index set: a term of the objective, or a row.
 
-    tag: short name, the stem of row names; a row's expression is a relation. paper: where it comes from.
+    tag: short name, the stem of row names; a row's expression is a relation. paper: its place in the paper.
     only: (`p_min` or `p_max`, parity) for rows that are needed only where it has this parity, else None.
     """
 
@@ -45,7 +45,7 @@ class Family:
 
     @property
     def is_row(self) -> bool:
-        """Whether it is a row; else it is a term of the objective."""
+        """Whether the family is a row; otherwise it is a term of the objective."""
         return bool(self.expression.is_Relational)
 
     @property
@@ -56,7 +56,7 @@ class Family:
 
     @property
     def sense(self) -> str:
-        """`>=`, `<=` or `==` for a row, empty for a term of the objective."""
+        """Relation `>=`, `<=` or `==` of a row, empty for a term of the objective."""
         e = self.expression
         return {"Eq": "=="}.get(e.func.__name__, e.rel_op) if self.is_row else ""
 
@@ -67,7 +67,7 @@ class Family:
         return [symbol for symbol in SLOTS[self.over] if symbol in present]
 
     def unknowns(self, fixed: tuple[str, ...] = ()) -> list[sp.Symbol]:
-        """Those of its symbols that mean variables, the ones that are fixed aside."""
+        """Its symbols that denote variables, without the fixed ones."""
         return [
             symbol
             for symbol in self.symbols
@@ -88,14 +88,14 @@ def row(
     *,
     only: tuple[str, int] | None = None,
 ) -> Family:
-    """A row for each element of an index set; number: of the paper's equation, or a tag."""
+    """A row for each element of an index set; number: the paper's equation, or a tag."""
     tag = f"c{number}" if isinstance(number, int) else number
     return Family(tag, over, relation, paper or f"({number})", only)
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a formulation leaves open: facet of z, norms of the two terms, integrality dropped."""
+    """Choices that a formulation leaves open: facet of z, norms of the two terms, integrality dropped."""
 
     facet: Facet = "hull"
     stroke_norm: int = 2
@@ -107,10 +107,10 @@ class Options:
 class Declaration:
     """A line of the table of formulations.
 
-    name; paper: its section, or `ours`; kind: the class as people call it; short: how names of library
-    entries carry it; minimises: what its objective is, the same words for formulations with the same optimum;
-    how: why it says the same as the others with these words; families: yields terms and rows for the options
-    that it takes; fixed: variables that are data.
+    name; paper: its section, or `ours`; kind: the usual name of its class; short: its name in identifiers of
+    library entries; minimises: its objective, in the same words for formulations with the same optimum;
+    how: why it is equivalent to the others with these words; families: function that yields terms, rows for
+    the options that it takes; fixed: variables that are data.
     """
 
     name: str
@@ -124,36 +124,36 @@ class Declaration:
 
     @property
     def source(self) -> str:
-        """Where it comes from: a section of the paper, or `ours`."""
+        """Origin: a section of the paper, or `ours`."""
         return f"section {self.paper}" if self.paper[0].isdigit() else self.paper
 
     @property
     def summary(self) -> str:
-        """One line on what distinguishes it."""
+        """One line on the feature that distinguishes the formulation."""
         first = (inspect.getdoc(self.families) or "").splitlines()[0].rstrip(".")
         return first[0].lower() + first[1:]
 
     @cached_property
     def defaults(self) -> Options:
-        """The options it has when none is chosen."""
+        """The default options."""
         own = inspect.signature(self.families).parameters.values()
         return Options(**{parameter.name: parameter.default for parameter in own})
 
     @cached_property
     def settable(self) -> frozenset[str]:
-        """Names of the options that may be chosen; `relax` where a variable is an integer."""
+        """Names of the options that may be chosen; `relax` if a variable is an integer."""
         return frozenset(inspect.signature(self.families).parameters) | (
             {"relax"} if not self.fixed else set()
         )
 
     @property
     def equivalent(self) -> str:
-        """The first other formulation with the same optimum, empty when there is none."""
+        """The first other formulation with the same optimum, empty if there is none."""
         same = (other.name for other in FORMULATIONS.values() if other.minimises == self.minimises)
         return next((name for name in same if name != self.name), "")
 
     def with_options(self, chosen: Mapping[str, Any]) -> Formulation:
-        """The formulation with the chosen options. Raises FormulationError for one that does not fit."""
+        """The formulation with the chosen options. Raises FormulationError for a wrong option."""
         options = self._options(chosen)
         given = {name: getattr(options, name) for name in inspect.signature(self.families).parameters}
         families = [
@@ -183,7 +183,7 @@ class Declaration:
 class Formulation:
     """A declared formulation with its options chosen: terms of the objective and rows, in order.
 
-    lifted: how products were lifted, empty when they were not.
+    lifted: how products were lifted, empty if they were not.
     """
 
     declaration: Declaration
@@ -204,7 +204,7 @@ class Formulation:
 
     @property
     def summary(self) -> str:
-        """One line on what distinguishes it."""
+        """One line on the feature that distinguishes the formulation."""
         return self.declaration.summary
 
     @property
@@ -224,14 +224,14 @@ class Formulation:
 
     @property
     def equivalent(self) -> str:
-        """Another formulation of the very same problem, empty when there is none: relaxations have none."""
+        """Another formulation of the same problem, empty if there is none; relaxations have none."""
         return "" if self.options.relax else self.declaration.equivalent
 
     @property
     def weakened(self) -> bool:
-        """Whether lifting made it a relaxation of itself.
+        """Whether lifting has made the formulation a relaxation of itself.
 
-        Between its facets z is p1 beta_i at p1 = 0 and 1 alone, and here p1 may lie between.
+        Between its facets z is p1 beta_i only at p1 = 0 and 1, and here p1 may lie between.
         """
         return bool(self.lifted) and self.options.relax
 
@@ -243,14 +243,14 @@ class Formulation:
 
 @cache
 def _is_convex(objective: tuple[Family, ...], rows: tuple[Family, ...], fixed: tuple[str, ...]) -> bool:
-    """The families are few, so each set of them is looked at once however many problems there are."""
+    """Whether families are convex as written; cached, because the sets of families are few."""
     return all(_degree(family.body, family.unknowns(fixed)) <= 1 for family in rows) and all(
         _is_sum_of_squares(family.expression, family.unknowns(fixed)) for family in objective
     )
 
 
 def _is_sum_of_squares(expression: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
-    """Whether every term is linear, or a square of a linear expression that is not taken away."""
+    """Whether every term is linear, or a square of a linear expression that is added."""
     return all(_is_square(summand, unknowns) for summand in sp.Add.make_args(expression))
 
 
@@ -265,7 +265,7 @@ def _is_square(summand: sp.Expr, unknowns: list[sp.Symbol]) -> bool:
 
 
 def _degree(expression: sp.Expr, unknowns: list[sp.Symbol]) -> float:
-    """Degree in the unknowns; infinite for what is no polynomial."""
+    """Degree in the unknowns; infinite for an expression that is not a polynomial."""
     if not unknowns:
         return 0
     if not expression.is_polynomial(*unknowns):
@@ -280,7 +280,7 @@ FORMULATIONS: Final[Mapping[str, Declaration]] = MappingProxyType(_TABLE)
 
 
 def declaration_of(name: str) -> Declaration:
-    """The line of the table that a name or short name means, as `milp` means `milp-mccormick`.
+    """The formulation of a full or short name: `milp` means `milp-mccormick`.
 
     Raises FormulationError for another word, with the nearest of these names.
     """
@@ -302,7 +302,7 @@ def short_names() -> list[str]:
 def formulation(
     name: str, *, paper: str, kind: str, short: str, minimises: str, how: str, fixed: tuple[str, ...] = ()
 ) -> Callable[[Callable[..., Iterator[Family]]], Declaration]:
-    """A decorator: enters a function that yields families into the table, as its `Declaration`."""
+    """Return a decorator that enters a function that yields families into the table, as its `Declaration`."""
 
     def enter(families: Callable[..., Iterator[Family]]) -> Declaration:
         assert not {name, short} & {*_TABLE, *short_names()}, f"there are two formulations {name} or {short}"

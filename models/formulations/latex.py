@@ -1,4 +1,4 @@
-"""LaTeX of a formulation, read off its declaration."""
+"""LaTeX of a formulation, derived from its declaration."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def latex(formulation: Formulation) -> str:
 
 
 def _domain(variable: Variable, formulation: Formulation) -> str:
-    """A line that says where a variable lies."""
+    """A line with the domain of a variable."""
     name, lower, upper = (expression(e) for e in (_own(variable), variable.lower, variable.upper))
     if variable.integer and not formulation.options.relax:
         between = [] if variable.upper - variable.lower == 1 else [r"\ldots"]
@@ -56,7 +56,7 @@ def _domain(variable: Variable, formulation: Formulation) -> str:
 
 
 def _own(variable: Variable) -> sp.Symbol:
-    """The symbol that means the variable itself."""
+    """The symbol that denotes the variable itself."""
     return next(symbol for symbol, slot in SLOTS[variable.over].items() if slot == (variable.name, "itself"))
 
 

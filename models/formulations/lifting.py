@@ -1,4 +1,4 @@
-"""The product p1 beta_i as a variable z, for formats that hold nothing beyond quadratic."""
+"""The product p1 beta_i as a variable z, for formats up to quadratic terms."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _WEAKER: Final = (
 
 
 def lift_products(formulation: Formulation) -> Formulation:
-    """The formulation with z for every product p1 beta_i, and its hull facets:
-    the same problem while p1 is 0 or 1.
+    """The formulation with z for every product p1 beta_i, and its hull facets.
 
-    With integrality dropped the result is a relaxation (`Formulation.weakened`). A square stays a square of a
-    linear expression, so that (8) becomes convex; (9) stays the expanded polynomial with 4 z beta_j.
+    It is the same problem while p1 is 0 or 1. With integrality dropped the result is a relaxation
+    (`Formulation.weakened`). A square stays a square of a linear expression, so that (8) becomes convex; (9)
+    stays the expanded polynomial with 4 z beta_j.
     """
     lifted = tuple(replace(family, expression=_lift(family.expression)) for family in formulation.objective)
     return replace(

@@ -1,4 +1,4 @@
-"""Monomials: those of a declaration, and the sum over equal ones of all its elements."""
+"""Monomials of a declaration, and the sums of equal ones over all its elements."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ..instance.grid import Bools, Floats, Ints
 from .declaration import Family
 
 Monomials = tuple[tuple[tuple[sp.Symbol, ...], sp.Expr], ...]
-"""Symbols, each as often as its power says, and coefficient, free of these symbols."""
+"""Symbols, each repeated as often as its power, and a coefficient without these symbols."""
 
 _NOISE: Final = 1e-12
-"""Rounding noise, relative to an element's largest coefficient: cancelled terms, angles of 1e-16."""
+"""Rounding noise relative to an element's largest coefficient: cancelled terms, angles of 1e-16."""
 
 
 @cache
 def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | None:
-    """The monomials of a declaration by degree, the constant one included; None when it is no polynomial.
+    """The monomials of a declaration by degree, constant included; None if it is not a polynomial.
 
-    Declarations are few and fixed: SymPy takes each apart once, however many instances there are.
+    Declarations are few and fixed: SymPy expands each once, for any number of instances.
     """
     if not variables:
         return (((), family.body),)
@@ -41,13 +41,13 @@ def monomials(family: Family, variables: tuple[sp.Symbol, ...]) -> Monomials | N
 
 def ordered(factors: tuple[Ints, ...]) -> Ints:
     """Columns of each monomial in ascending order, shape (count, degree)."""
-    if len(factors) == 2:  # nearly all, and faster than sorting rows
+    if len(factors) == 2:  # nearly all monomials, and faster than sorting rows
         return np.stack([np.minimum(*factors), np.maximum(*factors)], axis=1)
     return np.sort(np.stack(factors, axis=1), axis=1)
 
 
 def merged(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
-    """Sums over equal rows of `index`, sorted, without noise. columns: more than any index."""
+    """Sums over equal rows of `index`, sorted, without noise. columns: a number above every index."""
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]
@@ -62,12 +62,12 @@ def _sums(values: Floats, rank: NDArray[np.intp], count: int) -> Floats:
 
 
 def beyond_noise(total: Floats, scale: Floats) -> Bools:
-    """Whether sums are more than rounding, for terms of that scale."""
+    """Whether sums exceed rounding, for terms of that scale."""
     return np.abs(total) > _NOISE * scale
 
 
 def ranked(values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each distinct value stands, in ascending order, and the rank of every value among them."""
+    """Positions of the distinct values in ascending order, and the rank of every value among them."""
     order = np.argsort(values, kind="stable")
     ascending = values[order]
     new = np.ones(len(values), dtype=bool)

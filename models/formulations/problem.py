@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Monomial:
-    """A monomial of a family: symbols, each as often as its power, and coefficient (one or (count,))."""
+    """A monomial of a family: symbols, each repeated by its power, and coefficient (one or (count,))."""
 
     family: PlacedFamily
     symbols: tuple[sp.Symbol, ...]
@@ -63,7 +63,7 @@ class Monomial:
 
     @property
     def factors(self) -> tuple[Ints, ...]:
-        """Columns of its symbols, one array (count,) each; made anew at every call to spare memory."""
+        """Columns of its symbols, one array (count,) each; computed at every call to save memory."""
         return tuple(map(self.family.columns, self.symbols))
 
     @property
@@ -74,9 +74,9 @@ class Monomial:
 
 @dataclass(frozen=True, eq=False)
 class PlacedFamily:
-    """A family placed on an instance: where its elements are and which columns its symbols mean.
+    """A family placed on an instance: the positions of its elements and the columns of its symbols.
 
-    elements: indices into the family's index set, shape (count,). `terms` is None for what is no polynomial.
+    elements: indices into the family's index set, shape (count,). `terms` is None if it is not a polynomial.
     """
 
     family: Family
@@ -90,7 +90,7 @@ class PlacedFamily:
 
     @cached_property
     def variables(self) -> tuple[sp.Symbol, ...]:
-        """Symbols that mean columns."""
+        """Symbols that denote columns."""
         slots = SLOTS[self.family.over]
         return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
 
@@ -101,11 +101,11 @@ class PlacedFamily:
         return own + np.int32(block.offset)
 
     def block(self, symbol: sp.Symbol) -> Block:
-        """The block of columns that a symbol means."""
+        """The block of columns that a symbol denotes."""
         return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
 
     def inside(self, symbol: sp.Symbol) -> Ints | None:
-        """The symbol's place in its block at each element, (count,); None: the element's own."""
+        """The symbol's place in its block at each element, (count,); None: the element's own place."""
         index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
         if isinstance(index, slice):
             return None if self.everywhere else self.elements
@@ -132,7 +132,7 @@ class PlacedFamily:
 
     @cached_property
     def terms(self) -> tuple[Monomial, ...] | None:
-        """Its monomials, the constant one included, or None when it is no polynomial."""
+        """Its monomials, the constant included, or None if it is not a polynomial."""
         split = monomials(self.family, self.variables)
         if split is None:
             return None
@@ -140,7 +140,7 @@ class PlacedFamily:
 
     @property
     def degree(self) -> int:
-        """Degree of the polynomial; 99 for what is none."""
+        """Degree of the polynomial; 99 for another expression."""
         return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
 
     def of_degree(self, degree: int) -> tuple[Monomial, ...]:
@@ -169,7 +169,7 @@ class PlacedFamily:
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
 
     def excess(self, point: Floats) -> Floats:
-        """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
+        """Amount by which a point breaks each row, shape (count,): 0 or less where the row holds."""
         values = self.values(point)
         by_sense: dict[str, Floats] = {"==": np.abs(values), "<=": values, ">=": -values}
         return by_sense[self.family.sense]
@@ -177,7 +177,7 @@ class PlacedFamily:
 
 @dataclass(frozen=True)
 class Violation:
-    """The worst violations of a point: of rows, of bounds, of integrality; zero when there is none."""
+    """The worst violations of a point: of rows, of bounds, of integrality; zero without one."""
 
     rows: float
     bounds: float
@@ -206,7 +206,7 @@ class Problem:
     windows: Windows | None = None
 
     def __post_init__(self) -> None:
-        """Check that jumps are there exactly where they are data, and what is fixed fits the instance."""
+        """Check that jumps are given exactly where they are data, and that fixed values fit the instance."""
         if (self.jumps is None) == bool(self.formulation.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
@@ -245,7 +245,7 @@ class Problem:
         """Compute every array that the problem keeps.
 
         Call it before several threads share the problem: `cached_property` takes no lock since Python 3.12,
-        so each thread would compute an array of its own.
+        so each thread would compute its own array.
         """
         for name, kept in vars(Problem).items():
             if isinstance(kept, cached_property):
@@ -267,7 +267,7 @@ class Problem:
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """Arrays that symbols may mean beside columns."""
+        """Arrays that symbols may denote, besides columns."""
         data: dict[str, Any] = {
             "theta": self.instance.target,
             "w": self.instance.w,
@@ -288,7 +288,7 @@ class Problem:
 
     @property
     def tightened(self) -> str:
-        """How its windows were narrowed, one line; empty when they were not."""
+        """How its windows were narrowed, one line; empty if they were not."""
         if self.windows is None:
             return ""
         same = self.formulation.declaration.minimises in {TWO_NORM, AT_JUMPS}
@@ -318,7 +318,7 @@ class Problem:
         return blocks
 
     def _value(self, bound: sp.Expr) -> Floats:
-        """Values of a bound: one for each element, or one for all."""
+        """Values of a bound: one per element, or one for all."""
         symbols = sorted(bound.free_symbols, key=_name)
         return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
 
@@ -369,17 +369,17 @@ class Problem:
 
     @cached_property
     def objective_degree(self) -> int:
-        """Degree of the objective; 99 when it is no polynomial."""
+        """Degree of the objective; 99 if it is not a polynomial."""
         return max((family.degree for family in self.objective), default=0)
 
     @cached_property
     def row_degree(self) -> int:
-        """Greatest degree of a row; 99 when one is no polynomial, 0 without rows."""
+        """Greatest degree of a row; 99 if one is not a polynomial, 0 without rows."""
         return max((family.degree for family in self.rows), default=0)
 
     @property
     def problem_class(self) -> str:
-        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP (whether a QP is convex says `convex`)."""
+        """LP, MILP, QP, MIQP, QCP, MIQCP, NLP or MINLP; `convex` states whether a QP is convex."""
         integer = "MI" if self.integer.any() else ""
         if max(self.objective_degree, self.row_degree) > 2:
             return f"{integer}NLP"
@@ -395,8 +395,7 @@ class Problem:
         return self.formulation.convex
 
     def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
-        """The monomials of that degree, each set of columns once, sorted:
-        columns (k, degree) and coefficients (k,).
+        """The monomials of that degree, equal ones merged, sorted: columns (k, degree), coefficients (k,).
 
         Coefficients that cancel are left out. Shape (1, 0) for the constant.
         """
@@ -440,7 +439,7 @@ class Problem:
         )
 
     def point(self, field: CrossField) -> Floats:
-        """The complete point of a field: angles, jumps, and every other column at the value it stands for.
+        """The complete point of a field: angles, jumps, and every other column at its value for them.
 
         Raises InstanceError when the field is on another instance.
         """
@@ -463,13 +462,14 @@ class Problem:
 
     @cached_property
     def sha256(self) -> str:
-        """64 hexadecimal digits that stand for instance, formulation, options and jumps."""
+        """64 hexadecimal digits that identify instance, formulation, options and jumps."""
         return self._digest(self.formulation.lifted)
 
     @cached_property
     def stamp(self) -> str:
-        """`sha256_` and the first 12 digits of the hash before products were lifted:
-        the one that a manifest has, short enough for names.
+        """`sha256_` and the first 12 digits of the hash before products were lifted.
+
+        Manifests hold this hash; the stamp is short enough for names.
         """
         return f"sha256_{self._digest('')[:12]}"
 
@@ -489,7 +489,7 @@ def _angles_and_jumps(field: CrossField) -> dict[str, Any]:
 
 
 def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
-    """The block of columns `name` where angles and jumps are given, by the variable's definition."""
+    """The block of columns `name` at given angles and jumps, by the variable's definition."""
     if name in given:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
@@ -501,7 +501,7 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
 
 
 def _costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
-    """As `merged`, for single columns of a block: one number each, terms added in turn."""
+    """Coefficients of a block's single columns, added as in `merged`: terms in turn, one per column."""
     if not terms:
         return np.zeros((0, 1), np.int32), np.zeros(0)
     total, scale = np.zeros(block.count), np.zeros(block.count)
@@ -525,11 +525,11 @@ def _name(symbol: sp.Symbol) -> str:
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
-    """The problem of that formulation on the instance.
+    """The problem of a formulation on the instance.
 
     name: full or short, as `crossfield list` shows them. options, where the formulation has them: facet
     (`hull`, `printed`), stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the
-    jumps (m,), for `qp-fixed` alone.
+    jumps (m,), for `qp-fixed` only.
     Raises FormulationError for an unknown name, option or value (docs/formulations.md has the formulas).
     """
     return Problem(instance, declare(name, **options), p)
@@ -538,8 +538,8 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     """The same problem with its integer columns fixed at the jumps of a field: a continuous problem.
 
-    Fixed columns stay, with equal bounds: names and order are those of the problem. Raises InstanceError when
-    the field is on another instance.
+    Fixed columns stay, with equal bounds; names and order do not change. Raises InstanceError when the field
+    is on another instance.
     """
     return replace(problem, pinned=field)
 
@@ -547,13 +547,13 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
 def tightened(problem: Problem, windows: Windows) -> Problem:
     """The same problem with narrower windows of alpha and beta and ranges of jumps.
 
-    Raises InstanceError for windows that are not within those of its gauge.
+    Raises InstanceError for windows that are not within the windows of its gauge.
     """
     return replace(problem, windows=windows)
 
 
 def lifted(problem: Problem) -> Problem:
-    """The problem with each p1 beta_i lifted to z, for formats up to quadratic: `Formulation.weakened`."""
+    """The problem with each p1 beta_i lifted to z, for formats up to quadratic (`Formulation.weakened`)."""
     return replace(problem, formulation=lift_products(problem.formulation))
 
 

@@ -1,10 +1,9 @@
-"""The symbols of the formulations: which quantity each one means, and where on the grid it lives.
+"""The symbols of the formulations: the quantity that each denotes, and its place on the grid.
 
 A *quantity* (alpha, s, theta, ...) has one value per element of an index set: the pixels I, the stroke pixels
-S_c, or the neighbour pairs E. A *slot* is a symbol in an
-expression over such a set; it names a quantity and the way to it: over the pairs, alpha_i is alpha at the
-first pixel, alpha_j at the second. The size of a sketch changes the length of the index arrays, never an
-expression.
+S_c, or the neighbour pairs E. A *slot* is a symbol in an expression over such a set. It names a quantity and
+the way to it: over the pairs, alpha_i is alpha at the first pixel, alpha_j at the second. The size of a
+sketch changes the length of the index arrays, never an expression.
 """
 
 from __future__ import annotations
@@ -52,9 +51,9 @@ R: Final = alpha + beta - theta
 class Variable:
     """A block of columns: one variable per element of an index set.
 
-    lower, upper: its bounds, numbers or expressions in data over its index set, from which every format,
-    NumPy and the formulas of the docs read them; value: the variable at a given field, as an expression over
-    its index set; meaning: one line for the docs.
+    lower, upper: its bounds, numbers or expressions in data over its index set. Every format, NumPy and the
+    formulas of the docs are derived from them. value: the variable at a given field, as an expression over
+    its index set. meaning: one line for the docs.
     """
 
     name: str
@@ -92,7 +91,7 @@ VARIABLES: Final = {
 """Every variable of every formulation, in the order of columns."""
 
 NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
-"""The same where a proof has narrowed the windows: those of beta then are data too."""
+"""The same variables after a proof has narrowed the windows, so that bounds of beta are data too."""
 
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
     "pixels": {
@@ -116,7 +115,7 @@ SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
 """For each index set: symbol -> (quantity, way to it)."""
 
 SCALARS: Final = {w_strokes: "stroke_coefficient", w_beta: "skew_coefficient"}
-"""Symbols that are one number for the whole instance, and the attribute of the instance that holds it."""
+"""Symbols with one value for the whole instance, and the instance's attribute that holds it."""
 
 LATEX: Final = {
     **{symbol: f"{symbol.name}_{{ij}}" for symbol in (p, s, t, z, d, u)},
@@ -152,7 +151,7 @@ def elements(instance: Instance, over: IndexSet) -> int:
 
 
 def way(instance: Instance, kind: Way) -> Ints | slice:
-    """Index array that leads from the elements of a family to the elements of a quantity."""
+    """Index array from the elements of a family to the elements of a quantity."""
     if kind == "first":
         return instance.grid.first
     if kind == "second":
@@ -161,7 +160,7 @@ def way(instance: Instance, kind: Way) -> Ints | slice:
 
 
 def pixel_of(instance: Instance, over: IndexSet) -> Ints:
-    """Number of the pixel at which each element of an index set lies (of a pair: its first pixel)."""
+    """Number of the pixel at each element of an index set (for a pair: its first pixel)."""
     if over == "pixels":
         return np.arange(instance.grid.size, dtype=np.int32)
     if over == "pairs":
@@ -176,7 +175,7 @@ def numeric(arguments: list[sp.Symbol], expression: sp.Expr) -> Callable[..., An
 
 @cache
 def _compiled(arguments: tuple[sp.Symbol, ...], expression: sp.Expr) -> Callable[..., Any]:
-    """The expression compiled; declarations are few and fixed, so each is compiled once."""
+    """The compiled expression; declarations are few and fixed, so each is compiled once."""
     return sp.lambdify(arguments, expression, modules="numpy", cse=True)  # type: ignore[no-any-return]
 
 

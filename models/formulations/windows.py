@@ -1,4 +1,4 @@
-"""Windows of alpha and beta and ranges of jumps narrower than the gauge's: what a proof leaves of them."""
+"""Windows of alpha and beta and ranges of jumps that a proof has made narrower than the gauge's."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Where the angles (n,) and jumps (m,) of every field with a 2-norm energy up to `energy` lie.
+    """Windows that hold the angles (n,) and jumps (m,) of every field with a 2-norm energy up to `energy`.
 
     alpha_lower, alpha_upper, beta_lower, beta_upper: radians. p_min, p_max: whole numbers. Every end is
-    within those of the gauge. proof: what says so, one line of text. Raises InstanceError, from `check`, for
+    within the gauge's. proof: the source of the windows, one line of text. `check` raises InstanceError for
     windows that do not fit an instance.
     """
 
@@ -34,7 +34,7 @@ class Windows:
     proof: str
 
     def check(self, instance: Instance) -> None:
-        """Nothing where these windows lie within those of the instance; else raises InstanceError."""
+        """Raise InstanceError unless these windows lie within the instance's windows."""
         quarter = np.full(instance.grid.size, QUARTER)
         for name, low, high, least, most in (
             ("alpha", self.alpha_lower, self.alpha_upper, instance.alpha_lower, instance.alpha_upper),
@@ -42,7 +42,7 @@ class Windows:
             ("p", self.p_min, self.p_max, instance.p_min, instance.p_max),
         ):
             if low.shape != least.shape or high.shape != least.shape:
-                raise InstanceError(f"the windows of {name} are not of the grid of {instance.name}")
+                raise InstanceError(f"the windows of {name} do not fit the grid of {instance.name}")
             wrong: Bools = ~((low >= least - _SLACK) & (low <= high) & (high <= most + _SLACK))
             if wrong.any():
                 raise InstanceError(
@@ -63,7 +63,7 @@ class Windows:
 
     @property
     def bytes(self) -> bytes:
-        """All of it, for a hash."""
+        """All arrays as bytes, for a hash."""
         angles = np.concatenate([self.alpha_lower, self.alpha_upper, self.beta_lower, self.beta_upper])
         jumps = np.concatenate([self.p_min, self.p_max])
         text = f"{self.energy!r} {self.proof}"
@@ -76,7 +76,7 @@ class Windows:
 
     @classmethod
     def of_document(cls, document: dict[str, Any]) -> Windows:
-        """The windows that `document` gave."""
+        """The windows that `document` wrote."""
         given = {name: np.array(document[name], dtype=np.float64) for name in _ARRAYS}
         return cls(
             given["alpha_lower"],

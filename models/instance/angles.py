@@ -1,4 +1,4 @@
-"""Line directions: angles modulo pi, counter-clockwise, y up, averaged by the double angle only."""
+"""Line directions: angles modulo pi, counter-clockwise, y up, averaged only by the double angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers that are the same where the last digit differs between processors."""
+"""Rounding that makes numbers equal on processors that differ in the last digit."""
 
 
 def in_digits(value: float) -> float:

@@ -1,8 +1,8 @@
-"""Sine, cosine, arctangent, lengths and products that are the same to the last bit on every processor.
+"""Sine, cosine, arctangent, lengths and products that are equal to the last bit on every processor.
 
-Those of NumPy and of C libraries differ in the last digit between processors (with and without fused
-multiply-add, for one). These are made of additions, multiplications, divisions and square roots alone, each
-by itself, which IEEE 754 rounds in one way. They are right to 1e-15.
+The functions of NumPy and of C libraries differ in the last digit between processors, for example with and
+without fused multiply-add. The functions here use only additions, multiplications, divisions and square
+roots, one at a time, which IEEE 754 rounds in one way. They are correct to 1e-15.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def cosine(angle: Floats) -> Floats:
 
 
 def arctangent(y: Floats, x: Floats) -> Floats:
-    """The angle in (-pi, pi] of vectors (x, y), in radians; 0 for the vector 0. Shapes that broadcast."""
+    """The angle in (-pi, pi] of vectors (x, y), in radians; 0 for the vector 0. Shapes are broadcast."""
     across, along = np.abs(y), np.abs(x)
     larger = np.maximum(across, along)
     t = np.minimum(across, along) / np.where(larger > 0, larger, 1.0)
@@ -46,7 +46,7 @@ def arctangent(y: Floats, x: Floats) -> Floats:
 
 
 def length(x: Floats, y: Floats) -> Floats:
-    """The length of vectors (x, y), without care for overflow; shapes that broadcast."""
+    """The length of vectors (x, y), without protection from overflow; shapes are broadcast."""
     root: Floats = np.sqrt(x * x + y * y)
     return root
 
@@ -60,7 +60,7 @@ def turned(vectors: Floats, matrix: Floats) -> Floats:
 
 
 def _quarter_wave(angle: Floats, quarters: int) -> Floats:
-    """The sine of the angles and so many quarter turns."""
+    """The sine of the angles plus a number of quarter turns."""
     angle = np.asarray(angle, dtype=np.float64)
     turns = np.rint(angle * (2 / np.pi))
     rest = angle
@@ -73,7 +73,7 @@ def _quarter_wave(angle: Floats, quarters: int) -> Floats:
 
 
 def _series(coefficients: list[float], x: Floats) -> Floats:
-    """The polynomial with these coefficients, the constant one first."""
+    """The value of the polynomial with these coefficients, the constant first."""
     value = np.full_like(x, coefficients[-1])
     for coefficient in coefficients[-2::-1]:
         value = value * x + coefficient

@@ -32,7 +32,7 @@ _SCALARS = {
 }
 """Attributes of an instance by the keys of a file."""
 _ARRAYS = ("mask", "stroke_pixels", "theta", "w")
-_MOST_ERRORS: Final = 100  # of a document, among which the outermost one is told
+_MOST_ERRORS: Final = 100  # of a document; the outermost of them is reported
 _ARCHIVE: Final = {
     "head": Expected(1, MAX_HEAD, "u"),
     "origin": Expected(1, 2),
@@ -48,16 +48,16 @@ _RETIRED: Final = {
 
 
 def write_instance(instance: Instance, path: str | Path) -> Path:
-    """The path of the file that now holds the instance: JSON, or NumPy's .npz when the name ends so.
+    """Write the instance and return the path: NumPy's .npz if the name has this suffix, otherwise JSON.
 
-    Same instance, same bytes. Raises OutputError.
+    Equal instances give equal bytes. Raises OutputError.
     """
     path = Path(path)
     return write_bytes(path, _npz(instance) if path.suffix.lower() == ".npz" else to_json(instance).encode())
 
 
 def read_instance(path: str | Path) -> Instance:
-    """The instance that a .json or .npz file holds.
+    """Read an instance from a .json or .npz file.
 
     Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the
     schema.
@@ -68,7 +68,7 @@ def read_instance(path: str | Path) -> Instance:
 
 
 def to_json(instance: Instance) -> str:
-    """The instance as JSON text, one stroke pixel [row, column, theta, w] and one mask row a line."""
+    """The instance as JSON text, one line per stroke pixel [row, column, theta, w] and per mask row."""
     rows = ["".join("#" if inside else "." for inside in row) for row in instance.mask]
     strokes = _lines(instance)
     head = (
@@ -82,13 +82,13 @@ def to_json(instance: Instance) -> str:
 
 
 def _lines(instance: Instance) -> str:
-    """Strokes as JSON text, one a line."""
+    """Strokes as JSON text, one per line."""
     rows = zip(instance.stroke_pixels.tolist(), instance.theta.tolist(), instance.w.tolist(), strict=True)
     return ",\n".join(f"    [{r}, {c}, {angle!r}, {weight!r}]" for (r, c), angle, weight in rows)
 
 
 def decoded(data: bytes) -> str:
-    """The text of a JSON file. Raises InstanceError when it is none or has more than MAX_BYTES bytes."""
+    """The text of a JSON file. Raises InstanceError for other content and for more than MAX_BYTES bytes."""
     if len(data) > MAX_BYTES:
         raise InstanceError(f"has {len(data)} bytes of JSON; at most {MAX_BYTES} are read, write it as .npz")
     try:
@@ -98,12 +98,12 @@ def decoded(data: bytes) -> str:
 
 
 def of_json(text: str) -> Instance:
-    """The instance that JSON text describes. Raises InstanceError with the place in the document."""
+    """Read an instance from JSON text. Raises InstanceError with the place in the document."""
     return of_document(parse_json(text))
 
 
 def parse_json(text: str) -> object:
-    """The document that JSON text holds, with or without byte order mark, or InstanceError with the line."""
+    """Parse JSON text, with or without byte order mark. Raises InstanceError with the line."""
     try:
         return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_once))
     except (ValueError, RecursionError) as error:
@@ -111,11 +111,11 @@ def parse_json(text: str) -> object:
 
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """An object of a JSON document. Each key must be there once: programs differ on which one counts."""
+    """An object of a JSON document. Refuses repeated keys, because programs differ on which one counts."""
     found = dict(pairs)
     if len(found) < len(pairs):
         ((name, _),) = Counter(name for name, _ in pairs).most_common(1)
-        raise ValueError(f"the key {shortened(name)!r} is there twice")
+        raise ValueError(f"the key {shortened(name)!r} appears twice")
     return found
 
 
@@ -139,9 +139,9 @@ def read_document(
 
 
 def _check_writable(document: object) -> None:
-    """Nothing if the document can be written as JSON in UTF-8 again; otherwise raises InstanceError.
+    """Raise InstanceError unless the document can be written as JSON in UTF-8 again.
 
-    Python reads infinite numbers and halves of surrogate pairs, which no other program has to.
+    Python reads infinite numbers and halves of surrogate pairs, which other programs need not accept.
     """
     try:
         json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
@@ -152,7 +152,7 @@ def _check_writable(document: object) -> None:
 
 
 def of_document(document: object) -> Instance:
-    """The instance that a parsed JSON document describes, or InstanceError with the place in it."""
+    """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
     if isinstance(document, dict):
         for key in _RETIRED.keys() & document.keys():
@@ -182,7 +182,7 @@ def of_document(document: object) -> Instance:
 
 
 def check_counts(strokes: int, pixels: int) -> None:
-    """Nothing, when there are no more stroke pixels than pixels; else raises InstanceError."""
+    """Raise InstanceError if there are more stroke pixels than pixels."""
     if strokes > pixels:
         raise InstanceError(
             f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each stroke pixel once"
@@ -204,7 +204,7 @@ def are_places(numbers: Floats) -> bool:
 
 
 def number_table(rows: list[Any], width: int) -> Floats | None:
-    """Rows of numbers as an array (k, width), None when one of them is something else."""
+    """Rows of numbers as an array (k, width), None when an entry is something else."""
     if not all(type(row) is list and len(row) == width for row in rows):
         return None
     if not {type(value) for row in rows for value in row} <= {int, float}:
@@ -218,10 +218,10 @@ def number_table(rows: list[Any], width: int) -> Floats | None:
 def check_schema(
     document: object, schema: str, package: str, rows: Mapping[str, Callable[[list[Any]], bool]] | None = None
 ) -> dict[str, Any]:
-    """The document, which obeys the `<schema>.schema.json` that ships with a package.
+    """Return the document if it obeys the `<schema>.schema.json` that ships with a package.
 
-    rows: for keys with long lists a quick test whether all their entries obey the schema; then they are not
-    looked at one by one. Raises InstanceError with the place.
+    rows: for keys with long lists, a fast test whether all entries obey the schema, which replaces the check
+    of single entries. Raises InstanceError with the place.
     """
     assert isinstance(document, dict)
     quick = {
@@ -257,7 +257,7 @@ def _schema(name: str, package: str) -> dict[str, Any]:
 
 
 def check_version(document: object, form: str, version: int) -> None:
-    """Nothing, when the document says that it has this format and version; else raises InstanceError."""
+    """Raise InstanceError unless the document states this format and version."""
     if not isinstance(document, dict) or document.get("format") != form:
         raise InstanceError(f'is not a file of this kind: "format" must be "{form}"')
     found = document.get("version")
@@ -285,7 +285,7 @@ def arrays_of(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def _of_npz(data: bytes) -> Instance:
-    """The instance in an .npz that holds nothing else, or InstanceError with the array's name."""
+    """Read an instance from an .npz that holds nothing else. Raises InstanceError with the array's name."""
     archive = ArrayArchive(data)
     instance = of_archive(archive)
     archive.finish()
@@ -293,7 +293,7 @@ def _of_npz(data: bytes) -> Instance:
 
 
 def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
-    """Return the instance whose arrays an archive holds, their names preceded by a prefix.
+    """Read an instance from arrays of an archive whose names start with a prefix.
 
     Raises InstanceError with the array's name.
     """
@@ -304,7 +304,7 @@ def of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
 
 
 def of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
-    """The instance that `arrays_of` gave. Raises InstanceError with the array's name."""
+    """The instance whose arrays `arrays_of` returned. Raises InstanceError with the array's name."""
     head = head_of(arrays)
     check_version(head, FORMAT, VERSION)
     check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))

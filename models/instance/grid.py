@@ -84,7 +84,7 @@ class Grid:
 
     @cached_property
     def pair_number(self) -> tuple[Ints, Ints]:
-        """Two arrays [height, width]: number of a pixel's pair with its upper, its right neighbour, or -1."""
+        """Numbers of each pixel's pairs with the upper and right neighbours, [height, width] each, or -1."""
         upper = np.full(self.mask.shape, -1, dtype=np.int32)
         right = upper.copy()
         index = np.arange(len(self.first), dtype=np.int32)
@@ -95,10 +95,10 @@ class Grid:
 
     @cached_property
     def quads(self) -> Ints:
-        """The 2 x 2 pixels inside the mask, shape (q, 4): pairs met on a counter-clockwise walk (y up).
+        """The 2 x 2 pixels inside the mask, shape (q, 4): their pairs on a counter-clockwise walk (y up).
 
-        Columns: bottom (left to right), right side (upwards), top (stored left to right, walked against),
-        left side (stored upwards, walked against).
+        Columns: bottom (left to right), right side (upwards), top (stored left to right, walked in reverse),
+        left side (stored upwards, walked in reverse).
         """
         upper, right = self.pair_number
         bottom, side = right[1:, :-1], upper[1:, 1:]

@@ -1,4 +1,4 @@
-"""An instance: what a formulation needs to know of a sketch. Frozen and validated."""
+"""An instance: the data of a sketch that formulations need. Frozen and validated."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _FLAT = 1e-8  # directions closer to the horizontal than this are horizontal
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
 _FARTHEST = 1e100  # coordinates whose squares are finite numbers
-_SLACK = 1e-9  # floor and ceil of jump bounds, and the ends of ranges, forgive this much rounding
+_SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
 
 MOST_WEIGHT: Final = 1e6
 """Greatest weight of a term of the energy."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-"""Instance names, as instance libraries ask for: at most 32 lower-case letters, digits and `_`."""
+"""Instance names that instance libraries allow: at most 32 lower-case letters, digits and `_`."""
 
 _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment line, or have no UTF-8
 
@@ -102,22 +102,22 @@ class Instance(Pictured):
     name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
     mask: bool [height, width], row 0 at the top; True = solve for this pixel.
     stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
-    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi,
-    rounded to 12 decimals, and as 0 within 1e-8 of the horizontal: a cost that small would be dropped by
-    readers of the files.
+    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi and
+    rounded to 12 decimals. Within 1e-8 of the horizontal it is 0: readers of the files would drop such small
+    costs.
     w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
     stroke_coefficient, skew_coefficient: coefficients w_strokes and w_beta of the energy (1 and 1e-6), at
     most 1e6, because rounding errors of a larger term would hide the others. They count per pixel;
     `with_weights` takes weights that mean the same on every grid.
-    gauge: which window of length pi/2 holds alpha: `strokes` (exact) or `box` (as printed in (1)).
-    source: where the sketch came from, one line of text.
+    gauge: the window of length pi/2 that holds alpha: `strokes` (exact) or `box` (as printed in (1)).
+    source: origin of the sketch, one line of text.
     pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
-    corner of pixel [0, 0], with y downwards as sketches have it. Both are rounded to 12 digits; pixel_size is
-    in [1e-100, 1e100], origin up to that.
-    reading: what the reader of its drawing has to say, warnings among it; None where it comes from elsewhere.
+    corner of pixel [0, 0], with y downwards as in sketches. Both are rounded to 12 digits; pixel_size is in
+    [1e-100, 1e100], origin at most 1e100.
+    reading: messages from the reader of its drawing, such as warnings; None for other origins.
 
-    Rounding makes instances, and so their hashes, the same where the last digit differs between processors.
-    It changes nothing twice.
+    Rounding makes instances, and so their hashes, equal on processors that differ in the last digit. Rounding
+    is idempotent.
 
     Raises InstanceError when a rule is broken. See docs/mathematics.md, 1 and 4.
     """
@@ -136,7 +136,7 @@ class Instance(Pictured):
     reading: Reading | None = None
 
     def __post_init__(self) -> None:
-        """Take over read-only copies in the documented types, then check every rule."""
+        """Store read-only copies in the documented types, then check every rule."""
         self._freeze("mask", np.asarray(self.mask, dtype=bool))
         self._freeze("stroke_pixels", whole_numbers(self.stroke_pixels, "stroke_pixels"))
         for name in ("theta", "w"):
@@ -187,7 +187,7 @@ class Instance(Pictured):
         if max(self.mask.shape) > 9999:
             raise InstanceError(
                 f"the grid is {self.mask.shape[1]} x {self.mask.shape[0]}; "
-                "at most 9999 pixels a side are allowed"
+                "at most 9999 pixels per side are allowed"
             )
         if self.stroke_pixels.size == 0:
             raise NoStrokeError("no stroke lies inside the mask; move the mask or draw a curvature line")
@@ -261,7 +261,7 @@ class Instance(Pictured):
 
     @cached_property
     def p_min(self) -> Ints:
-        """Least useful jump of each pair, shape (m,): floor(-2 d_hi / pi)."""
+        """Smallest useful jump of each pair, shape (m,): floor(-2 d_hi / pi)."""
         d_hi = self.alpha_upper[self.grid.first] - self.alpha_lower[self.grid.second]
         return np.floor(-2 * d_hi / np.pi + _SLACK).astype(np.int32)
 
@@ -276,7 +276,7 @@ class Instance(Pictured):
         return replace(self, gauge=gauge)
 
     def with_weights(self, stroke_weight: float | None = None, skew_weight: float | None = None) -> Instance:
-        """The same instance under other weights, which mean the same on every grid (docs/weights.md).
+        """The same instance with other weights, which mean the same on every grid (docs/weights.md).
 
         stroke_weight, skew_weight: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On
         another grid the coefficients are stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a
@@ -294,18 +294,18 @@ class Instance(Pictured):
 
     @property
     def stroke_weight(self) -> float:
-        """Weight of the strokes that means the same on every grid; the coefficient on one of 24 pixels."""
+        """Weight of the strokes that means the same on every grid; the coefficient on a grid of 24 pixels."""
         return stroke_weight(self.stroke_coefficient, max(self.mask.shape))
 
     @property
     def skew_weight(self) -> float:
-        """Weight of the skew that means the same on every grid; the coefficient on one of 24 pixels."""
+        """Weight of the skew that means the same on every grid; the coefficient on a grid of 24 pixels."""
         return skew_weight(self.skew_coefficient, max(self.mask.shape))
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
         """The same instance with only those stroke pixels, shape (s,).
 
-        mask: another one, by default the same. Raises InstanceError.
+        mask: another mask; the same by default. Raises InstanceError.
         """
         return replace(
             self,
@@ -328,11 +328,11 @@ class Instance(Pictured):
         return self._moved(self.mask[:, ::-1], pixels, -1, np.pi)
 
     def transposed(self) -> Instance:
-        """The instance mirrored at the line from top left to bottom right: rows and columns exchanged."""
+        """The instance mirrored at its main diagonal: rows and columns are exchanged."""
         return self._moved(self.mask.T, self.stroke_pixels[:, ::-1], -1, -HALF)
 
     def _moved(self, mask: Bools, pixels: Ints, sense: int, turn: float) -> Instance:
-        """The instance with its stroke pixels elsewhere and every direction theta at sense theta + turn."""
+        """The instance with its stroke pixels moved and every theta changed to sense theta + turn."""
         order = np.lexsort((pixels[:, 1], pixels[:, 0]))
         return replace(
             self,
@@ -365,7 +365,7 @@ class Instance(Pictured):
 
     @cached_property
     def sha256(self) -> str:
-        """64 hexadecimal digits that stand for the whole content; equal for equal instances only."""
+        """64 hexadecimal digits of the whole content; equal only for equal instances."""
         digest = hashlib.sha256(b"crossfield-instance 1\n")
         for text in (self.name, self.gauge, self.source):
             digest.update(text.encode() + b"\0")

@@ -1,4 +1,4 @@
-"""What the reader of a drawing has to say beside the instance: doubts, open places, the page."""
+"""Messages from the reader of a drawing about an instance: doubts, open places, the page."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Reading:
-    """How an instance was read from a drawing; no part of its content, its files and its hash.
+    """How an instance was read from a drawing; not part of its content, files or hash.
 
-    page: x, y, width and height of the page in the drawing's units, or None where the drawing does not say.
-    warnings: what may not be as the drawing was meant, one line each; the places are x, y in the drawing's
+    page: x, y, width and height of the page in the drawing's units, or None if the drawing has none.
+    warnings: possible misreadings of the drawing, one line each; places are x, y in the drawing's
     units, y down. openings: both ends (x, y) of each gap in the outline that was bridged.
     """
 

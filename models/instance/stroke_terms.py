@@ -13,7 +13,7 @@ from .grid import Floats, Ints
 class StrokeTerms:
     """One residual R = alpha + beta - goal for each stroke pixel, shapes (s,).
 
-    pixel: its number. goal: its direction in the gauge's range. weight: its reliability times the
+    pixel: number of the pixel. goal: its direction in the gauge's range. weight: its reliability times the
     instance's `stroke_coefficient`.
     """
 
@@ -30,5 +30,5 @@ class StrokeTerms:
         return np.bincount(self.pixel, values, size).astype(np.float64, copy=False)
 
     def chosen(self, terms: Ints, number: Ints) -> StrokeTerms:
-        """Some of the terms, by their numbers, at pixels that are numbered anew by `number` (n,)."""
+        """Some of the terms, by their numbers, at pixels renumbered by `number` (n,)."""
         return StrokeTerms(number[self.pixel[terms]], self.goal[terms], self.weight[terms])

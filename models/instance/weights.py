@@ -1,9 +1,9 @@
-"""Weights that mean the same on every grid, and the coefficients of the energy that they are on one.
+"""Weights that mean the same on every grid, and their coefficients in the energy on one grid.
 
-The smoothness of a field is a sum of squared differences over pairs of pixels, and stays what it is when the
-grid is made finer: twice as many pixels a side are four times as many pairs of half the difference. A stroke
-then runs through twice as many pixels, and the area holds four times as many. So a weight of the strokes is
-divided by the pixels of the longer side, and a weight of the skew by their square.
+The smoothness of a field is a sum of squared differences over pairs of pixels. It keeps its value on a finer
+grid: twice as many pixels per side give four times as many pairs of half the difference. A stroke then runs
+through twice as many pixels, and the area holds four times as many. So a weight of the strokes is divided by
+the pixels of the longer side, and a weight of the skew by their square.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .digits import in_digits
 REFERENCE: Final = 24
 """Pixels of the longer side of the grid on which weights are the coefficients of the energy."""
 STROKE_WEIGHT: Final = 20.0
-"""Default weight of the strokes of a sketch; docs/weights.md says why."""
+"""Default weight of the strokes of a sketch; see docs/weights.md for the reason."""
 SKEW_WEIGHT: Final = 1e-6
 """Default weight of the skew in a sketch."""
 
@@ -31,10 +31,10 @@ def skew_coefficient(weight: float, longer: int) -> float:
 
 
 def stroke_weight(coefficient: float, longer: int) -> float:
-    """The weight of the strokes, to 12 digits, whose coefficient on a grid this is."""
+    """The weight of the strokes, to 12 digits, with this coefficient on a grid."""
     return in_digits(coefficient * longer / REFERENCE)
 
 
 def skew_weight(coefficient: float, longer: int) -> float:
-    """The weight of the skew, to 12 digits, whose coefficient on a grid this is."""
+    """The weight of the skew, to 12 digits, with this coefficient on a grid."""
     return in_digits(coefficient * longer**2 / REFERENCE**2)

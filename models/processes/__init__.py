@@ -1,5 +1,5 @@
-"""Where work runs, and when it ends.
+"""Execution of work, and its end.
 
-Deadlines, Ctrl-C, and the same work side by side in processes that never outlive this one.
-What is worked on is models/search; solvers as programs of their own are export/solving.
+Deadlines, Ctrl-C, and parallel work in processes that never outlive this one. The work itself belongs to
+models/search; solvers that are separate programs belong to export/solving.
 """

@@ -1,8 +1,8 @@
 """Child processes that run functions of the package: start, time limit, interruption, result, failure.
 
 A child is a program of the package, not a second copy of the user's program: the pools of the standard
-library import the user's script again in every process. It gets calls through a pipe and ends when the pipe
-closes, so it never outlives its parent. Requests to stop travel through the same pipe, not as signals.
+library import the user's script again in every process. It receives calls through a pipe and ends when the
+pipe closes, so it never outlives its parent. Requests to stop travel through the same pipe, not as signals.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from .messages import Stop, Task, WorkerError, reason, send
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05
-"""Seconds after its deadline, plus a share of its time, in which work may return what it has."""
+"""Seconds after its deadline, plus a share of its time, for work to return its result."""
 PATIENCE: Final = 4.0
-"""Seconds that work may take to answer Ctrl-C: half way it is asked again, then it is killed."""
+"""Seconds for work to answer Ctrl-C: the request is repeated half way, then the work is killed."""
 _TICK: Final = 0.1
 _PROGRAM: Final = (
     "import sys; sys.path += [each for each in sys.argv[1:] if each not in sys.path]; "
     f"from {__package__}.worker import main; main()"
 )
-"""Finds modules wherever this process does, but puts no folder of the user before those of libraries."""
+"""Finds modules where this process does, but puts no folder of the user before those of libraries."""
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class KilledError(WorkerError):
-    """Work that was killed because it did not end in time; `interrupted` tells whether the user asked."""
+    """Work that was killed because it did not end in time; `interrupted` is True for Ctrl-C."""
 
     def __init__(self, message: str, *, interrupted: bool = False) -> None:
-        """Keep who asked for the end."""
+        """Store whether the user requested the end."""
         super().__init__(message)
         self.interrupted = interrupted
 
@@ -57,12 +57,12 @@ class Returned(NamedTuple):
 class Child:
     """A process that runs functions of modules, one call at a time.
 
-    folder: its current folder, this process' own by default. one_thread: whether numerical libraries there
-    keep to one thread. The process starts with the first call, and again after one that it did not survive.
+    folder: its current folder, this process' folder by default. one_thread: whether numerical libraries there
+    use one thread. The process starts with the first call, and restarts if it did not survive a call.
     """
 
     def __init__(self, folder: Path | None = None, *, one_thread: bool = False) -> None:
-        """Start nothing yet."""
+        """Store the settings; no process starts yet."""
         self._folder, self._one_thread = folder, one_thread
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -87,12 +87,12 @@ class Child:
     ) -> Returned:
         """Call `work(*arguments)` in the child and return its result.
 
-        work: a function of an importable module. deadline: when the work is asked to stop; deadlines among
-        the arguments arrive with the seconds that are left. log: file for what the work prints. The first
-        Ctrl-C asks the work to stop as well, the second kills it and is raised.
+        work: a function of an importable module. deadline: time of the request to stop; deadlines among the
+        arguments arrive with the seconds that are left. log: file for the output of the work. The first
+        Ctrl-C also requests the stop; the second kills the work and is raised.
 
-        Raises what the work raises, KilledError for work that does not stop in time, and WorkerError, with
-        the reason, when the process dies or a value cannot be sent.
+        Raises the exceptions of the work, KilledError for work that does not stop in time, and WorkerError,
+        with the reason, when the process dies or a value cannot be sent.
         """
         watch = _Watch(deadline or Deadline(), self._ask_to_stop)
         if watch.deadline.passed():
@@ -110,12 +110,12 @@ class Child:
         return Returned(_result(answer), watch.interrupted)
 
     def close(self) -> None:
-        """Kill the process, and start none again."""
+        """Kill the process, and prevent another start."""
         self._closed = True
         self.end()
 
     def end(self) -> None:
-        """Kill the process and all that it started."""
+        """Kill the process and its children."""
         with self._lock:
             process, self._process = self._process, None
         if process is None:
@@ -123,7 +123,7 @@ class Child:
         kill(process)
         process.wait()
         if process.stdin is not None:
-            with suppress(OSError):  # what was not yet written is lost
+            with suppress(OSError):  # unwritten output is lost
                 process.stdin.close()
 
     def _running(self, watch: _Watch) -> subprocess.Popen[bytes]:
@@ -140,7 +140,7 @@ class Child:
         return process
 
     def _load(self, work: Callable[..., Any], process: subprocess.Popen[bytes], watch: _Watch) -> None:
-        """Have the child import the module of the work first, since deadlines in its arguments then run."""
+        """Have the child import the module of the work first, because deadlines in its arguments then run."""
         module = getattr(work, "func", work).__module__
         if module in self._loaded:
             return
@@ -151,7 +151,7 @@ class Child:
     @staticmethod
     def _send(task: Task, process: subprocess.Popen[bytes]) -> None:
         assert process.stdin is not None
-        with suppress(BrokenPipeError):  # the child died; its exit code tells why
+        with suppress(BrokenPipeError):  # the child died; its exit code shows why
             send(task, process.stdin)
 
     def _started(self) -> subprocess.Popen[bytes]:
@@ -179,7 +179,7 @@ class Child:
             else:
                 if isinstance(answer, _Ended):
                     if watch.asked:
-                        raise KilledError("ended when it was asked to stop", interrupted=watch.interrupted)
+                        raise KilledError("ended on a request to stop", interrupted=watch.interrupted)
                     raise WorkerError(self._how_it_ended())
                 return answer
 
@@ -203,7 +203,7 @@ def _imported(_work: Callable[..., Any]) -> None:
 
 
 class _UnsentError(WorkerError):
-    """A task that pickle does not take; the child is as it was."""
+    """A task that pickle refuses; the child is unchanged."""
 
 
 def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
@@ -214,7 +214,7 @@ def _pickled(work: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
 
 
 def _result(answer: bytes) -> Any:
-    """Return the result in an answer. Raises the error in it."""
+    """Return the result in an answer, or raise the error in it."""
     try:
         done, found = pickle.loads(answer)  # noqa: S301 - from a process of our own
     except Exception as error:
@@ -225,7 +225,7 @@ def _result(answer: bytes) -> Any:
 
 
 class _Ended(NamedTuple):
-    """Put in the queue of answers when the child closes its end of the pipe."""
+    """Item in the queue of answers after the child has closed its end of the pipe."""
 
 
 def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -> None:
@@ -234,13 +234,13 @@ def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -
         try:
             while True:
                 answers.put(pickle.load(stream))  # noqa: S301 - from a process of our own
-        except Exception:  # noqa: BLE001 - a message that breaks off, however pickle takes that
+        except Exception:  # noqa: BLE001 - pickle raises anything for a truncated message
             answers.put(_Ended())
 
 
 @dataclass
 class _Watch:
-    """When a call is asked to stop and when it is killed: by its deadline and by Ctrl-C."""
+    """Times at which a call is requested to stop and is killed, from its deadline and from Ctrl-C."""
 
     deadline: Deadline
     ask: Callable[[], None]
@@ -262,7 +262,7 @@ class _Watch:
         self.look()
 
     def look(self) -> None:
-        """Ask the work to stop when it is due; raise KilledError when it had its time."""
+        """Request the stop when it is due; raise KilledError when the time for it is over."""
         if self.patience is not None and self.patience.passed():
             raise KilledError("did not stop after Ctrl-C and was killed", interrupted=True)
         if self.kill.passed():
@@ -272,7 +272,7 @@ class _Watch:
             self.ask()
 
     def _reasons(self) -> int:
-        """Return how many times the work should have been asked by now."""
+        """Return how many requests to stop are due by now."""
         late = int(self.deadline.passed())
         if self.patience is None:
             return late

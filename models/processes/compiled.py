@@ -1,4 +1,7 @@
-"""What Numba compiles on its first call, and keeps on disk. Pip installs it without a compiler."""
+"""Functions that Numba compiles on their first call and caches on disk.
+
+Pip installs Numba without a compiler.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +16,26 @@ _MADE: Final[list[Any]] = []
 
 
 def compiled(work: _Work) -> _Work:
-    """The function compiled on its first call, and kept on disk where there is a place for it.
+    """The function compiled on its first call, and cached on disk where a folder is writable.
 
     It runs without Python's lock.
     """
     made: Any
     try:
         made = numba.njit(cache=True, error_model="numpy", nogil=True)(work)
-    except RuntimeError:  # no folder may be written to
+    except RuntimeError:  # no folder is writable
         made = numba.njit(error_model="numpy", nogil=True)(work)
     _MADE.append(made)
     return cast("_Work", made)
 
 
 def all_compiled() -> bool:
-    """Whether each function that is imported by now is kept on disk, if it can be: then it is only loaded."""
+    """Whether every imported function is cached on disk where possible, so that it only has to be loaded."""
     return all(map(_is_kept, _MADE))
 
 
 def place() -> Path:
-    """The folder in which the first of these functions is kept. Raises IndexError where there is none."""
+    """The folder with the cache of the first function. Raises IndexError without a function."""
     return Path(_MADE[0].stats.cache_path)
 
 

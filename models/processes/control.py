@@ -1,4 +1,4 @@
-"""Control of the work in a child process: whether the parent asked it to stop."""
+"""Control of the work in a child process: requests of the parent to stop."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _LOCK: Final = threading.Lock()
 
 
 def stopped() -> bool:
-    """Return whether the work at hand was asked to stop."""
+    """Return whether the parent has requested a stop of the current work."""
     return _STOP.is_set()
 
 
 @contextmanager
 def on_stop(hook: Callable[[], object]) -> Iterator[None]:
-    """Call `hook` from another thread each time the work is asked to stop, and at once if it was already."""
+    """Call `hook` from another thread at each request to stop, and at once if one has arrived already."""
     with _LOCK:
         _HOOKS.append(hook)
         late = _STOP.is_set()
@@ -33,7 +33,7 @@ def on_stop(hook: Callable[[], object]) -> Iterator[None]:
 
 
 def ask_to_stop() -> None:
-    """Note that the parent asks the work to stop, and call the hooks."""
+    """Record that the parent requests a stop, and call the hooks."""
     with _LOCK:
         _STOP.set()
         hooks = tuple(_HOOKS)
@@ -42,5 +42,5 @@ def ask_to_stop() -> None:
 
 
 def begin() -> None:
-    """Forget requests to stop that were meant for earlier work."""
+    """Forget requests to stop earlier work."""
     _STOP.clear()

@@ -1,7 +1,7 @@
-"""Threads that share compiled work: it runs without Python's lock.
+"""Threads that share compiled work, which runs without Python's lock.
 
-Parallel loops of Numba would do the same. But their threads spin while they wait, which doubled the time on a
-machine where others work; the OpenMP ones do not survive a fork, and the built-in ones no second thread of
+Parallel loops of Numba are the alternative. But their threads spin while they wait, which doubled the time on
+a busy machine. The OpenMP threads do not survive a fork, and the built-in ones allow no second thread of
 Python.
 """
 
@@ -21,13 +21,13 @@ _Part = TypeVar("_Part")
 
 
 class Crew:
-    """So many threads, this one among them."""
+    """A thread pool that includes the calling thread."""
 
     def __init__(self, count: int, others: ThreadPoolExecutor) -> None:
         self._count, self._others = count, others
 
     def parts(self, work: np.ndarray[Any, Any]) -> list[slice]:
-        """Neighbouring items for each thread, as equal in work as whole items allow."""
+        """Consecutive items for each thread, as equal in work as whole items allow."""
         done = np.concatenate([[0.0], np.cumsum(work, dtype=np.float64)])
         goals = np.linspace(0.0, done[-1], self._count + 1)
         ends = np.abs(done[:, None] - goals).argmin(axis=0)
@@ -35,12 +35,12 @@ class Crew:
         return [slice(a, b) for a, b in pairwise(ends) if a < b]
 
     def equal_parts(self, many: int) -> list[slice]:
-        """So many items, cut into as many parts as there are threads."""
+        """A number of items, cut into as many parts as there are threads."""
         ends = [many * number // self._count for number in range(self._count + 1)]
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def run(self, work: Callable[[_Part], object], parts: Sequence[_Part]) -> None:
-        """Do the work on each of the parts at the same time."""
+        """Do the work on all parts at the same time."""
         waiting = [self._others.submit(work, part) for part in parts[1:]]
         for part in parts[:1]:
             work(part)
@@ -50,6 +50,6 @@ class Crew:
 
 @contextmanager
 def crew(count: int) -> Iterator[Crew]:
-    """A crew, whose threads have ended afterwards. Raises InputError for a number that cannot be."""
+    """A thread pool that ends with the block. Raises InputError for a number of threads out of range."""
     with ThreadPoolExecutor(max(1, checked(count) - 1)) as others:
         yield Crew(count, others)

@@ -1,6 +1,6 @@
-"""When work has to end: made once from a limit and passed down, so that every part asks for what is left.
+"""End of work: created once from a limit and passed down, so that every part can ask for the time left.
 
-Work that may be cut off asks whether it is over at every good place, and then gives what it has.
+Work that may be cut off checks the deadline at every good place, and then returns its present result.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 Clock = Callable[[], float]
 
 Over = Callable[[], bool]
-"""Says whether work has to end now: it is asked at every good place, and the work then gives what it has."""
+"""Returns whether work has to end now. Work calls it at every good place, then returns its present result."""
 
 
 def never() -> bool:
-    """False: the work goes on to its own end, and what it gives depends on its input alone."""
+    """Return False: the work runs to its own end, and its result depends only on its input."""
     return False
 
 
@@ -34,12 +34,12 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
-        """The moment so many seconds from now."""
+        """The moment that many seconds from now."""
         return cls(clock() + seconds, clock)
 
     @classmethod
     def of(cls, limit: float | Deadline | None) -> Deadline:
-        """Deadline of a limit: itself, the moment so many seconds from now, or none for None."""
+        """Deadline of a limit: itself, the moment that many seconds from now, or no deadline for None."""
         if isinstance(limit, Deadline):
             return limit
         return cls() if limit is None else cls.after(limit)
@@ -48,17 +48,17 @@ class Deadline:
         return Deadline.after, (self.left(),)
 
     def left(self) -> float:
-        """Seconds until then; 0.0 once it has passed."""
+        """Seconds until the moment; 0.0 once it has passed."""
         return max(0.0, self.at - self.clock())
 
     def passed(self) -> bool:
-        """Whether nothing is left."""
+        """Whether the moment has passed."""
         return self.left() == 0.0
 
     def steps(self) -> Over:
         """Return a function to call before each of some equal steps of work.
 
-        It says whether the deadline would pass during the next step, if that took as long as the last one.
+        It returns whether the deadline would pass during the next step, if that took as long as the last one.
         """
         began = [self.clock()]
 
@@ -70,13 +70,13 @@ class Deadline:
         return over
 
     def later(self, seconds: float) -> Deadline:
-        """The moment so many seconds after this one; before it where they are negative."""
+        """The moment that many seconds after this one; before it for a negative number."""
         return replace(self, at=self.at + seconds)
 
     def share(self, part: float) -> Deadline:
-        """The moment at which that part of what is left will have gone by."""
+        """The moment after that share of the time left."""
         return replace(self, at=self.clock() + part * self.left())
 
     def within(self, seconds: float) -> Deadline:
-        """The sooner one of this moment and that so many seconds from now."""
+        """The earlier of this moment and the moment that many seconds from now."""
         return replace(self, at=min(self.at, self.clock() + seconds))

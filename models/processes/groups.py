@@ -1,7 +1,7 @@
 """Child processes in groups of their own: starting, interrupting and killing them on each system.
 
-Ctrl-C on a terminal reaches the group in the foreground. A child in another group is left to the process that
-started it. On Windows, `kill` ends the child but not what the child has started.
+Ctrl-C on a terminal reaches the group in the foreground. A child in another group is controlled by the
+process that started it. On Windows, `kill` ends the child but not its children.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from contextlib import suppress
 from typing import Any, Final
 
 KILLED: Final = 1 if sys.platform == "win32" else -int(signal.SIGKILL)
-"""Exit code of a process that was killed; on Windows other failures have it too."""
+"""Exit code of a killed process; on Windows other failures have it too."""
 
 
 def start(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
-    """Child process in a group of its own. `options` are those of `subprocess.Popen`."""
+    """Child process in a group of its own. `options` are the options of `subprocess.Popen`."""
     if sys.platform == "win32":
         return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **options)
     return subprocess.Popen(command, start_new_session=True, **options)
 
 
 def interrupt(child: subprocess.Popen[Any]) -> None:
-    """Send a child of `start` what Ctrl-C would send; the child listens with `on_interrupt`."""
+    """Send a child of `start` the signal of Ctrl-C; the child handles it with `on_interrupt`."""
     if sys.platform == "win32":
         child.send_signal(signal.CTRL_BREAK_EVENT)
     else:
@@ -41,7 +41,7 @@ def on_interrupt(handler: Callable[..., object]) -> None:
 
 
 def kill(child: subprocess.Popen[Any]) -> None:
-    """Kill a child of `start` with its group, also what is left of the group of a child that has ended."""
+    """Kill a child of `start` with its group, even when the child itself has ended."""
     if sys.platform == "win32":
         child.kill()
         return

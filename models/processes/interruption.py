@@ -1,4 +1,4 @@
-"""Ctrl-C for work in rounds: it ends at the next good place."""
+"""Ctrl-C for work in rounds, which ends at the next good place."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """A function that says whether Ctrl-C was pressed; pressed again, it interrupts at once.
+    """Return a function that reports whether Ctrl-C was pressed; a second Ctrl-C interrupts at once.
 
-    Elsewhere than in the main thread, and where signals are ignored already, it never was.
+    Outside the main thread, and where signals are ignored already, it always returns False.
     """
     pressed: list[int] = []
 

@@ -14,14 +14,14 @@ class WorkerError(CrossfieldError):
 
 
 class Task(NamedTuple):
-    """A pickled function with its arguments, and the file for what it prints, or None."""
+    """A pickled function with its arguments, and the file for its output, or None."""
 
     work: bytes
     log: Path | None
 
 
 class Stop(NamedTuple):
-    """A request to end the work at hand with what it has."""
+    """A request to end the current work with its present result."""
 
 
 def send(value: Any, stream: IO[bytes]) -> None:

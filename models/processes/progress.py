@@ -1,12 +1,12 @@
-"""What is told of work under way."""
+"""Progress callbacks of running work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[str], None]
-"""Is told in a line what is done now."""
+"""Receives one line that describes the current step."""
 
 
 def silent(_line: str) -> None:
-    """Nothing is shown: for work that nobody watches."""
+    """Show no progress: for work without an observer."""

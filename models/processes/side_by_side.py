@@ -1,7 +1,7 @@
 """Tasks in several processes of the package, which Ctrl-C does not reach and which never outlive this one.
 
-The pools of the standard library read the user's program again in every process, and they and joblib leave
-processes behind.
+The pools of the standard library import the user's program again in every process. They and joblib leave
+processes running.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Found = TypeVar("Found")
 P = ParamSpec("P")
 
 MOST: Final = max(16, 2 * (os.cpu_count() or 1))
-"""Most threads or processes: beyond twice the cores nothing is quicker, and each takes memory."""
+"""Most threads or processes: beyond twice the cores there is no gain, and each takes memory."""
 
 
 def checked(count: int, what: str = "jobs", *, least: int = 1) -> int:
-    """The number of threads or processes, if that many may be asked for. Raises InputError."""
+    """The number of threads or processes. Raises InputError if it is out of range."""
     if not least <= count <= MOST:
-        raise InputError(f"{count} {what} cannot be; give {least} to {MOST}")
+        raise InputError(f"{what} must be between {least} and {MOST}, got {count}")
     return count
 
 
@@ -41,7 +41,8 @@ def cores() -> int:
 def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[[list[Task]], list[Found]]]:
     """A function that does the work on tasks in that many processes; results in the tasks' order.
 
-    work: a function of a module, not of the user's program. Raises what the work and `workers` raise.
+    work: a function of a module, not of the user's program. Raises the exceptions of the work and of
+    `workers`.
     """
     with workers(jobs) as chosen:
         yield lambda tasks: list(chosen.map(work, tasks))
@@ -49,20 +50,20 @@ def side_by_side(work: Callable[[Task], Found], jobs: int) -> Iterator[Callable[
 
 @contextmanager
 def workers(jobs: int) -> Iterator[Executor]:
-    """Executor whose tasks run in that many processes, or in this one for a single job.
+    """Executor with that many processes; a single job runs in this process.
 
     Functions must belong to a module, not to the user's program. A process starts when there is a task for
-    it. All have ended afterwards. Raises InputError for a number of jobs that is out of range. Futures raise
-    what their task raises, and WorkerError when a process dies or something cannot be sent.
+    it. All processes end with the block. Raises InputError for a number of jobs that is out of range. Futures
+    raise the exceptions of their task, and WorkerError when a process dies or a value cannot be sent.
     """
     if checked(jobs) == 1:
-        yield _Here()
+        yield _InProcess()
         return
     with _Processes(jobs) as processes:
         yield processes
 
 
-class _Here(Executor):
+class _InProcess(Executor):
     """Executor that runs a task in this process when it is submitted."""
 
     def submit(self, fn: Callable[P, Found], /, *args: P.args, **kwargs: P.kwargs) -> Future[Found]:
@@ -72,12 +73,12 @@ class _Here(Executor):
 
 
 class _Processes(Executor):
-    """Child processes, started one by one as tasks come, each asked by a thread."""
+    """Child processes, started one by one as tasks come; a thread waits for each."""
 
     def __init__(self, jobs: int) -> None:
         self._threads = ThreadPoolExecutor(jobs)
         self._children = [Child(one_thread=True) for _ in range(jobs)]
-        self._idle: queue.LifoQueue[Child] = queue.LifoQueue()  # those that were started come first
+        self._idle: queue.LifoQueue[Child] = queue.LifoQueue()  # started processes come first
         for child in reversed(self._children):
             self._idle.put(child)
 

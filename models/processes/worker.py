@@ -1,4 +1,4 @@
-"""The program of a child process: it does tasks for its parent until its standard input closes."""
+"""The program of a child process, which does tasks for its parent until its standard input closes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def main() -> None:
     """Answer each task that arrives on standard input by one message on standard output."""
     tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
     with os.fdopen(os.dup(1), "wb") as answers:
-        os.dup2(2, 1)  # what a library prints is no answer
+        os.dup2(2, 1)  # output of libraries is not an answer
         threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
         send(b"", answers)  # all imports are done: time limits count from here
         while True:
@@ -56,7 +56,7 @@ def _answer(task: bytes) -> bytes:
         return pickle.dumps((False, _noted(WorkerError(message))))
     try:
         found = work()
-    except Exception as error:  # noqa: BLE001 - it is raised where the task came from
+    except Exception as error:  # noqa: BLE001 - the parent raises it where the task came from
         return _failure(error)
     try:
         return pickle.dumps((True, found))
@@ -66,7 +66,7 @@ def _answer(task: bytes) -> bytes:
 
 
 def _failure(error: Exception) -> bytes:
-    """Pickle of an error of the work, or of a WorkerError with its name and message where it cannot travel.
+    """Pickle of an error of the work, or of a WorkerError with its name and message if it cannot be pickled.
 
     Pickles call the class of an error with its `args`, which do not fit every constructor.
     """
@@ -75,20 +75,20 @@ def _failure(error: Exception) -> bytes:
         _, arrived = pickle.loads(sent)  # noqa: S301 - made in the line above
         if type(arrived) is type(error) and str(arrived) == str(error):
             return sent
-    except Exception:  # noqa: BLE001, S110 - what pickling such an error raises says nothing about the work
+    except Exception:  # noqa: BLE001, S110 - an exception while pickling does not concern the work
         pass
     return pickle.dumps((False, _noted(WorkerError(reason(error)))))
 
 
 def _noted(error: Exception) -> Exception:
-    """The error with the traceback of the one that is being handled as a note."""
+    """The error, with the traceback of the exception being handled as a note."""
     error.add_note(traceback.format_exc())
     return error
 
 
 @contextmanager
 def _output_to(log: Path | None) -> Iterator[None]:
-    """Send what the work prints to a file, C libraries included."""
+    """Redirect the output of the work to a file, including C libraries."""
     if log is None:
         yield
         return
@@ -104,7 +104,7 @@ def _output_to(log: Path | None) -> Iterator[None]:
 
 
 def _redirect(out: int, err: int) -> None:
-    """Make descriptors 1 and 2 copies of others, after what is buffered was written."""
+    """Make descriptors 1 and 2 copies of others, after writing buffered output."""
     sys.stdout.flush()
     sys.stderr.flush()
     with suppress(OSError, TypeError, AttributeError):  # elsewhere C libraries flush by themselves

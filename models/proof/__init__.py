@@ -1,5 +1,5 @@
-"""What proves that no field is better.
+"""Proofs that no field has a lower energy.
 
-Lower bounds of the 2-norm energy on lattices of crosses, what they leave of the labels, and fields that are
-proven optimal. What finds fields is models/search.
+Lower bounds of the 2-norm energy on lattices of crosses, the labels that they leave possible, and fields that
+are proven optimal. models/search finds fields.
 """

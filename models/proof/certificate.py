@@ -1,8 +1,8 @@
-"""Certificates: what a proof says, in a file that anyone can check without the code that has found it.
+"""Certificates: the claims of a proof in a file that anyone can check without the code of the prover.
 
-An .npz of the same bytes for the same proof. It holds the arrays of a field file (models/field/file.py; the
+An .npz with equal bytes for equal proofs. It holds the arrays of a field file (models/field/file.py; the
 format is another), with the claim in its head: status, energy, bound and the number of levels. For each
-level, led by `level_0_`, `level_1_`, ...:
+level, with the prefixes `level_0_`, `level_1_`, ...:
 
     h           (1,)    spacing
     alpha, beta (n,)    centres
@@ -11,15 +11,14 @@ level, led by `level_0_`, `level_1_`, ...:
     scale       (m,)    of each pair's message
     wide        (m,)    whether its whole numbers are among steps_32 rather than steps_16
     steps_16, steps_32  the messages one after the other: what a pair gives to the labels of its earlier
-    pixel,
-                        each number less the one before, which compresses well; sums are modulo 2^32
+                        pixel, each number less the one before, which compresses well; sums are modulo 2^32
 
-Where levels are branches, there is an array `parents` besides: the number of the level from which each
-follows, -1 for the first. Without it each follows from the one before.
+Levels that are branches have an additional array `parents`: the number of the level from which each follows,
+-1 for the first. Without it each follows from the level before.
 
-What a pair gives to its later pixel need not be told: the best of it follows
-(models/proof/check_certificate.py, 3), and so half of a level's shares are enough. They are whole numbers
-times a scale, and whatever they are, the bound they give is valid.
+The share of a pair's later pixel is not stored, because the best one follows from the earlier pixel's
+(models/proof/check_certificate.py, 3). So half of a level's shares are enough. They are whole numbers
+times a scale, and for any values of them the resulting bound is valid.
 """
 
 from __future__ import annotations
@@ -47,16 +46,16 @@ _PREFIX: Final = "instance_"
 _MOST_16: Final = 2**15 - 1
 _MOST_32: Final = 2**31 - 1
 _SPARE: Final = 1e-10
-"""What a claimed bound leaves of the one that was checked, relative to 1 + bound: other processors round
-otherwise.
+"""Share of the checked bound that a claimed bound gives up, relative to 1 + bound, because other
+processors round differently.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A claim: no field has an energy below `bound`; with status `optimal`, that of the field is the least.
+    """A claim: no field has an energy below `bound`; with status `optimal`, the field's energy is the least.
 
-    field, energy: the field and its 2-norm energy. verdict: what the checker has found.
+    field, energy: the field and its 2-norm energy. verdict: findings of the checker.
     """
 
     field: CrossField
@@ -72,18 +71,18 @@ class Certificate:
 
     @property
     def forced(self) -> int:
-        """The number of pairs whose jump is that of the centre in every field that could be better."""
+        """The number of pairs whose jump equals the centre's in every field that could be better."""
         return self.verdict.forced
 
 
 def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Certificate:
-    """The certificate of a proof, which now is in the file at `path`.
+    """Write the certificate of a proof to `path` and return it.
 
-    It claims what the checker confirms, which may be less than the proof says. Same proof, same bytes.
-    over: says whether to end; then the certificate has the levels only that were checked by then.
-    Raises InputError for a proof that the checker refuses or that is in the 1-norm, SolverError for a proof
-    without levels and when it is over before the coarsest level is checked, and OutputError when the file
-    cannot be written.
+    It claims what the checker confirms, which may be less than the proof states. Equal proofs give equal
+    bytes. over: returns whether to end; then the certificate has only the levels that were checked by then.
+    Raises InputError for a proof that the checker refuses or that is in the 1-norm. Raises SolverError for a
+    proof without levels and when time ends before the coarsest level is checked. Raises OutputError when the
+    file cannot be written.
     """
     path = Path(path)
     if proof.norm != 2:
@@ -100,12 +99,12 @@ def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Cer
 
 
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
-    """Return the certificate in a file, checked.
+    """Read and check the certificate in a file.
 
-    The checker reads the file, once. Field, instance, energy, bound and status are those of the arrays that
-    it has checked.
+    The checker reads the file, once. Field, instance, energy, bound and status come from the arrays that it
+    has checked.
 
-    on: the instance that it must be on, when one is given.
+    on: the instance that the field must be on, if given.
     Raises InputError for an unreadable file, another instance and a claim that does not hold, InstanceError
     for a field or an instance that breaks its rules.
     """
@@ -124,14 +123,14 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
     except check_certificate.RefusedError as error:
         raise InputError(f"is refused as a certificate: {error}", file=path) from error
     except check_certificate.UnreadableError as error:
-        raise InputError(f"is no certificate: {error}", file=path) from error
+        raise InputError(f"is not a certificate: {error}", file=path) from error
     return Certificate(field, verdict.energy, head["bound"], head["status"], verdict)
 
 
 def _field(arrays: Arrays) -> CrossField:
-    """The field of a certificate, whose arrays stand for it and its instance as they are.
+    """The field of a certificate, whose arrays must equal those of field and instance exactly.
 
-    An instance rounds what it is given. A certificate of other numbers proves nothing of the rounded ones.
+    An instance rounds its arguments. A certificate of other numbers proves nothing about the rounded ones.
     """
     parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
     field = CrossField(of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
@@ -143,7 +142,7 @@ def _field(arrays: Arrays) -> CrossField:
 
 
 def _confirmed(arrays: Arrays, path: Path, over: Over) -> Verdict:
-    """What the checker finds of arrays that are to be written. Raises InputError, SolverError."""
+    """Verdict of the checker on arrays that are to be written. Raises InputError, SolverError."""
     try:
         return check_certificate.check(arrays, over)
     except check_certificate.StoppedError as error:
@@ -198,8 +197,9 @@ def _of_level(level: LevelRecord, field: CrossField) -> Arrays:
 
 
 def _messages(level: LevelRecord, field: CrossField) -> Arrays:
-    """What each pair gives to its earlier pixel, as whole numbers of its scale:
-    the level's own, unless too many of them fit into 32 bits.
+    """The messages from each pair to its earlier pixel, as whole numbers of its scale.
+
+    These are the level's own messages, unless too many of them fit into 32 bits.
     """
     flat, counts = _to_earlier(level, field)
     if not len(counts):
@@ -222,12 +222,12 @@ def _stored(steps: Any, counts: Any, scale: Any) -> Arrays:
         "scale": scale,
         "wide": wide,
         "steps_16": steps[~each].astype(np.int16),
-        "steps_32": steps[each].astype(np.int32),  # modulo 2^32, as they are added up
+        "steps_32": steps[each].astype(np.int32),  # modulo 2^32, because the checker adds them up so
     }
 
 
 def _to_earlier(level: LevelRecord, field: CrossField) -> tuple[Any, Any]:
-    """The shares of each pair's earlier pixel, flat, and how many they are."""
+    """The shares of each pair's earlier pixel, flat, and their number."""
     grid = field.instance.grid
     count = level.alpha_count.astype(np.int64) * level.beta_count
     early = np.minimum(grid.first, grid.second)

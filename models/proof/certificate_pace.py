@@ -1,8 +1,8 @@
 """Expected time of a certificate: an effort per level, and the present pace of the checker.
 
 The unit of effort is a pixel of a level with few labels, whose check takes about 1.6 ms. 340,000 additions of
-the checker take as long, and so does compressing 3,200 labels. The pace depends on the machine and its load.
-It is therefore measured on a tiny level.
+the checker take as long, and so does compressing 3,200 labels. The pace depends on the machine and its load,
+so it is measured on a tiny level.
 """
 
 from __future__ import annotations

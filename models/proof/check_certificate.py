@@ -1,11 +1,11 @@
 """Check a certificate of a cross field with no code of its prover: `python check_certificate.py FILE`.
 
 One file, Python 3.9 or newer and NumPy. All of it is recomputed from the instance in float64: the energy U of
-the field, and at every level of the lattice the costs, a bound, what it excludes, and that the next level
-covers the rest. Exit code 0: the claim is proven. 1: it is not; a line says where. 2: no certificate.
+the field, and at every level of the lattice the costs, a bound, the cells that it excludes, and that the next
+level covers the rest. Exit code 0: the claim is proven. 1: it is not; a line says where. 2: no certificate.
 
-"Optimal" says: no field has an energy below U by more than the number printed, which is at most OPTIMAL times
-the greater of 1 and U. "Gap" says: no field has an energy below the bound.
+"Optimal" means: no field has an energy below U by more than the number printed, which is at most OPTIMAL
+times the greater of 1 and U. "Gap" means: no field has an energy below the bound.
 
 1. The problem. Crosses lie on a strip: (alpha, beta) and (alpha + pi/2, -beta) are the same lines, and
    |beta| <= pi/4. With the best jumps, and at every stroke its nearer line, crosses have the energy
@@ -37,9 +37,9 @@ the greater of 1 and U. "Gap" says: no field has an energy below the bound.
    at once these are the jumps from the least to the greatest of them; see `jumps`.
 
 3. A pass. M_e(x) is a number for each label of the earlier pixel of pair e, taken from the certificate; any
-   numbers will do. What the pair can give to its later pixel beside it is S_e(y) = min over x of c_e(x, y) -
+   numbers will do. The largest share that remains for its later pixel is S_e(y) = min over x of c_e(x, y) -
    M_e(x), so that c_e(x, y) >= M_e(x) + S_e(y). Go through the pixels in their order. At pixel i, theta_i is
-   D_i + the sum of M over its pairs to later pixels + the sum of what it has got from earlier ones, mu_i =
+   D_i + the sum of M over its pairs to later pixels + the sum of shares received from earlier ones, mu_i =
    min theta_i, t_i = theta_i - mu_i >= 0. It hands gamma t_i on, gamma = 1 / max(1, earlier pairs, later
    pairs): later pixels get
 
@@ -70,7 +70,7 @@ the greater of 1 and U. "Gap" says: no field has an energy below the bound.
    each piece, and G(y) >= G(x) + grad G(x) (y - x), whose least value over the y in a box is a sum of single
    terms.
 
-5. Rounding. Messages may be anything, so errors in them do no harm; what counts is by how much an inequality
+5. Rounding. Messages may be anything, so errors in them do no harm. What counts is how much an inequality
    of 3. may fail at a pixel or a pair. That is below a small multiple (ROUNDING) of the machine's precision
    times the size of the numbers that enter; the sum over all of them is taken off every bound. Sums over
    pixels are made without rounding (math.fsum). Domains may fall short of what they should cover by SLIVER
@@ -124,15 +124,15 @@ Over = Callable[[], bool]
 
 
 class RefusedError(Exception):
-    """A claim that does not follow; the message says where."""
+    """A claim that does not follow; the message names the place."""
 
 
 class UnreadableError(Exception):
-    """A file that is no certificate."""
+    """A file that is not a certificate."""
 
 
 class StoppedError(Exception):
-    """It was over before anything was proven."""
+    """Time was over before anything was proven."""
 
 
 @dataclass
@@ -156,7 +156,7 @@ class Sketch:
 
 @dataclass
 class Level:
-    """A lattice, which of its labels are allowed, and the messages of the pairs.
+    """A lattice, its allowed labels, and the messages of the pairs.
 
     ranges (n, 4): steps, as first and count of alpha, first and count of beta; allowed (a, b) of each pixel;
     the message of each pair is to its earlier pixel.
@@ -172,7 +172,7 @@ class Level:
 
 @dataclass
 class Passed:
-    """What a pass over a level gives.
+    """Result of a pass over a level.
 
     A bound of F on its domain, the right side of 3. at each label of each pixel, and the greatest error of
     both.
@@ -185,10 +185,10 @@ class Passed:
 
 @dataclass
 class Verdict:
-    """What is proven.
+    """Findings of the checker: the proven claim.
 
-    status: `optimal` or `gap`. boxes (n, 4): alpha and beta from, to, where every better field has its
-    crosses, by labels round `centres` (n, 2). forced_pairs (m,): where its jumps are forced. levels: their
+    status: `optimal` or `gap`. boxes (n, 4): ranges of alpha and beta that hold the crosses of every better
+    field, by labels around `centres` (n, 2). forced_pairs (m,): where its jumps are forced. levels: their
     bounds.
     """
 
@@ -209,13 +209,13 @@ class Verdict:
 # Reading ---------------------------------------------------------------------------------------------------
 
 
-# The archive is parsed here, and strictly, because programs read different arrays from unusual archives.
+# This file parses the archive itself, and strictly: programs read different arrays from unusual archives.
 
 
 def read(path: str) -> dict[str, Array]:
     """The arrays of the certificate in a file."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123 - a path as it was typed is enough here
+        with open(path, "rb") as stream:  # noqa: PTH123 - the path as typed is enough here
             data = stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         raise UnreadableError(f"cannot be read ({type(error).__name__})") from error
@@ -223,11 +223,11 @@ def read(path: str) -> dict[str, Array]:
 
 
 def unpacked(data: bytes) -> dict[str, Array]:
-    """The arrays of an .npz, which holds those of a certificate and nothing else.
+    """The arrays of an .npz, which holds a certificate's arrays and nothing else.
 
-    It consists of the members, stored or deflated, the directory and its end record, with no byte before,
-    between or after them, and no comment. The header of each member repeats its directory entry. Each name is
-    there once. Sizes are checked before anything is unpacked; no pickles.
+    It consists of the members, stored or deflated, the directory and its end record, without other bytes
+    before, between or after them, and without a comment. The header of each member repeats its directory
+    entry. Each name appears once. Sizes are checked before anything is unpacked; no pickles.
     """
     try:
         arrays = _members(data)
@@ -240,7 +240,7 @@ def unpacked(data: bytes) -> dict[str, Array]:
 
 
 def _require(holds: Any, otherwise: str) -> None:
-    """Nothing where it holds; else raises UnreadableError."""
+    """Raise UnreadableError unless the condition holds."""
     if not holds:
         raise UnreadableError(otherwise)
 
@@ -272,12 +272,12 @@ def _members(data: bytes) -> dict[str, Array]:
 
 
 def _content(data: bytes, place: int, key: str, facts: list[int]) -> int:
-    """Where the content of a member begins, whose header at a place must repeat the directory entry."""
+    """Start of the content of a member, whose header at a place must repeat the directory entry."""
     _, flags, method, _, _, _, packed, length, _, extra, comment, disk, _, _, offset = facts
     local = [*struct.unpack_from("<4s5H3L2H", data, place)]
     name = key.encode() + b".npy"
     begin: int = place + 30 + len(name) + local[10]
-    if local[10] == 20:  # NumPy has the sizes once more in 64 bits
+    if local[10] == 20:  # NumPy repeats the sizes in 64 bits
         wide = struct.pack("<2H2Q", 1, 16, length, packed)
         _require(data[begin - 20 : begin] == wide, f"{key} has two sizes")
         local[7:9] = [packed, length] if local[7:9] == [0xFFFFFFFF] * 2 else local[7:9]
@@ -290,16 +290,16 @@ def _content(data: bytes, place: int, key: str, facts: list[int]) -> int:
 
 
 def _array(name: str, packed: bytes, facts: list[int]) -> Array:
-    """The array that the content of a member holds: of the kinds and the form that certificates have."""
+    """The array in the content of a member, in the kinds and the form of certificates."""
     deflated, checksum, length = facts[2] == 8, facts[5], facts[7]
     unpacker = zlib.decompressobj(-15)
     head = unpacker.decompress(packed, 128) if deflated else packed[:128]
-    said = HEAD.fullmatch(head)
-    if said is None:
+    found = HEAD.fullmatch(head)
+    if found is None:
         raise UnreadableError(f"{name} is no array as certificates have it")
-    kind, shape = np.dtype(said[1].decode()), tuple(int(side) for side in said[2].split(b",") if side)
+    kind, shape = np.dtype(found[1].decode()), tuple(int(side) for side in found[2].split(b",") if side)
     size = math.prod(shape) * kind.itemsize
-    _require(128 + size == length, f"{name} is not what its header says")
+    _require(128 + size == length, f"{name} differs from its header")
     rest = unpacker.decompress(unpacker.unconsumed_tail, size + 1) if deflated else packed[128:]
     ended = not deflated or (unpacker.eof and not unpacker.unused_data)
     whole = ended and len(rest) == size and zlib.crc32(rest, zlib.crc32(head)) == checksum
@@ -309,7 +309,7 @@ def _array(name: str, packed: bytes, facts: list[int]) -> Array:
 
 
 def _need_names(arrays: dict[str, Array]) -> None:
-    """Nothing where the arrays are those of a certificate with so many levels; else raises an error."""
+    """Raise an error unless the arrays are exactly those of a certificate with that many levels."""
     levels = _levels(head_of(arrays))
     names = set(PARTS) | {f"level_{number}_{part}" for number in range(levels) for part in LEVEL_PARTS}
     for name in sorted(names - set(arrays)):
@@ -335,14 +335,14 @@ def _text(arrays: dict[str, Array], name: str) -> dict[str, Any]:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object, each of whose keys is there once: programs differ on which one counts."""
+    """A JSON object without repeated keys, because programs differ on which of them counts."""
     found = dict(pairs)
-    _require(len(found) == len(pairs), "has a text with a key that is there twice")
+    _require(len(found) == len(pairs), "has a text with a repeated key")
     return found
 
 
 def _given(arrays: dict[str, Array], name: str, kind: str, *shape: int | None) -> Array:
-    """An array of that kind and, where numbers are given, of that shape; finite."""
+    """An array of that kind and, if numbers are given, of that shape; finite."""
     if name not in arrays:
         raise UnreadableError(f"has no array {name}")
     array = arrays[name]
@@ -357,7 +357,7 @@ def _given(arrays: dict[str, Array], name: str, kind: str, *shape: int | None) -
 
 
 def _need(holds: Any, name: str, wrong: str) -> None:
-    """Nothing where all of it holds; else raises RefusedError with the first place where not."""
+    """Raise RefusedError, with the first place that fails, unless all of the condition holds."""
     holds = np.asarray(holds)
     if not holds.all():
         place = f"[{int(np.argmin(holds))}]" if holds.ndim else ""
@@ -381,7 +381,7 @@ def _levels(head: dict[str, Any]) -> int:
 
 
 def sketch_of(arrays: dict[str, Array]) -> Sketch:
-    """The instance that the certificate holds. Stroke directions are moved into the gauge's own range."""
+    """The instance in the certificate, with stroke directions moved into the gauge's own range."""
     head = _text(arrays, "instance_head")
     _need("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     mask = _given(arrays, "instance_mask", "|b1", None, None)
@@ -459,7 +459,7 @@ def energy_of(sketch: Sketch, alpha: Array, beta: Array, p: Array) -> tuple[floa
 
 
 def slack_of(sketch: Sketch, levels: int) -> float:
-    """By how much F may change, at most, when every angle moves by SLIVER at each level.
+    """Greatest change of F when every angle moves by SLIVER at each level.
 
     At most four pairs with slopes of 4 |A| and 4 |B|, both at most pi / 2 at the best jumps, 2 W pi/2 and
     2 w_beta pi/4.
@@ -511,7 +511,7 @@ def _messages(arrays: dict[str, Array], at: str, sketch: Sketch, shapes: Array) 
 
 
 def _cut(flat: Array, shapes: Array) -> list[Array]:
-    """The blocks of those shapes that stand one after the other."""
+    """Consecutive blocks of those shapes."""
     ends = np.cumsum(shapes.prod(axis=1))
     return (
         [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), shapes)] if len(ends) else []
@@ -529,7 +529,7 @@ def positions(level: Level, sketch: Sketch, i: int) -> tuple[Array, Array]:
 
 
 def unary(level: Level, sketch: Sketch, i: int) -> tuple[Array, float]:
-    """The cost D of each label of pixel i, inf where it is not allowed, and the size of what enters."""
+    """The cost D of each label of pixel i, inf for labels that are not allowed, and the size of its terms."""
     alpha, beta = positions(level, sketch, i)
     h, weight = level.h, float(sketch.weight[i])
     cost = sketch.w_beta * (beta * beta - h * h / 4)[None, :] + np.zeros((len(alpha), 1))
@@ -564,7 +564,7 @@ def jumps(alpha_i: Array, alpha_j: Array) -> range:
 
 
 class Pair:
-    """The costs c of a pair, for each parity of the jump the sum of a matrix in alpha and one in beta.
+    """The costs c of a pair: for each parity of the jump the sum of a matrix in alpha and one in beta.
 
     c is the lesser of the two; rows are labels of the earlier pixel.
     """
@@ -586,7 +586,7 @@ class Pair:
         self._drop_idle()
 
     def _drop_idle(self) -> None:
-        """Leave out a parity that is nowhere less than the other."""
+        """Drop a parity that is nowhere less than the other."""
         for worse, better in ((0, 1), (1, 0)):
             if len(self.parts) == 2:
                 least = sum(float(part.min()) for part in self.parts[worse])
@@ -596,7 +596,7 @@ class Pair:
     def to_later(self, *given: Array) -> list[Array]:
         """The least given(x) + c(x, y) over labels x of the earlier pixel, for each label y of the later one.
 
-        One such array for each of the given.
+        One such array for each array of `given`.
         """
         stacked = np.concatenate(given)
         found = [np.split(_min_plus(stacked, b), len(given)) for _, b in self.parts]
@@ -628,7 +628,7 @@ class Pass:
         self.errors: list[float] = []
 
     def run(self, stop: Over) -> Passed:
-        """The pass. Raises StoppedError where it has to end before the last pixel."""
+        """Do the pass. Raises StoppedError when it has to end before the last pixel."""
         numbers, least, waiting = [], [], []
         for i in range(len(self.costs)):
             if stop():
@@ -644,7 +644,7 @@ class Pass:
         return Passed(math.fsum(least) - error, rights, error)
 
     def _theta(self, i: int, given: list[Array]) -> tuple[Array, float]:
-        """What theta_i exceeds its minimum by at each label, and the minimum."""
+        """Excess of theta_i over its minimum at each label, and the minimum."""
         cost, size = self.costs[i]
         shares = [self.level.messages[e] for e in self.sketch.later[i]]
         shares += [given[e] for e in self.sketch.earlier[i]]
@@ -654,7 +654,7 @@ class Pass:
         return total - least, least
 
     def _send(self, e: int, over: Array, earlier: int, later: int) -> None:
-        """Let pair e give to its later pixel what it can, without and with what its earlier one hands on."""
+        """Send the message of pair e to its later pixel, without and with the share of its earlier pixel."""
         pair, held = Pair(self.level, self.sketch, e), self.level.messages[e]
         given = over / max(1, earlier, later) - held
         allowed = np.isfinite(given)
@@ -676,7 +676,7 @@ def surviving(level: Level, passed: Passed, most: float) -> list[Array]:
 
 
 def corners(labels: Array, both: Any) -> Array:
-    """For each cell what `both` makes of its four vertices."""
+    """Combine the values at the four vertices of each cell with `both`."""
     return both(both(labels[:-1, :-1], labels[1:, :-1]), both(labels[:-1, 1:], labels[1:, 1:]))
 
 
@@ -684,7 +684,7 @@ def corners(labels: Array, both: Any) -> Array:
 
 
 def need_whole_strip(level: Level, sketch: Sketch) -> None:
-    """Nothing where the domain of each pixel holds every cross; else raises RefusedError."""
+    """Raise RefusedError unless the domain of each pixel holds every cross."""
     for i, allowed in enumerate(level.allowed):
         alpha, beta = positions(level, sketch, i)
         _need(allowed.all(), f"level_0_allowed of pixel {i}", "leaves out labels")
@@ -694,7 +694,7 @@ def need_whole_strip(level: Level, sketch: Sketch) -> None:
 
 
 def covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch) -> list[Array]:
-    """For each pixel, which cells left of a level lie in the domain of another, as far as |beta| <= pi/4."""
+    """Whether cells left of a level, by pixel, lie in the domain of another, as far as |beta| <= pi/4."""
     found = []
     for i, kept in enumerate(cells):
         at, other = positions(coarse, sketch, i), positions(fine, sketch, i)
@@ -709,10 +709,10 @@ def covered(coarse: Level, cells: list[Array], fine: Level, sketch: Sketch) -> l
 
 
 def need_all_covered(parts: list[list[Array]], number: int) -> None:
-    """Nothing where one of the levels that follow holds each field whose crosses are in the cells left.
+    """Raise RefusedError unless the next levels together hold each field with crosses in the cells left.
 
-    That is so where all of them hold all cells of all pixels, but for one pixel: there it is enough that each
-    cell is in one of them. number: of the last of them. Raises RefusedError elsewhere.
+    This holds if all of them contain all cells of all pixels except one. At that pixel each cell has to be
+    in one of them. number: number of the last of them.
     """
     cut = [i for i, each in enumerate(zip(*parts)) if not all(part.all() for part in each)]
     for place, i in enumerate(cut):
@@ -722,13 +722,13 @@ def need_all_covered(parts: list[list[Array]], number: int) -> None:
 
 
 def _spanned(low: Array, high: Array, origin: float, h: float) -> tuple[Array, Array]:
-    """The first cell that intervals meet by more than SLIVER, and the one after the last."""
+    """The first cell that intervals meet by more than SLIVER, and the cell after the last."""
     first = np.floor((low + SLIVER - origin) / h).astype(np.int64)
     return first, np.ceil((high - SLIVER - origin) / h).astype(np.int64)
 
 
 def _held(domain: Array, rows: tuple[Array, Array], columns: tuple[Array, Array]) -> Array:
-    """True for the rectangles of cells that the domain holds all of."""
+    """True for the rectangles of cells that lie completely in the domain."""
     total = np.zeros((domain.shape[0] + 1, domain.shape[1] + 1), np.int64)
     total[1:, 1:] = domain.cumsum(axis=0).cumsum(axis=1)
     (a, c), (b, d) = rows, columns
@@ -740,7 +740,7 @@ def _held(domain: Array, rows: tuple[Array, Array], columns: tuple[Array, Array]
 
 
 def boxes_of(level: Level, cells: list[Array], sketch: Sketch, margin: float) -> Array:
-    """The least box round the cells of each pixel within |beta| <= pi/4, wider by a margin; shape (n, 4).
+    """The smallest box round the cells of each pixel within |beta| <= pi/4, wider by a margin; shape (n, 4).
 
     Columns: alpha from, to, beta from, to.
     """
@@ -768,7 +768,7 @@ def forced(sketch: Sketch, p: Array, boxes: Array) -> Array:
 
 
 def beyond_windows(turned: Array, boxes: Array) -> Array:
-    """How far the boxes lead beyond the windows of the strokes, above and below; shape (2, n)."""
+    """Distances by which the boxes exceed the windows of the strokes, above and below; shape (2, n)."""
     found: Array = np.stack([boxes[:, 1] - turned, turned - boxes[:, 0]]) - QUARTER
     return found
 
@@ -777,8 +777,8 @@ def beyond_windows(turned: Array, boxes: Array) -> Array:
 class Piece:
     """A part of the boxes (n, 4), and the lines that carry the strokes there.
 
-    lines (n,): 0 where u carries the stroke; 1 above the window and -1 below it, where v does. bound: of the
-    piece that it was cut from.
+    lines (n,): 0 where u carries the stroke; 1 above the window and -1 below it, where v does. bound: bound
+    of the piece that it was cut from.
     """
 
     boxes: Array
@@ -798,7 +798,7 @@ class Quadratic:
         self.low, self.high = piece.boxes[:, ::2].T.ravel(), piece.boxes[:, 1::2].T.ravel()
 
     def given(self, beta: Array) -> Array:
-        """What is taken off for the edges that the piece leads over, at each pixel."""
+        """Deduction at each pixel for the edges that the piece crosses."""
         found: Array = self.above * (QUARTER + beta) + self.below * (QUARTER - beta)
         return found
 
@@ -825,7 +825,7 @@ class Quadratic:
         return np.concatenate([slope, skew])
 
     def bound(self, x: Array) -> float:
-        """A lower bound on the piece: the value at x, and the least that its gradient promises."""
+        """A lower bound on the piece: the value at x plus the least change that its gradient allows."""
         value, slope = self.value(x), self.slope(x)
         sketch, angles = self.sketch, MOST_ANGLE + MOST_JUMP
         error = PRECISION * ROUNDING * (1 + np.tile(sketch.weight, 2) + sketch.w_beta) * angles
@@ -835,9 +835,9 @@ class Quadratic:
         return value - math.fsum(falls) - PRECISION * angles * (pairs + strokes)
 
     def least(self, x: Array) -> Array:
-        """A point near the least of the piece, by Newton steps on the angles that no bound holds.
+        """A point near the minimum of the piece, by Newton steps on the angles that no bound holds.
 
-        Whatever it is, the bound is valid.
+        The bound is valid for any point.
         """
         x = np.clip(x, self.low, self.high)
         for _ in range(50):
@@ -852,7 +852,7 @@ class Quadratic:
         return x
 
     def _newton(self, slope: Array, free: Array) -> Array:
-        """The step on the free angles after which there is no slope, by conjugate gradients."""
+        """The step on the free angles to zero slope, by conjugate gradients."""
         still = self.slope(np.zeros(len(slope)))
         step, rest = np.zeros(len(slope)), -slope
         way, size = rest, float(np.sum(rest * rest))
@@ -868,7 +868,7 @@ class Quadratic:
         return step
 
     def cut(self, x: Array, turned: Array, bound: float) -> list[Piece]:
-        """The piece cut at the edges of the window of the pixel at which most is taken off, if any."""
+        """The piece cut at the edges of the window of the pixel with the largest deduction, if any."""
         over = self.above + self.below > 0
         if not over.any():
             return []
@@ -885,9 +885,9 @@ class Quadratic:
 
 
 def relabelled(sketch: Sketch, field: Field, centres: Array) -> tuple[Field, Array]:
-    """The field by the labels nearest to the centres, and the direction of each stroke.
+    """The field with the labels nearest to the centres, and the direction of each stroke.
 
-    A stroke has the turn that line u has there.
+    Each stroke takes the turn that line u has there.
     """
     alpha, beta, p = field
     steps = np.round((centres[:, 0] - alpha) / HALF).astype(np.int64)
@@ -901,8 +901,8 @@ def lower_bound(
 ) -> tuple[float, Array]:
     """A lower bound of F in the boxes, -inf where a jump is not forced, and the pairs with forced jumps.
 
-    Boxes that lead over edges of windows are cut until the bound is `enough`, or there are MOST_PIECES, or it
-    is over.
+    Boxes that cross edges of windows are cut until the bound is `enough`, there are MOST_PIECES, or time is
+    over.
     """
     centres = np.stack([level.alpha, level.beta], axis=1)
     (alpha, beta, p), turned = relabelled(sketch, field, centres)
@@ -934,12 +934,12 @@ def lower_bound(
 
 
 def check(arrays: dict[str, Array], over: Over = lambda: False) -> Verdict:
-    """What the arrays of a certificate prove.
+    """Check the arrays of a certificate and return what they prove.
 
-    over: is asked again and again whether to end; then only the levels count that were passed by then.
-    Raises RefusedError where a level does not follow from the one before, or where less is proven than
-    claimed; UnreadableError for what is no certificate; StoppedError where it is over before the first level
-    was passed.
+    over: called repeatedly, returns whether to end; then only the levels passed by then count. Raises
+    RefusedError when a level does not follow from the one before, or when less is proven than claimed. Raises
+    UnreadableError for arrays that are not a certificate, and StoppedError when time is over before the first
+    level was passed.
     """
     try:
         return _check(arrays, over)
@@ -967,10 +967,10 @@ def _check(arrays: dict[str, Array], over: Over) -> Verdict:
 
 
 class Tree:
-    """Which level follows from which, and the bound of each."""
+    """The level that each level follows from, and the bound of each."""
 
     def __init__(self, arrays: dict[str, Array], count: int) -> None:
-        """Each level follows from the one before where no array `parents` says otherwise."""
+        """Read `parents`; without it each level follows from the one before."""
         chain = np.arange(-1, count - 1)
         self.parents = _given(arrays, "parents", "<i4", count) if "parents" in arrays else chain
         _need((self.parents >= -1) & (self.parents <= chain), "parents", "is not of a level before")
@@ -978,7 +978,7 @@ class Tree:
         self.bounds: list[float] = []
 
     def cut(self, number: int) -> None:
-        """Leave out a level and those after it, and those before that follow from the same one."""
+        """Drop a level and later ones, and earlier ones that follow from the same level."""
         first = int(np.flatnonzero(self.parents == self.parents[number])[0])
         self.parents, self.bounds = self.parents[:first], self.bounds[:first]
 
@@ -987,7 +987,7 @@ class Tree:
         return [int(each) for each in np.flatnonzero(self.parents == number)]
 
     def bound(self, number: int = 0) -> float:
-        """The bound of F on the domain of a level: its own, or the least of those that follow from it."""
+        """The bound of F on the domain of a level: its own, or the least bound of the levels after it."""
         least = [self.bound(each) for each in self.followers(number)]
         return max(self.bounds[number], min(least, default=-math.inf))
 
@@ -995,7 +995,7 @@ class Tree:
 def _descend(
     arrays: dict[str, Array], sketch: Sketch, count: int, most: float, over: Over
 ) -> tuple[Tree, Array, Level]:
-    """The bounds of all levels, the boxes round what is left after the last ones, and the first level."""
+    """The bounds of all levels, the boxes round the cells left after the last ones, and the first level."""
     tree = Tree(arrays, count)
     first = level_of(arrays, 0, sketch)
     need_whole_strip(first, sketch)
@@ -1030,7 +1030,7 @@ def _descend(
 
 
 def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:
-    """Nothing where the claim is proven; else raises RefusedError."""
+    """Raise RefusedError unless the claim is proven."""
     energy = _number(head, "energy", 0.0, math.inf)
     bound = _number(head, "bound", -math.inf, math.inf)
     close = abs(energy - verdict.energy) <= error + 1e-12 * max(1.0, verdict.energy)
@@ -1043,7 +1043,7 @@ def _compare(head: dict[str, Any], verdict: Verdict, error: float) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The exit code, with the verdict printed."""
+    """Print the verdict and return the exit code."""
     parser = argparse.ArgumentParser(description="Check a certificate of a cross field.")
     parser.add_argument("file", help="a certificate (.npz)")
     path = parser.parse_args(arguments).file

@@ -1,28 +1,28 @@
 """The lattice of the 1-norm: one for all pixels, on which pairs lose nothing.
 
 alpha and beta of every label are multiples of h, and h divides pi/4. So the differences A and B of two
-labels are multiples of h too, at every jump. Round crosses by thresholds as models/proof/costs.py says: A
-and B each fall on one of two neighbouring multiples of h with the right mean, and |.| is linear between
-them, as it is for beta. Hence
+labels are multiples of h too, at every jump. Round crosses by thresholds as in models/proof/costs.py: A
+and B each become one of two neighbouring multiples of h with the right mean. |.| is linear between them,
+and so it is for beta. Hence
 
     pair    c = min over p of 2 (|A| + |B|)        E[c] <= 2 (|a| + |b|)
     skew    w_beta |beta|                          E[.] = w_beta |beta|
 
 For strokes the line's misfit R = alpha + beta - theta is a sum of two that are rounded independently: it
-falls on one of three values h apart, with the right mean. They need not be multiples of h. With any -1 <= l
+becomes one of three values h apart, with the right mean. They need not be multiples of h. With any -1 <= l
 <= 1 let
 
     stroke  w d(R),  d(R) = |R| where |R| >= 2h, else l R        E[.] <= w |r|
 
-Either all three values are less than 2h in size. There d is linear, and its mean is l r <= |r|. Or one of
-them is 2h or more in size: as they span 2h, none has another sign. Then |.| is linear on them, d is nowhere
-more, and the mean of d is at most |r|. The same with R = alpha + pi/2 - beta - theta for line v, where l =
-0 is taken, and after any number of turns by pi. The least over lines and turns is nowhere more than any of
-them.
+Either all three values are less than 2h in size. Then d is linear there, and its mean is l r <= |r|. Or one
+of them is 2h or more in size: because they span 2h, none has another sign. Then |.| is linear on them, d is
+nowhere more, and the mean of d is at most |r|. The same holds with R = alpha + pi/2 - beta - theta for line
+v, with l = 0, and after any number of turns by pi. The least over lines and turns is nowhere more than any
+of them.
 
-The discrete problem is thus one whose local polytope holds every field at no more than its 1-norm energy.
-At the best angles for some jumps nothing is lost at all where l is the multiplier of the stroke in the
-linear program for them (models/search/box_lp.py): l R supports |R| at r, and the pairs hold it in balance.
+So the local polytope of the discrete problem holds every field at no more than its 1-norm energy. At the
+best angles for some jumps there is no loss if l is the multiplier of the stroke in the linear program for
+them (models/search/box_lp.py): l R supports |R| at r, and the pairs hold it in balance.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class CommonLattice(Lattice):
     def near(cls, field: CrossField, slopes: Floats, steps: int) -> CommonLattice:
         """The lattice of spacing pi / (2 steps) with every cross of the strip in a cell.
 
-        steps: an even number. alpha covers pi/2 round the multiple of h next to that of the field.
+        steps: an even number. alpha covers pi/2 round the multiple of h nearest to the field's alpha.
         """
         h, size = HALF / steps, field.instance.grid.size
         known, beta = reached(field.instance), np.zeros(size)
@@ -72,7 +72,7 @@ class CommonLattice(Lattice):
         return np.zeros(self.instance.grid.size)
 
     def unary_costs(self) -> Floats:
-        """D of each label, flat: skew and stroke term; inf where it is not allowed."""
+        """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
         cost: Floats = self.instance.skew_coefficient * np.abs(self.angles[1])
         weight = stroke_weight(self.instance)[self.pixel]
         at = np.flatnonzero(weight)
@@ -88,7 +88,7 @@ class CommonLattice(Lattice):
         return np.where(self.allowed, cost, np.inf)
 
     def _misfit(self, r: Floats, slope: Floats) -> Floats:
-        """The cost d(R) of a line, a little less where rounding could make it more."""
+        """The cost d(R) of a line, slightly reduced where rounding could increase it."""
         r = wrap(r, -HALF, np.pi)
         found: Floats = np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)
         return found

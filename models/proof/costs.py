@@ -1,18 +1,18 @@
-"""Discrete costs of labels that never add up to more than the energy of the fields they stand for.
+"""Discrete costs of labels whose sum never exceeds the energy of the fields that the labels represent.
 
 Round every cross x_i to a vertex of its cell: alpha up or down by a threshold t, beta by another, both
-uniform, so that the means are right (bilinear weights). Let pixels share the thresholds; at a jump p that is
-odd the pair takes 1 - t for one of its betas. Each difference of a pair, A and B, then falls on one of two
+uniform, so that the means are right (bilinear weights). Let pixels share the thresholds; at an odd jump p
+the pair takes 1 - t for one of its betas. Each difference of a pair, A and B, then becomes one of two
 neighbouring values of spacing h with the right mean: its variance is at most h^2/4. The law of a pixel's
-vertex does not depend on how its pairs are coupled, so that one law per pixel and one per pair fit together:
+vertex does not depend on how its pairs are coupled, so one law per pixel and one per pair fit together:
 they are feasible for the local polytope. Hence with
 
     pair    c = min over p of 2 (A^2 + B^2) - h^2              E[c] <= 2 (a^2 + b^2)
     stroke  w (min over lines and turns of R^2 - h^2/2)         E[.] <= w r^2,  R rounded in alpha and beta
     skew    w_beta (beta^2 - h^2/4)                             E[.] <= w_beta beta^2
 
-every lower bound of the discrete problem over that polytope, whatever the messages it comes from, is one of
-the energy of all fields whose crosses lie in cells with four allowed vertices.
+every lower bound of the discrete problem over that polytope, from any messages, is a lower bound of the
+energy of all fields whose crosses lie in cells with four allowed vertices.
 
 Where the centre of a black pixel has its line u within pi/4 of the stroke, u may lose another amount at the
 label (k, l): 0 where k + l = 0, h^2 where |k + l| = 1, else h^2/2. With the weights f, g in alpha and beta, R
@@ -35,12 +35,12 @@ from .lattice import Lattice
 
 
 def pair_deduction(h: float) -> float:
-    """What a pair's discrete cost lies below the cost of its two labels: h^2."""
+    """Deduction of a pair's discrete cost from the cost of its two labels: h^2."""
     return h * h
 
 
 def unary_costs(lattice: Lattice) -> Floats:
-    """D of each label, flat: skew and stroke term with their deductions; inf where it is not allowed."""
+    """D of each label, flat: skew and stroke term with their deductions; inf for labels not allowed."""
     if isinstance(lattice, CommonLattice):
         return lattice.unary_costs()
     instance, h = lattice.instance, lattice.h

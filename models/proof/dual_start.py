@@ -1,6 +1,6 @@
-"""The search that begins at what the dual of a coarse lattice suggests where that is lower.
+"""The search that starts from the dual of a coarse lattice where this is lower.
 
-A few passes over the first lattice of a proof look at all pixels at once. They often find the right jumps
+A few passes over the first lattice of a proof consider all pixels at once. They often find the right jumps
 of a whole drawing, which a search patch by patch does not reach from the greedy field.
 """
 
@@ -18,11 +18,11 @@ from ..search.search import RoundProgress, Search
 from ..search.search import search as search_patches
 
 _FEWEST: Final = 64  # pixels up to which a search alone finds the optimum
-_MOST: Final = 1000  # beyond, the field is that of the grid of half the resolution
+_MOST: Final = 1000  # beyond, the field comes from the grid of half the resolution
 _STEPS: Final = 16  # in pi/2
 _PASSES: Final = 3  # forwards and backwards before fields are rounded
 _ROUNDINGS: Final = 2  # later ones of this lattice find little
-_LEAST_SECONDS: Final = 5.0  # with less, loading what is compiled would take a good part of them
+_LEAST_SECONDS: Final = 5.0  # with less, loading compiled code would take a good part of them
 _COMPILING: Final = 60.0  # seconds; with less, compiling would
 
 
@@ -36,19 +36,19 @@ def search(
     start: CrossField | None = None,
     progress: RoundProgress = lambda *_: None,
 ) -> Search:
-    """The field of least 2-norm energy found, never above `start`.
+    """Search for the field of least 2-norm energy, never above `start`.
 
-    Nor is it above the first field, unless time cuts that off, nor above what a short proof finds:
-    the search begins at the best of them (grids of 65 to 1000 pixels, or that many at lower resolution; with
-    5 s or more, or 60 s where what it needs has not been compiled yet).
+    The result is also not above the first field, unless time cuts that off, and not above the result of a
+    short proof. The search begins at the best of them (grids of 65 to 1000 pixels, or that many at lower
+    resolution; with 5 s or more, or 60 s while code is not compiled yet).
 
-    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
-    success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
-    100 a second), and the last solve, with 5 % and half a second more.
-    Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes; start: a field to begin at where, improved, it is better than the others; seed: of all
-    choices by chance. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that
-    is not positive and too many jobs, InstanceError for a start on another instance.
+    seconds, rounds: when to end, whichever comes first; with neither, after 200 perturbations per pixel
+    without success. All work respects the seconds, the start too. One step may exceed them (on a grid of 100
+    x 100 a second), and so may the last solve, by 5 % and half a second. Without seconds the same instance,
+    seed and rounds give the same field on the same kind of processor. jobs: number of processes; start: a
+    field that is used if, improved, it is better than the others; seed: of all random choices. Ctrl-C ends
+    the search with the best field so far. Raises InputError for a limit that is not positive and too many
+    jobs, InstanceError for a start on another instance.
     """
     return search_patches(
         instance,
@@ -63,16 +63,16 @@ def search(
 
 
 def suggested(field: CrossField, left: Callable[[], float], over: Over = never, *, jobs: int) -> CrossField:
-    """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
+    """A field of no more energy: the given one, or one rounded from the dual of the coarsest lattice.
 
-    left: seconds that are left; with few of them, and for very small and large grids, it is the field itself.
-    over: whether the time is over. jobs: threads; any number of them gives the same field.
+    left: seconds that are left; with few of them, and for very small and large grids, the given field
+    returns. over: whether the time is over. jobs: threads; any number of them gives the same field.
     """
     if not _FEWEST < field.instance.grid.size <= _MOST:
         return field
     if left() < _LEAST_SECONDS:
         return field
-    # What Numba compiles is loaded only here: it takes a second.
+    # Code that Numba compiles is loaded only here: it takes a second.
     from ..processes.compiled import all_compiled
     from ..processes.crew import crew
     from .lattice import Lattice

@@ -1,4 +1,4 @@
-"""Where no choice is left: on the boxes round the cells that are left the energy is a convex quadratic.
+"""The convex quadratic that remains when no choice of jumps and lines is left.
 
 Let p be the jumps of the centre, s = (-1)^p, and Q the energy with these jumps and with line u at its own
 turn at every stroke: convex, `qp-fixed`.
@@ -8,12 +8,12 @@ one step further A^2 falls by pi |A| - pi^2/4 at most, and B^2 grows by 4 s beta
 A^2 does not fall, and B stays.
 
 Strokes. Let a = alpha - theta, |a| <= 3 pi/4. Where |a| <= pi/4, u at this turn is the nearest line. Above
-pi/4 it is v, and with e = a - pi/4 the cost of u exceeds that of v, (alpha - pi/2 - beta - theta)^2, by 4 e
-(beta + pi/4); below -pi/4, with e = -pi/4 - a, that of (alpha + pi/2 - beta - theta)^2 by 4 e (pi/4 - beta).
-With e replaced by its greatest value on the box, these are linear in beta. So the energy is at least Q less w
-times both: again a convex quadratic. It loses nothing where beta is at the end at which u and v are one line.
-Where that is not enough, the box is cut at the edges of the window into pieces; in those beyond, v carries
-the stroke, and on each piece the energy is again a convex quadratic.
+pi/4 it is v, and with e = a - pi/4 the cost of u exceeds v's cost, (alpha - pi/2 - beta - theta)^2, by 4 e
+(beta + pi/4). Below -pi/4, with e = -pi/4 - a, it exceeds (alpha + pi/2 - beta - theta)^2 by 4 e (pi/4 -
+beta). With e replaced by its greatest value on the box, these are linear in beta. So the energy is at least
+Q minus w times both: again a convex quadratic. It loses nothing where beta is at the end at which u and v
+coincide. If the loss is too large, the box is cut at the edges of the window into pieces. In the pieces
+beyond, v carries the stroke, and on each piece the energy is again a convex quadratic.
 
 The least value of that quadratic on the boxes is bounded from its gradient g at any point x: by its value
 there + the least of g (y - x) over y in the boxes.
@@ -33,24 +33,24 @@ from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, never
 from ..search.box_qp import least_in_box
 from ..search.energy import Quadratic, energy_at
-from .pruning import Left
+from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_PIECES: Final = 60
 _ROUNDING: Final = 1e-10
-"""What is taken off a bound, relative to 1 + its value: float64 loses some 1e-12 in it."""
+"""Deduction from a bound, relative to 1 + its value: float64 loses some 1e-12 in it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Forced:
-    """What the boxes force.
+    """Choices that the boxes force.
 
     pairs (m,): whether the jump of the centre is a best one on the whole box. strokes (s,): whether a box
-    lies within 3 pi/4 of its stroke, so that the lemma holds. above, below (s,): how far alpha can be beyond
-    theta + pi/4, below theta - pi/4.
+    lies within 3 pi/4 of its stroke, so that the lemma holds. above, below (s,): greatest excess of alpha
+    over theta + pi/4, and below theta - pi/4.
     """
 
-    left: Left
+    left: RemainingCells
     pairs: Bools
     strokes: Bools
     above: Floats
@@ -58,7 +58,7 @@ class Forced:
 
     @property
     def everything(self) -> bool:
-        """Whether the energy on the boxes is bounded by the one convex quadratic."""
+        """Whether one convex quadratic bounds the energy on the boxes."""
         return bool(self.pairs.all() and self.strokes.all())
 
     def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:
@@ -87,10 +87,10 @@ class Piece:
     """A part of the boxes, cut at the edges of windows.
 
     alpha_low, alpha_high (n,). lines (s,): 0 where u carries the stroke, or v beyond an edge that the piece
-    goes over; -1 where it is below the window, 1 where it is above, and v carries it.
+    crosses; -1 below the window and 1 above it, where v carries the stroke.
     """
 
-    left: Left
+    left: RemainingCells
     alpha_low: Floats
     alpha_high: Floats
     lines: Ints
@@ -110,9 +110,9 @@ class Piece:
         return field, value - _ROUNDING * (1 + abs(value))
 
     def cut(self, field: CrossField) -> list[Piece]:
-        """The piece cut at both edges of the window of one stroke: the one at which most is given away there.
+        """The piece cut at both edges of the window of the stroke with the largest deduction.
 
-        Empty where it goes over no edge.
+        Empty if it crosses no edge.
         """
         above, below = self._beyond()
         if not (above + below).any():
@@ -133,7 +133,7 @@ class Piece:
         return parts
 
     def _beyond(self) -> tuple[Floats, Floats]:
-        """How far the piece goes above and below the windows where u carries the stroke, shapes (s,)."""
+        """Distances by which the piece exceeds the windows where u carries the stroke, shapes (s,)."""
         instance = self.left.lattice.instance
         at, u = instance.stroke_index, self.lines == 0
         above = np.maximum(self.alpha_high[at] - instance.target - QUARTER, 0.0)
@@ -141,7 +141,7 @@ class Piece:
         return above * u, below * u
 
     def _given(self, field: CrossField) -> Floats:
-        """By how much the quadratic is less than Q at each stroke, shape (s,)."""
+        """Difference between Q and the quadratic at each stroke, shape (s,)."""
         instance = field.instance
         at, weight = instance.stroke_index, instance.stroke_coefficient * instance.w
         beta, u = field.beta[at], field.residual_r
@@ -152,7 +152,7 @@ class Piece:
         return given
 
     def _quadratic(self) -> Quadratic:
-        """The quadratic of the piece but for a constant."""
+        """The quadratic of the piece without its constant."""
         lattice = self.left.lattice
         instance, n = lattice.instance, lattice.instance.grid.size
         energy, at = energy_at(instance, lattice.p), instance.stroke_index
@@ -166,8 +166,8 @@ class Piece:
         return Quadratic(energy.matrix + turned, vector)
 
 
-def forced(left: Left) -> Forced:
-    """What is forced on the boxes that are left."""
+def forced(left: RemainingCells) -> Forced:
+    """Choices that are forced on the boxes that are left."""
     lattice = left.lattice
     at, target = lattice.instance.stroke_index, lattice.instance.target
     low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
@@ -180,7 +180,7 @@ def forced(left: Left) -> Forced:
     )
 
 
-def _best_jumps(left: Left) -> Bools:
+def _best_jumps(left: RemainingCells) -> Bools:
     """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
     lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
     turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)

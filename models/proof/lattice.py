@@ -2,9 +2,9 @@
 
 Label (k, l) of pixel i stands at alpha_i + h (k + o_i), beta_i + h (l + o_i) round a centre (alpha_i,
 beta_i), which is the cross of the best field known. The offset o is 0 on black and 1/2 on white pixels of the
-checkerboard, so that the differences of neighbours at that field lie in the middle between those of their
-labels, where a pair's discrete cost touches the true one. Rectangles of labels are stored one after the
-other, those of a pixel alpha-major; `allowed` says which of them are left.
+checkerboard. So the differences of neighbours at that field lie in the middle between the differences of
+their labels, where a pair's discrete cost touches the true one. Rectangles of labels are stored one after
+the other, each pixel's alpha-major; `allowed` marks the labels that are left.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..instance.grid import Bools, Floats, Grid, Ints
 from ..instance.instance import HALF, QUARTER, Instance
 
 Starts = NDArray[np.int64]
-"""Where blocks of flat arrays begin, and where the last one ends."""
+"""Starts of the blocks of flat arrays, and the end of the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Lattice:
     instance: the problem. h: spacing in radians. alpha, beta (n,), p (m,): the centres. alpha_first,
     alpha_count, beta_first, beta_count (n,): the ranges k = first ... first + count - 1 and of l. allowed:
     bool, one for each label of each pixel's rectangle, alpha-major, pixels in the grid's order. A pixel's
-    cross may be anywhere in a cell all of whose four vertices are allowed.
+    cross may be anywhere in a cell whose four vertices are all allowed.
     """
 
     norm: ClassVar[Norm] = 2
@@ -51,7 +51,7 @@ class Lattice:
         """The lattice of spacing pi / (2 steps) round a field, with every cross of the strip in a cell.
 
         steps: an even number. alpha covers a window of length pi/2 round its centre, beta [-pi/4, pi/4].
-        Cells that stick out are kept. Pixels that no stroke reaches have less: see `reached`.
+        Cells that stick out are kept. Pixels that no stroke reaches have fewer labels: see `reached`.
         """
         h, size = HALF / steps, field.instance.grid.size
         alpha_first, alpha_count = np.full(size, -steps // 2, np.int32), np.full(size, steps + 1, np.int32)
@@ -74,7 +74,7 @@ class Lattice:
 
     @cached_property
     def start(self) -> Starts:
-        """Where each pixel's labels begin in flat arrays, shape (n + 1,)."""
+        """Start of each pixel's labels in flat arrays, shape (n + 1,)."""
         return starts(self.count)
 
     @cached_property
@@ -98,13 +98,13 @@ class Lattice:
 
     @property
     def work(self) -> float:
-        """Additions that a pass takes at most: the size of all (min,+) products over one angle."""
+        """Most additions of a pass: the size of all (min,+) products over one angle."""
         i, j = self.instance.grid.first, self.instance.grid.second
         rows, columns = self.alpha_count.astype(np.float64), self.beta_count.astype(np.float64)
         return float(2 * (rows[j] * columns[i] * (columns[j] + rows[i])).sum())
 
     def share_starts(self, end: Ints) -> Starts:
-        """Where the shares of each pair at one of its ends begin in flat arrays, shape (m + 1,).
+        """Starts of the shares of each pair at one of its ends in flat arrays, shape (m + 1,).
 
         end: `first` or `second` of the grid.
         """
@@ -119,8 +119,8 @@ def offsets(grid: Grid) -> Floats:
 def reached(instance: Instance) -> Bools:
     """Whether each pixel's part of the mask (4-connected) has a stroke, shape (n,).
 
-    A part without strokes costs nothing where all its crosses are one with beta = 0, as its centres have to
-    be, and nothing costs less. So it is looked at nowhere else: its labels are k, l = -1, 0, 1 on every
+    A part without strokes has the least possible cost, zero, if all its crosses are equal with beta = 0, as
+    its centres must be. So other crosses are not considered there: its labels are k, l = -1, 0, 1 on every
     level.
     """
     from scipy import ndimage
@@ -133,7 +133,7 @@ def reached(instance: Instance) -> Bools:
 def few_unreached(
     reached: Bools, alpha_first: Ints, alpha_count: Ints, beta_first: Ints, beta_count: Ints
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """The ranges of steps, with -1, 0, 1 both ways where no stroke reaches."""
+    """The ranges of steps, reduced to -1, 0, 1 both ways where no stroke reaches."""
     few = (np.int32(-1), np.int32(3), np.int32(-1), np.int32(3))
     given = (alpha_first, alpha_count, beta_first, beta_count)
     a, b, c, d = (np.where(reached, all_, some) for all_, some in zip(given, few, strict=True))
@@ -141,11 +141,11 @@ def few_unreached(
 
 
 def starts(counts: Ints) -> Starts:
-    """Where blocks of those lengths begin when they stand one after the other, and where the last ends."""
+    """Starts of consecutive blocks of those lengths, and the end of the last."""
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
 def strip(beta: Floats, h: float, offset: Floats) -> tuple[Ints, Ints]:
-    """Least and greatest step l with which the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
+    """Least and greatest step l so that the cells round the centres cover [-pi/4, pi/4]; shapes (n,)."""
     lower, upper = (-QUARTER - beta) / h - offset, (QUARTER - beta) / h - offset
     return np.floor(lower).astype(np.int32), np.ceil(upper).astype(np.int32)

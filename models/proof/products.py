@@ -1,15 +1,15 @@
 """The compiled code for one pixel and one pair: (min,+) products of labels with a pair's cost.
 
-For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha and one in beta, so that the
+For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha and one in beta. So the
 product is one over beta and then one over alpha: O(N^3) for N^2 labels. A^2 is the least over all jumps of
 that parity: A is taken modulo pi.
 
 Compiled by Numba (models/processes/compiled.py). Measured on the sample `mouse` at 24 pixels, 34 x 33
-labels each, one thread: 24 ms a pass, and 108 ms for its products alone in NumPy over anti-diagonals, with
-all labels of all pairs (in NumPy nothing that cannot be the least is left out, and levels whose pixels have
-different numbers of labels would have to be padded). With two threads 12.5 ms. The first call compiles for
-some 15 s; the code is kept on disk, and then loaded in 0.3 s. The names of `State` and `Rectangles` are part
-of what is kept: with another name, old files cannot be read.
+labels each, one thread: 24 ms per pass. With two threads it takes 12.5 ms. NumPy over anti-diagonals takes
+108 ms for the products alone, with all labels of all pairs: it cannot skip labels that cannot be the least,
+and would have to pad levels whose pixels have different numbers of labels. The first call compiles for
+some 15 s; the code is cached on disk, and then loads in 0.3 s. The names of `State` and `Rectangles` are part
+of the cache: after renaming them, old files cannot be read.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _PI: Final = float(np.pi)
 
 @compiled
 def pixel_pass(i: int, earlier: int, state: State) -> None:
-    """Take from the pairs to earlier pixels, and hand on to those to later ones.
+    """Take from the pairs to earlier pixels, and pass on to the pairs to later pixels.
 
-    earlier: column of `around` at which the two pairs to earlier pixels stand; the later ones are beyond.
+    earlier: column of `around` with the two pairs to earlier pixels; the later ones are beyond.
     """
     begin, end = state.start[i], state.start[i + 1]
     mine, unary = state.theta[begin:end], state.unary[begin:end]
@@ -62,7 +62,7 @@ def pixel_pass(i: int, earlier: int, state: State) -> None:
 
 @compiled
 def _hand_on(share: Floats, theta: Floats, least: float, part: float) -> None:
-    """Take a part of theta from what a pair gives."""
+    """Deduct a part of theta from the share of a pair."""
     for x in range(share.size):
         if theta[x] < np.inf:
             share[x] -= part * (theta[x] - least)
@@ -70,7 +70,7 @@ def _hand_on(share: Floats, theta: Floats, least: float, part: float) -> None:
 
 @compiled
 def add(target: Floats, values: Floats) -> None:
-    """Add the values to the target; `+=` would compile texts of errors too, for seconds."""
+    """Add the values to the target; `+=` would compile texts of errors too, which takes seconds."""
     for x in range(target.size):
         target[x] += values[x]
 
@@ -85,7 +85,7 @@ def share_of(pair: int, i: int, state: State) -> Floats:
 
 @compiled
 def pair_minimum(pair: int, state: State) -> float:
-    """The least c - shares of a pair over the labels that are allowed."""
+    """The least c - shares of a pair over the allowed labels."""
     i = state.first[pair]
     share = share_of(pair, i, state)
     most = np.empty(share.size)
@@ -100,7 +100,7 @@ def pair_minimum(pair: int, state: State) -> float:
 
 @compiled
 def product(pair: int, i: int, state: State, out: Floats) -> None:
-    """All that a pair can give to the labels x of its end i: min over y of c(x, y) - share(y)."""
+    """Greatest share of a pair at the labels x of its end i: min over y of c(x, y) - share(y)."""
     j = state.second[pair] if state.first[pair] == i else state.first[pair]
     rows, columns = state.alpha_count[j], state.beta_count[j]
     source = -share_of(pair, j, state)
@@ -128,13 +128,13 @@ def product(pair: int, i: int, state: State, out: Floats) -> None:
 
 @compiled
 def sized(residual: float, norm: int) -> float:
-    """The square of a residual, or its size."""
+    """The square or the absolute value of a residual."""
     return residual * residual if norm == 2 else abs(residual)
 
 
 @compiled
 def _alpha_costs(a: float, state: State, odd: bool, cost: Floats) -> float:
-    """Fill in 2 A^2 or 2 |A| for labels x of the one and y of the other end; the least."""
+    """Fill in 2 A^2 or 2 |A| for labels x of one end and y of the other; return the least."""
     if odd:
         a += _HALF
     least = np.inf
@@ -149,7 +149,7 @@ def _alpha_costs(a: float, state: State, odd: bool, cost: Floats) -> float:
 
 @compiled
 def _beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: Floats) -> float:
-    """Fill in 2 B^2 or 2 |B| for labels y of the one and x of the other end; the least."""
+    """Fill in 2 B^2 or 2 |B| for labels y of one end and x of the other; return the least."""
     least = np.inf
     for y in range(cost.shape[0]):
         other = y_first + state.h * y
@@ -164,7 +164,7 @@ def _beta_costs(x_first: float, y_first: float, state: State, odd: bool, cost: F
 
 @compiled
 def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
-    """Fill in the least over y of given[row, y] + cost[y, x], those y left out that cannot be it."""
+    """Fill in the least over y of given[row, y] + cost[y, x], without the y that cannot attain it."""
     half[:] = np.inf
     least, sums = np.empty(cost.shape[0]), np.empty(cost.shape[0])
     for y in range(cost.shape[0]):
@@ -184,7 +184,7 @@ def _over_beta(given: Floats, cost: Floats, half: Floats) -> None:
 
 @compiled
 def _over_alpha(half: Floats, cost: Floats, found: Floats) -> None:
-    """Lower found[row] to the least over y of half[y] + cost[row, y], rows that cannot lower it left out."""
+    """Lower found[row] to the least over y of half[y] + cost[row, y], without rows that cannot lower it."""
     least, sums = np.empty(half.shape[0]), np.empty(half.shape[0])
     for y in range(half.shape[0]):
         least[y] = half[y].min()

@@ -1,14 +1,14 @@
-"""A field, and a proof of how far from the best it is at most.
+"""A field, and a proof of its largest possible distance from the best.
 
-Lattice after lattice, each of half the spacing. On each level the dual rises by passes
-(models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold a better field is
-dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the centre: the
-lattices begin anew round it.
+The proof goes from lattice to lattice, each of half the spacing. On each level passes raise the dual
+(models/proof/sweep.py), fields are rounded from it (rounding.py), and labels that cannot hold a better field
+are dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the centre, and the
+lattices start again round it.
 
 Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
-lattices leave its gap. Once such a level is met, the one before is cut into branches at the alpha of the
-pixel of which the dual says least. The branch of least bound goes on, with half the spacing, or cut again;
-the least of their bounds is that of all.
+lattices do not close its gap. At such a level, the level before is cut into branches at the alpha of the
+pixel that the dual determines least. The branch of least bound goes on, with half the spacing, or is cut
+again; the least of their bounds holds for all.
 """
 
 from __future__ import annotations
@@ -36,37 +36,37 @@ from .certificate_pace import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
-from .pruning import branches, finer, left, prolonged
+from .pruning import branches, finer, prolonged, remaining_cells
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
 
 ProofProgress = Callable[[float, float, int], object]
-"""Is told the bound, the least energy so far, and how many labels are left, every few passes."""
+"""Receives the bound, the least energy so far, and the number of labels left, every few passes."""
 
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
 _PASSES: Final = 3  # forwards and backwards between two roundings
 _SLOW: Final = 0.05
-"""Share of the gap: a level on which some passes close less has done its work.
+"""Share of the gap: a level is finished when some passes close less.
 A tenth of it where no other level can follow.
 """
-_MOST_ROUNDS: Final = 40  # a level
+_MOST_ROUNDS: Final = 40  # per level
 _STALLED: Final = 0.5  # share of the gap that half the spacing leaves where branches are needed
 _PARTS: Final = 8  # branches of a level
 _SLOW_BRANCH: Final = 0.05  # as _SLOW, on branches
 _MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
-MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
-_MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
-_RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
-_WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
+MOST_LABELS: Final = 16_000_000  # per level; each takes some 200 bytes
+_MOST_BRANCHED: Final = 5_000_000  # of all waiting branches: each keeps its messages
+_RECORDING: Final = 4  # passes of equal cost as starting the rounding, bounding the record and pruning
+_WORTH: Final = 2 * _RECORDING  # passes; a level starts only if there is time for as many
 _DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
 _BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
-_MANY: Final = 4  # levels after which a gap that is left may be that of the field
-_LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
+_MANY: Final = 4  # levels after which a remaining gap may belong to the field
+_LARGE: Final = 1_000_000  # labels of a level before which to search, because passes over it take as long
 _SEARCH: Final = 0.1  # share of the time for that search
-_SLICE: Final = 0.3  # share of the time that is left for a search where the lattices have come to their end
-_ROUNDS: Final = 5  # of a search without a limit of time
+_SLICE: Final = 0.3  # share of the remaining time for a search after the last lattice
+_ROUNDS: Final = 5  # of a search without a time limit
 
 
 @one_thread()
@@ -83,19 +83,19 @@ def prove(
     progress: ProofProgress = lambda *_: None,
     stop: Over = never,
 ) -> Proof:
-    """The field of least energy that was found, and a lower bound of the energy of all fields.
+    """The field of least energy found, and a lower bound of the energy of all fields.
 
-    norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; of its proofs there are no
-    certificates. seconds: when to end; levels that could not be recorded by then are not begun. If no level
+    norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; proofs in the 1-norm have no
+    certificates. seconds: when to end; levels that could not be recorded by then are not started. If no level
     was recorded, the bound is 0 and `levels` is empty. certified: end sooner, by the estimated time that
-    `write_certificate` takes for the levels; a level whose certificate would be late is not begun. gap: the
-    relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field to begin
-    with where, improved, it is better than the first field. seed: of the search that follows where
-    the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every good place
-    whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
-    proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
-    and seldom tight.
-    Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs.
+    `write_certificate` takes for the levels; a level whose certificate would be late is not started. gap: the
+    relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field that is
+    used if, improved, it is better than the first field. seed: of the search that follows if the lattices
+    leave a gap. jobs: threads, and processes of that search. stop: called at every good place, returns
+    whether to end. Ctrl-C ends the proof with its present result. Without seconds the same arguments give the
+    same proof, for any number of threads. The bound holds for both gauges; under `box` it is the bound of
+    `strokes`, and seldom tight. Raises InputError for a limit that is not positive, a gap below 0, another
+    norm, and too many jobs.
     """
     spent = isinstance(seconds, int | float) and not seconds > 0
     if spent or not gap >= 0 or jobs < 1:
@@ -113,10 +113,10 @@ def prove(
 
 @dataclass
 class _Limits:
-    """When to end: a deadline, whether the user or the caller asks for it, and a gap that is enough.
+    """When to end: a deadline, a request of the user or caller, or a gap that is enough.
 
     whole: the deadline of proof and certificate. certified: whether there is a certificate to write. pace:
-    greatest measured seconds per unit of its effort. kept: the seconds that it is expected to take.
+    greatest measured seconds per unit of its effort. kept: its expected seconds.
     """
 
     whole: Deadline
@@ -133,7 +133,7 @@ class _Limits:
         return self.whole.later(-self.kept)
 
     def keep(self, effort: float) -> None:
-        """Keep time for a certificate of that effort.
+        """Reserve time for a certificate of that effort.
 
         If there is too little for the first level, no certificate can be written in time. The proof then uses
         all of the time, and looks for better fields.
@@ -146,13 +146,13 @@ class _Limits:
         self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
-        """Which limit of time is met; empty when none is."""
+        """The time limit that is met; empty if none is."""
         if self.interrupted() or self.stop():
             return "interrupted"
         return "time" if self.deadline.passed() else ""
 
     def over(self, ahead: float = 0.0) -> bool:
-        """Whether work has to end now, or within so many seconds."""
+        """Whether work has to end now, or within that many seconds."""
         return bool(self.met()) or self.deadline.left() <= ahead
 
 
@@ -164,7 +164,7 @@ def _of_norm(norm: Norm) -> type[Work]:
 
 
 def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
-    """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
+    """The best of the first field, the user's field and, in time, the PolyVector start, improved."""
     fields = [first_field(instance, over)]
     if given is not None:
         fields.append(improved(given, over))
@@ -175,7 +175,7 @@ def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossF
 
 @dataclass
 class _Chain:
-    """The levels round one centre, and what they prove together."""
+    """The levels round one centre, and their common bound."""
 
     levels: list[LevelRecord] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
@@ -190,7 +190,7 @@ class _Chain:
 
 @dataclass(frozen=True, order=True)
 class _Branch:
-    """A level with nothing after it yet: its bound, its number, its dual, and whether it has to be cut."""
+    """A level without a successor yet: its bound, its number, its dual, and whether it has to be cut."""
 
     bound: float
     number: int
@@ -200,7 +200,7 @@ class _Branch:
 
 @dataclass
 class Work:
-    """What a proof of the 2-norm has reached."""
+    """State of a proof of the 2-norm."""
 
     norm: ClassVar[Norm] = 2
     first = staticmethod(first_of)
@@ -224,7 +224,7 @@ class Work:
         return improved(field, over)
 
     def energy(self, field: CrossField) -> float:
-        """The energy that the proof is of."""
+        """The energy in the norm of the proof."""
         return field.energy(self.norm).total
 
     def level(self, centre: CrossField) -> Lattice:
@@ -232,7 +232,7 @@ class Work:
         return Lattice.whole(centre, COARSEST)
 
     def proof(self, seconds: float, ended: str) -> Proof:
-        """What is proven, with the levels that prove it."""
+        """The proven claim, with the levels that prove it."""
         bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
         status: Status = "optimal" if self._exact(bound) else "gap"
         return Proof(
@@ -241,16 +241,16 @@ class Work:
         )  # fmt: skip
 
     def run(self) -> str:
-        """Go through chains of levels until a limit is met, or nothing helps; which one."""
+        """Go through chains of levels until a limit is met, or no step helps; return the reason."""
         ended = self._descend()
         while not ended or (ended == "labels" and self._found_more()):
             ended = self._descend()
         return self.limits.met() or ended
 
     def _found_more(self) -> bool:
-        """Whether a search in the time that is left finds a field for which to begin anew.
+        """Whether a search in the time that is left finds a field for a new start.
 
-        That needs as much time as the last chain took; with less the search goes on to the end.
+        A new start needs as much time as the last chain took; with less, the search goes on to the end.
         """
         before, spent = self.energy(self.best), time.monotonic() - self.began
         while not self.limits.over():
@@ -263,7 +263,7 @@ class Work:
         return False
 
     def _descend(self) -> str:
-        """Go through the levels round the best field; how it ended, empty where a better one was found."""
+        """Go through the levels round the best field; return why they ended, empty after a better field."""
         if met := self.limits.met():
             return met
         self.chain, before, self.began = _Chain(), self.best, time.monotonic()
@@ -295,7 +295,7 @@ class Work:
                 coarser, dual = dual, prolonged(dual, lattice)
 
     def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
-        """Whether there is time for some passes over the lattice that follows, and for its certificate."""
+        """Whether there is time for some passes over the next lattice, and for its certificate."""
         passes = _WORTH * dual.seconds_on(lattice)
         certificate = self._effort_with(lattice) * self.limits.pace if self.limits.certified else 0.0
         return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
@@ -305,20 +305,20 @@ class Work:
         return max(self.proven.effort, self.chain.effort + certificate_effort(lattice))
 
     def _closing(self, dual: Dual) -> Over:
-        """Says whether the time that is left is what it takes to record the level."""
+        """Return a function that tests whether only the time to record the level is left."""
         return lambda: self.limits.over(_RECORDING * dual.seconds)
 
     def _stalls(self) -> bool:
         """Whether half the spacing has left more than half of the gap, and the best field has a vortex.
 
-        Then the dual mixes places where it may be, and finer lattices do not help.
+        Then the dual mixes possible places of the vortex, and finer lattices do not help.
         """
         bounds = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
         vortices = len(self.best.singularities.index) > 0
         return len(self.chain.levels) > 2 and bounds[1] > _STALLED * bounds[0] and vortices
 
     def _branch(self, dual: Dual) -> str:
-        """Cut the last level but one into branches, and go on with the one of least bound; how it ended."""
+        """Cut the last level but one into branches, follow the one of least bound; return why it ended."""
         levels = self.chain.levels[:-1]
         self.chain = _Chain(levels, list(range(-1, len(levels) - 1)))
         waiting = [_Branch(levels[-1].bound, len(levels) - 1, dual, stalls=True)]
@@ -340,14 +340,14 @@ class Work:
         return ended or self._ended()
 
     def _parts(self, branch: _Branch) -> list[Dual]:
-        """The duals that follow from a branch: on the lattice of half the spacing, or on parts of its own."""
+        """The duals that follow from a branch: on the lattice of half the spacing, or on its parts."""
         if branch.stalls:
             return branches(branch.dual, _PARTS)
-        lattice = finer(left(branch.dual, branch.bound, self.energy(self.best)))
+        lattice = finer(remaining_cells(branch.dual, branch.bound, self.energy(self.best)))
         return [] if _too_large(lattice) else [prolonged(branch.dual, lattice)]
 
     def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
-        """The branch of a dual, which is raised as long as it pays, and recorded."""
+        """The branch of a dual, raised as long as it pays, and recorded."""
         reached, energy = -np.inf, self.energy(self.best)
         self.limits.keep(self._effort_with(dual.lattice))
         closing = self._closing(dual)
@@ -363,7 +363,7 @@ class Work:
         return _Branch(level.bound, len(levels) - 1, dual, stalls=stalls)
 
     def _ended(self) -> str:
-        """Why the work is at its end; empty if it is not."""
+        """The reason why the work is finished; empty if it is not."""
         energy, bound = self.energy(self.best), self.proven.bound
         if self._exact(bound):
             return "optimal"
@@ -374,7 +374,7 @@ class Work:
         return energy - bound <= EXACT * (1 + energy)
 
     def _costly(self, lattice: Lattice) -> bool:
-        """Whether it is time to search for a better centre: the next level takes long, or there were many."""
+        """Whether to search for a better centre: the next level takes long, or there were many levels."""
         return len(self.chain.levels) == _MANY or bool(lattice.start[-1] > _LARGE)
 
     def _search(self, share: float) -> None:
@@ -397,7 +397,7 @@ class Work:
         self.best = min(self.best, found, key=self.energy)
 
     def _ascend(self, dual: Dual, slow: float) -> None:
-        """Raise the dual of a level, and round fields from it, until the bound's rise is slow."""
+        """Raise the dual of a level, and round fields from it, until the bound rises slowly."""
         reached, rounding, closing = -np.inf, Rounding(dual, self.improve), self._closing(dual)
         for _ in range(_MOST_ROUNDS):
             bound = dual.ascend(_PASSES, closing)
@@ -409,9 +409,9 @@ class Work:
             reached = bound
 
     def _record(self, dual: Dual, *, again: bool) -> Forced | None:
-        """Record the level and what it proves, prune it, and see what is forced; not when the time is over.
+        """Record the level and its bound, prune it, and find the forced choices, unless the time is over.
 
-        again: it is recorded already, with less.
+        again: the level is recorded already, with a lower bound.
         """
         chain, energy = self.chain, self.energy(self.best)
         level, what = LevelRecord.of(dual, energy), None
@@ -423,7 +423,7 @@ class Work:
             chain.levels.append(level)
             chain.bound = max(chain.bound, level.bound)
         if not self.limits.over():
-            what = self.forced(left(dual, level.bound, energy))
+            what = self.forced(remaining_cells(dual, level.bound, energy))
             chain.forced = int(what.pairs.sum())
             self._fit(what)
         if chain.bound >= self.proven.bound:
@@ -431,7 +431,7 @@ class Work:
         return what
 
     def _fit(self, what: Forced) -> None:
-        """Solve the convex problem that is left, if all is forced."""
+        """Solve the remaining convex problem, if everything is forced."""
         if what.everything:
             found, least = what.least(self.energy(self.best), self.limits.over)
             jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
@@ -440,12 +440,12 @@ class Work:
 
 
 def _labels(waiting: list[_Branch]) -> int:
-    """The number of labels that are left on branches."""
+    """The number of labels left on branches."""
     return sum(int(branch.dual.lattice.allowed.sum()) for branch in waiting)
 
 
 def _too_large(lattice: Lattice) -> bool:
-    """Whether a level is beyond what memory, time or the digits of an angle allow."""
+    """Whether a level exceeds the limits of memory, time or the digits of an angle."""
     fine = lattice.h < np.pi / 2 / _FINEST
     return fine or bool(lattice.start[-1] > MOST_LABELS) or lattice.work > _MOST_WORK
 

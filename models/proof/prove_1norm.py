@@ -1,15 +1,15 @@
-"""The work of a proof in the 1-norm: that of models/proof/prove.py, on the lattices of common_lattice.py.
+"""Proofs in the 1-norm: the method of models/proof/prove.py, on the lattices of common_lattice.py.
 
-Once a level's boxes leave no choice of jumps, the energy on them is that of a linear program but for
-strokes at the edges of their windows. Its multipliers prove its least value.
+Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes at
+the edges of their windows. Its multipliers prove its least value.
 
 Jumps. With s = (-1)^p, let g = min(|beta_i|, |beta_j|), negative where s beta_i beta_j >= 0: |B| grows by
 -2 g with the other parity. One step further |A| is at least pi/2 - |A|. So p is a best jump where |A| + g
 <= pi/4. Two steps further |A| is at least pi - |A|, which is no less where |A| <= pi/2, and B stays.
 
-Strokes. Where |alpha - theta| <= pi/4, line u at this turn is the nearest one whatever beta is. At pi/4 +
+Strokes. Where |alpha - theta| <= pi/4, line u at this turn is the nearest one for every beta. At pi/4 +
 e, 0 <= e <= pi/4, u is pi/4 + e + beta from the stroke and v is |pi/4 - e + beta|, which is nearer by 2 e
-at most; other turns are no nearer than one of the two. The same below -pi/4.
+at most; other turns are no nearer than one of the two. The same holds below -pi/4.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
 from .common_lattice import CommonLattice
 from .forced import Forced
 from .prove import COARSEST, Work, first_of
-from .pruning import Left
+from .pruning import RemainingCells
 
 
 class WorkIn1Norm(Work):
-    """What a proof of the 1-norm has reached."""
+    """State of a proof of the 1-norm."""
 
     norm: ClassVar[Norm] = 1
 
     @staticmethod
     def first(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
-        """The better one of the 2-norm's first field and of what the user gives, both fitted."""
+        """The better one of the 2-norm's first field and the user's field, both fitted."""
         fields = [first_of(instance, None, over)] + ([] if given is None else [given])
         return min((settled_1norm(each, over) for each in fields), key=lambda field: field.energy(1).total)
 
@@ -49,29 +49,29 @@ class WorkIn1Norm(Work):
         return CommonLattice.near(fitted, slopes, COARSEST)
 
     def improve(self, found: CrossField, best: CrossField, over: Over) -> CrossField:
-        """The better one of a best field and of one found, fitted."""
+        """The better one of a best field and a new one, fitted."""
         return min(best, settled_1norm(found, over), key=self.energy)
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, fitted."""
         return settled_1norm(field, over)
 
-    def forced(self, left: Left) -> Forced1Norm:
-        """What is forced on the boxes that are left."""
+    def forced(self, left: RemainingCells) -> Forced1Norm:
+        """Choices that are forced on the boxes that are left."""
         return forced_1norm(left)
 
     def _search(self, share: float) -> None:
-        """Nothing: a search is for the 2-norm, and rounding finds better fields than it does."""
+        """Return None: the search is for the 2-norm, and rounding finds better fields than it does."""
 
     def _found_more(self) -> bool:
-        """False: there is no search that could find more."""
+        """Return False: there is no search that could find more."""
         return False
 
 
 class Forced1Norm(Forced):
-    """What the boxes force in the 1-norm: then the energy on them is that of one linear program.
+    """Choices that the boxes force in the 1-norm, where a linear program gives the energy on them.
 
-    pairs, strokes, above, below: as there, in the 1-norm, with strokes up to pi/4 beyond their windows.
+    pairs, strokes, above, below: as in `Forced`, in the 1-norm, with strokes up to pi/4 beyond their windows.
     """
 
     def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:  # noqa: ARG002
@@ -85,8 +85,8 @@ class Forced1Norm(Forced):
         return CrossField(instance, alpha, beta, left.lattice.p), fit.bound - beyond
 
 
-def forced_1norm(left: Left) -> Forced1Norm:
-    """What is forced on the boxes that are left, in the 1-norm."""
+def forced_1norm(left: RemainingCells) -> Forced1Norm:
+    """Choices that are forced on the boxes that are left, in the 1-norm."""
     lattice = left.lattice
     at, target = lattice.instance.stroke_index, lattice.instance.target
     low, high = left.alpha_low[at] - target, left.alpha_high[at] - target
@@ -94,7 +94,7 @@ def forced_1norm(left: Left) -> Forced1Norm:
     return Forced1Norm(left, _best_jumps(left), np.maximum(above, below) <= QUARTER, above, below)
 
 
-def _best_jumps(left: Left) -> Bools:
+def _best_jumps(left: RemainingCells) -> Bools:
     """Whether the centre's jump is a best one on the boxes of each pair, shape (m,)."""
     lattice, (i, j) = left.lattice, (left.lattice.instance.grid.first, left.lattice.instance.grid.second)
     turn, sign = HALF * lattice.p, 1.0 - 2.0 * (lattice.p & 1)

@@ -1,23 +1,23 @@
-"""What a level leaves for the next one: cells in which a field of at most the energy U may have its crosses.
+"""Pruning of a level: the cells that may hold crosses of fields of at most the energy U.
 
-The rule, with what a checker has to compute in float64 from a LevelRecord and the U of the whole proof:
+The rule, with the values that a checker computes in float64 from a LevelRecord and the U of the whole proof:
 
-1. A forward pass (models/proof/sweep.py) from the shares of the record. At each pixel i, when it has taken
+1. A forward pass (models/proof/sweep.py) from the shares of the record. At each pixel i, after it has taken
    from the pairs to its upper and left neighbours: theta_i(x) = D_i(x) + the sum of its shares, over allowed
    labels x.
 2. Label x of pixel i survives where `bound` + theta_i(x) - min theta_i <= U + tolerance. For a field whose
    crosses are rounded as in models/proof/costs.py, the mean of the left side over the label's law is at most
-   its energy: one vertex of the cell it lies in survives, whatever the pass has made of the shares before,
+   its energy. So one vertex of its cell survives, for any changes that the pass has made to earlier shares,
    because the bound never falls in a pass.
 3. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and one of them survives.
-4. In the next level, of half the spacing round the same centres, every label is allowed whose cells
-   meet a cell that is left, but for labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k,
-   l) begins at (2 k + o, 2 l + o): that is a vertex on black pixels and the middle of a cell on white ones.
+4. The next level has half the spacing round the same centres. It allows every label whose cells meet a cell
+   that is left, except labels beyond the cells that cover |beta| <= pi/4. In its steps, cell (k, l) begins at
+   (2 k + o, 2 l + o): a vertex on black pixels and the middle of a cell on white ones.
 
-Pixels that no stroke reaches (models/proof/lattice.py) are left out of these rules: see `reached` there.
+Pixels that no stroke reaches (models/proof/lattice.py) are exempt from these rules: see `reached` there.
 
-Here the tolerance is 1e-7 (1 + U), for U as it was then; a checker that allows for 1e-9 (1 + U) of its own
-rounding and takes the final U, which is no greater, never keeps a cell that this one dropped.
+Here the tolerance is 1e-7 (1 + U), for U as it was then. A checker that allows for 1e-9 (1 + U) of its own
+rounding and takes the final U, which is no greater, never keeps a cell that was dropped here.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from .lattice import Lattice, Starts, few_unreached, reached, starts, strip
 from .sweep import Dual
 
 TOLERANCE: Final = 1e-7
-"""What may be above U and still survives, relative to 1 + U."""
+"""Excess over U with which labels still survive, relative to 1 + U."""
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class RemainingCells:
     """The cells that are left on a lattice.
 
     cells: bool, flat like the labels: whether the cell from this label upwards is left.
@@ -54,8 +54,8 @@ class Left:
     beta_high: Floats
 
 
-def left(dual: Dual, bound: float, energy: float) -> Left:
-    """The cells that a level leaves below an energy; a forward pass of the dual is made for it."""
+def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
+    """The cells that a level leaves below an energy, after a forward pass of the dual."""
     lattice = dual.lattice
     dual.forward()
     spare = energy + TOLERANCE * (1 + energy) - bound
@@ -64,14 +64,14 @@ def left(dual: Dual, bound: float, energy: float) -> Left:
     _mark_cells(_rectangles(lattice), lattice.allowed, survives, cells)
     steps = _ends(lattice, cells)
     at = lattice.h * (steps + lattice.offset[:, None])
-    return Left(
+    return RemainingCells(
         lattice, cells,
         lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
         np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
     )  # fmt: skip
 
 
-def finer(left: Left) -> Lattice:
+def finer(left: RemainingCells) -> Lattice:
     """The lattice of half the spacing on the cells that are left."""
     lattice = left.lattice
     h, half = lattice.h / 2, (lattice.offset > 0).astype(np.int32)
@@ -96,10 +96,10 @@ def finer(left: Left) -> Lattice:
 
 
 def branches(dual: Dual, count: int) -> list[Dual]:
-    """The dual on parts of its lattice, which together hold all its cells: the alpha of one pixel is cut.
+    """The dual on parts of its lattice that together hold all its cells; the alpha of one pixel is cut.
 
-    The pixel is the one of whose alpha the dual says least: the dearest alpha costs least there, at its best
-    beta. Where a vortex may be in many places, that is the pixel in their middle. Empty where nothing can be
+    The dual determines the alpha of this pixel least: the dearest alpha costs least there, at its best
+    beta. Where a vortex may be in many places, it is the pixel in their middle. Empty if there is nothing to
     cut.
     """
     dual.backward()
@@ -149,7 +149,7 @@ def prolonged(dual: Dual, lattice: Lattice) -> Dual:
 
 
 def _on(lattice: Lattice, shares: list[Floats], before: Dual) -> Dual:
-    """The dual with those shares on a lattice that follows, and the seconds that a pass may take."""
+    """The dual with those shares on a following lattice, and the expected seconds per pass."""
     dual = Dual(lattice, before.crew, *shares)
     dual.seconds = before.seconds_on(lattice)
     return dual
@@ -163,7 +163,7 @@ def _ends(lattice: Lattice, cells: Bools) -> Ints:
 
 
 class Rectangles(NamedTuple):
-    """Where the labels of each pixel begin, how many there are in alpha and beta, and the first k and l."""
+    """Start of the labels of each pixel, their numbers in alpha and beta, and the first k and l."""
 
     start: Starts
     rows: Ints
@@ -253,7 +253,7 @@ def _interpolate(
 
 @compiled
 def _between(step: int, offset: float, ratio: float, first: int, count: int) -> tuple[int, float]:
-    """The old label below a new one, and how far it is from there to the next: 0 to 1."""
+    """The old label below a new one, and the fraction from there to the next: 0 to 1."""
     place = min(max((step + offset) * ratio - offset - first, 0.0), count - 1.0)
     low = min(int(place), count - 2)
     return low, place - low

@@ -1,4 +1,4 @@
-"""What a proof says: the field, the bound, and every level of it in a form that can be checked."""
+"""The result of a proof: the field, the bound, and every level in a form that can be checked."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Status = Literal["optimal", "gap"]
 
 EXACT: Final = 1e-9
-"""Gap relative to 1 + energy that rounding leaves of none."""
+"""Gap relative to 1 + energy that rounding leaves when the true gap is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,14 +22,13 @@ class LevelRecord:
     """One level of a proof: a lattice (see models/proof/lattice.py) and a dual solution on it.
 
     h: spacing in radians. alpha, beta (n,), p (m,): the centres, the same at all levels of a proof.
-    alpha_first, alpha_count, beta_first, beta_count (n,), allowed (flat): the labels.
-    shares_first, shares_second: flat over pairs in the grid's order, alpha-major: what a pair gives to the
-    labels of its first, of its second pixel; 0 at labels that are not allowed. Whole multiples of `quantum`,
-    a power of two, below 2^31 of them (2^49 in the 1-norm).
-    bound: sum over pixels of min (D + shares) + sum over pairs of min (c - shares), over allowed labels; D
-    and c are in models/proof/costs.py. An error bound for its float64 sums is taken off.
-    energy: U when the level was pruned; what the next level lacks has more (models/proof/pruning.py).
-    work: additions of a pass, as of its lattice.
+    alpha_first, alpha_count, beta_first, beta_count (n,), allowed (flat): the labels. shares_first,
+    shares_second: flat over pairs in the grid's order, alpha-major: the shares of a pair at the labels of its
+    first and of its second pixel; 0 at labels that are not allowed. Whole multiples of `quantum`, a power of
+    two, below 2^31 of them (2^49 in the 1-norm). bound: sum over pixels of min (D + shares) + sum over pairs
+    of min (c - shares), over allowed labels; D and c are in models/proof/costs.py. An error bound for its
+    float64 sums is deducted. energy: U when the level was pruned; fields outside the next level have more
+    (models/proof/pruning.py). work: additions of a pass, as of its lattice.
     """
 
     h: float
@@ -50,7 +49,7 @@ class LevelRecord:
 
     @classmethod
     def of(cls, dual: Dual, energy: float) -> Self:
-        """The record of a dual whose shares are rounded to multiples of their quantum for it."""
+        """The record of a dual; its shares are first rounded to multiples of their quantum."""
         at, quantum, state = dual.lattice, dual.quantise(), dual.state
         return cls(
             at.h, at.alpha, at.beta, at.p, at.alpha_first, at.alpha_count, at.beta_first, at.beta_count,
@@ -61,16 +60,16 @@ class LevelRecord:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """The best field that was found and what is proven of it.
+    """The best field found, and a lower bound of the energy of all fields.
 
-    field, energy: U, its energy in the norm. bound: no field has less energy. status: `optimal` where the
-    bound is the energy but for rounding, energy - bound <= 1e-9 (1 + energy): then the jumps are forced, and
-    the field solves the convex problem that is left; else `gap`. forced: number of pairs whose jump is that
-    of the levels' centre in every field that could be better. levels: the last chain of lattices, coarsest
-    first. seconds: of the whole work. ended: `optimal`, `gap` (the one asked for is reached), `time`,
-    `interrupted`, or `labels` where the next level would be too large. norm: 1 or 2. parents: the number of
-    the level from which each follows, -1 for the first; empty where each follows from the one before. Where
-    several follow from one, they are branches: the alpha of one pixel is cut.
+    field, energy: U, its energy in the norm. bound: no field has less energy. status: `optimal` if the bound
+    equals the energy up to rounding, energy - bound <= 1e-9 (1 + energy); else `gap`. For `optimal` the jumps
+    are forced, and the field solves the remaining convex problem. forced: number of pairs whose jump is the
+    jump of the levels' centre in every field that could be better. levels: the last chain of lattices,
+    coarsest first. seconds: of the whole work. ended: `optimal`, `gap` (the requested one is reached),
+    `time`, `interrupted`, or `labels` if the next level would be too large. norm: 1 or 2. parents: the number
+    of the level from which each follows, -1 for the first; empty if each follows from the one before. Several
+    levels that follow from one are branches: the alpha of one pixel is cut.
     """
 
     field: CrossField
@@ -90,8 +89,8 @@ class Proof:
         return relative_gap(self)
 
 
-class _Said(Protocol):
-    """What a proof and a certificate both say."""
+class _Bounded(Protocol):
+    """Common attributes of a proof and a certificate."""
 
     @property
     def status(self) -> Status: ...
@@ -101,6 +100,6 @@ class _Said(Protocol):
     def bound(self) -> float: ...
 
 
-def relative_gap(said: _Said) -> float:
+def relative_gap(claim: _Bounded) -> float:
     """The gap relative to the energy, (energy - bound) / energy; 0 where the field is proven optimal."""
-    return 0.0 if said.status == "optimal" else (said.energy - said.bound) / max(said.energy, 1e-300)
+    return 0.0 if claim.status == "optimal" else (claim.energy - claim.bound) / max(claim.energy, 1e-300)

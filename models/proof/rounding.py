@@ -1,7 +1,7 @@
-"""Fields from a dual solution: pixel by pixel the label that looks cheapest, then improved.
+"""Fields from a dual solution: pixel by pixel the label of least estimated cost, then improved.
 
-In the order of a pass the label of least D + cost to the neighbours that have theirs + shares of those that
-have not (Kolmogorov 2006, 5).
+In the order of a pass, each pixel takes the label of least D + cost to the neighbours that have their label +
+shares of the neighbours that have none (Kolmogorov 2006, 5).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PI: Final = float(np.pi)
 
 
 Improve = Callable[[CrossField, CrossField, Over], CrossField]
-"""From a field that was rounded and the best one so far: the better one of them, improved."""
+"""Returns the better of a rounded field and the best one so far, improved."""
 
 
 class Rounding:
@@ -40,9 +40,9 @@ class Rounding:
         self._tried: set[bytes] = set()
 
     def lower(self, best: CrossField, over: Over = never) -> CrossField:
-        """A field of no more energy than `best`: it itself, or one that the shares suggest.
+        """A field of no more energy than `best`: itself, or a field that the shares suggest.
 
-        Comes after a backward pass, and leaves the dual after one.
+        Called after a backward pass, and leaves the dual after one.
         """
         best = self._rounded(best, over, forwards=True)
         if over():
@@ -64,7 +64,7 @@ class Rounding:
 
 
 def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
-    """The one of lower 2-norm energy: the best field, or the one found, improved where that may pay."""
+    """The field of lower 2-norm energy: the best field, or the new one, improved where that may pay."""
     state = FreeField.of(found)
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
@@ -103,7 +103,7 @@ def _decode(order: Indices, state: State, alpha: Floats, beta: Floats, fixed: Bo
 
 @compiled
 def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats) -> None:
-    """Add the cost of a pair of pixel i with a cross that is fixed."""
+    """Add the cost of a pair of pixel i with a fixed cross."""
     columns = state.beta_count[i]
     for row in range(state.alpha_count[i]):
         even = state.alpha[i] + state.h * row - alpha

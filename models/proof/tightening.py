@@ -1,4 +1,4 @@
-"""The windows that a certificate leaves, in the labels of the instance's gauge."""
+"""Windows narrowed by a certificate, in the labels of the instance's gauge."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..instance.instance import HALF, QUARTER
 from .certificate import Certificate
 
 _MARGIN = 1e-9
-"""Radians that windows are wider than the boxes, so that solvers may round."""
-_SLACK = 1e-9  # floor and ceil of jump bounds forgive this much rounding
+"""Radians by which windows are wider than the boxes, to allow for rounding in solvers."""
+_SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds
 
 
 def windows_left(certificate: Certificate) -> Windows:
     """Windows of the angles, and ranges of the jumps, of every field of at most the certificate's energy.
 
-    Each box of the certificate is taken to the label that its field has in the gauge. Where it leads beyond
-    the window of the gauge, crosses in it have labels at both ends: then alpha keeps its whole window, and
-    beta lies between plus and minus its greatest size. A jump that is forced between two boxes within their
-    windows is fixed; else its range follows from the windows as that of the gauge does.
+    Each box of the certificate is moved to the label that its field has in the gauge. If it exceeds the
+    window of the gauge, crosses in it have labels at both ends. Then alpha keeps its whole window, and beta
+    lies between plus and minus its greatest size. A jump that is forced between two boxes within their
+    windows is fixed; other ranges follow from the windows, as in the gauge.
     """
     field, verdict = certificate.field, certificate.verdict
     instance, grid = field.instance, field.instance.grid
@@ -48,7 +48,7 @@ def windows_left(certificate: Certificate) -> Windows:
 
 
 def _relabelled(boxes: Floats, steps: Ints) -> Floats:
-    """The boxes (n, 4) of alpha and beta after so many steps of their labels."""
+    """The boxes (n, 4) of alpha and beta after that many steps of their labels."""
     alpha, beta = boxes[:, :2] + HALF * steps[:, None], boxes[:, 2:] * parity_sign(steps)[:, None]
     return np.concatenate([alpha, np.sort(beta, axis=1)], axis=1)
 

@@ -1,5 +1,5 @@
-"""Fields without a solver.
+"""Fields without an external solver.
 
 The greedy field, best angles for given jumps, local improvement, and the search over jumps.
-Whatever needs an installed solver or a written file is export/solving.
+Methods that need an installed solver or a written file belong to export/solving.
 """

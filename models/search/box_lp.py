@@ -1,10 +1,10 @@
-"""The best angles for given jumps in the 1-norm: a linear program, and the bound that its multipliers prove.
+"""The best angles for given jumps in the 1-norm: a linear program, and the bound from its multipliers.
 
 With x = (alpha, beta), shape (2n,), the 1-norm energy at jumps p (docs/mathematics.md, 5) is sum k |Mx +
 c|: two rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for
 each pixel, beta with k = w_beta. For numbers -1 <= l <= 1 the sum is at least that of k l (Mx + c), which
-is linear: its least value in a box is a lower bound there, whoever has found the l, and at the multipliers
-of the linear program it is the least energy in the box.
+is linear. The least value of this sum in a box is a lower bound there, for l from any source. At the
+multipliers of the linear program it is the least energy in the box.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Residuals:
 
     @classmethod
     def at(cls, instance: Instance, p: Ints) -> Residuals:
-        """Those at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
+        """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels."""
         n, first, second = instance.grid.size, instance.grid.first, instance.grid.second
         unit, m, strokes = sparse.eye_array(n, format="csr"), len(first), instance.stroke_terms
         nothing, at = sparse.csr_array((m, n)), unit[strokes.pixel]
@@ -59,7 +59,7 @@ class Residuals:
     def bound(self, multipliers: Floats, lower: Floats, upper: Floats) -> float:
         """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers.
 
-        They are cut to [-1, 1], and rounding is taken off.
+        They are clipped to [-1, 1], and rounding errors are deducted.
         """
         force = self.weight * np.clip(multipliers, -1.0, 1.0)
         slope = self.matrix.T @ force
@@ -70,9 +70,9 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Angles of least 1-norm energy in a box at given jumps, x (2n,), and what proves it.
+    """Angles of least 1-norm energy in a box at given jumps, x (2n,), and their proof.
 
-    multipliers (r,): l of each residual in [-1, 1], see `Residuals`; where weights are 0, 0.
+    multipliers (r,): l of each residual in [-1, 1], see `Residuals`; 0 where weights are 0.
     bound: no angles in the box have less energy.
     """
 
@@ -112,8 +112,8 @@ class LinearFit:
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     """The field of least 1-norm energy with the jumps of `field` within its windows.
 
-    With it the multipliers of its first strokes, shape (s,) in [-1, 1]: with which force each is kept, in
-    parts of its weight.
+    Also returns the multipliers of its first strokes, shape (s,) in [-1, 1]: the force that keeps each
+    stroke, relative to its weight.
     """
     instance, m = field.instance, len(field.p)
     quarter = np.full(instance.grid.size, QUARTER)
@@ -130,7 +130,7 @@ def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
 
 @one_thread()
 def settled_1norm(field: CrossField, over: Over = never) -> CrossField:
-    """A field whose 1-norm energy neither best jumps nor best angles lower: at most that of the one given."""
+    """The field after alternating best jumps and best angles in the 1-norm, which lower its energy."""
     best, least = field, field.energy(1).total
     while not over():
         jumps = best_jumps(field.instance, best.alpha, best.beta, norm=1)

@@ -21,8 +21,8 @@ from .energy import LinearSolver, Quadratic, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
 _NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
-_NEWTON: Final = 1e-2  # relative residual of a Newton step: closer is wasted while bounds change
-_MOST_STEPS: Final = 500  # 5 to 50 are usual; contact along a curve recedes by some pixels a step
+_NEWTON: Final = 1e-2  # relative residual of a Newton step: a smaller one is wasted while bounds change
+_MOST_STEPS: Final = 500  # 5 to 50 are usual; contact along a curve recedes by some pixels per step
 _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
@@ -31,9 +31,9 @@ def fitted(field: CrossField, over: Over = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
 
     This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not
-    say (parts without strokes), the angles stay near those given. The gradient's entries that no bound
-    balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. Where the time is over before,
-    the best angles so far.
+    determine angles (parts without strokes), they stay near the given ones. The gradient's entries that no
+    bound balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. If time is over before,
+    the best angles so far are returned.
     """
     instance = field.instance
     quarter = np.full(instance.grid.size, QUARTER)
@@ -63,9 +63,9 @@ def least_in_box(
 
     Bounds may be infinite.
 
-    Rounding, 500 steps, or time that is over end the search too: then the best point so far comes back.
-    tolerance: the largest slope left that no bound balances, relative to 1 + the largest entry of b.
-    solver: one that has met a system like this one, which spares a factorisation.
+    Rounding, 500 steps, or the end of time stop the search too and return the best point so far.
+    tolerance: the largest remaining slope that no bound balances, relative to 1 + the largest entry of b.
+    solver: a solver that was used for a similar system, which saves a factorisation.
     """
     solver = LinearSolver() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.vector).max())
@@ -90,6 +90,6 @@ def least_in_box(
 
 
 def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
-    """Whether a step, not of nothing, lowers the energy by a fair share of what the slope promises."""
+    """Whether a nonzero step lowers the energy by a fair share of the decrease that the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised

@@ -1,8 +1,8 @@
-"""The same sketch on a grid of half the resolution, and a field brought from there to the fine grid.
+"""The same sketch on a grid of half the resolution, and prolongation of a field to the fine grid.
 
 The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a
-quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, are made four times
-as large, up to the greatest that an instance may have.
+quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, become four times
+as large, up to the greatest weight of an instance.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .improvement import improved, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
 CREEP: Final = 1e-3
-"""Relative fall of the energy in a round: less is not worth a round on a fine grid."""
+"""Relative fall of the energy in a round: a smaller one does not justify a round on a fine grid."""
 
 
 def halved(instance: Instance) -> Instance | None:
-    """The instance with each 2 x 2 pixels made one, or None when no stroke is left.
+    """The instance with each 2 x 2 pixels merged into one, or None when no stroke is left.
 
     A coarse pixel is inside the mask when one of its pixels is. Its stroke is the mean of its pixels'
     strokes, by the double angle.
@@ -55,14 +55,14 @@ def halved(instance: Instance) -> Instance | None:
 
 
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
+    """The improved field on the fine grid of `instance` that grows from a field on `halved(instance)`."""
     return improved(grown(coarse, instance, over), over)
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The field that grows on the fine grid of `instance` out of a field on `halved(instance)`.
+    """The field on the fine grid of `instance` that grows from a field on `halved(instance)`.
 
-    Crosses and jumps start as those of the coarse pixels; at strokes u is the line that is nearer to the
+    Crosses and jumps start with the values of the coarse pixels; at strokes u is the line nearer to the
     stroke. Then angles and jumps settle until the time is over.
     """
     state = lifted(coarse, instance)
@@ -90,7 +90,7 @@ def _jumps(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
 
 
 def _face_strokes(state: FreeField) -> None:
-    """Take the label at each stroke pixel in which u is nearest to the stroke."""
+    """Choose the label at each stroke pixel whose u is nearest to the stroke."""
     instance, at = state.instance, state.instance.stroke_index
     steps = np.zeros(instance.grid.size, dtype=np.int32)
     steps[at] = _nearest_label(instance.target, state.alpha[at], state.beta[at])

@@ -1,8 +1,8 @@
-"""The energy at fixed jumps as a quadratic form, and solves of the sparse systems it leads to.
+"""The energy at fixed jumps as a quadratic form, and solutions of its sparse systems.
 
 With x = (alpha, beta), shape (2n,), the 2-norm energy (docs/mathematics.md, 5) is x'Hx - 2 b'x + constant. H
-holds 2, -2 a pair in alpha and 2, -2 (-1)^p a pair in beta, w at strokes, also between alpha_i and beta_i,
-and w_beta.
+holds 2, -2 per pair in alpha and 2, -2 (-1)^p per pair in beta, w at strokes, also between alpha_i and
+beta_i, and w_beta.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..instance.instance import Instance
 from ..smooth.systems import PULL, Solve, factored, stroke_weight, symmetric
 
 CLOSE: Final = 1e-2
-"""Relative residual of a step that ranks jumps like the exact one."""
+"""Relative residual of a step that ranks jumps as the exact one does."""
 
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
 
@@ -43,7 +43,7 @@ class Quadratic:
         return slope
 
     def change(self, slope: Floats, step: Floats) -> float:
-        """By how much the value changes with a step from where the slope was taken."""
+        """Change of the value for a step from the point of that slope."""
         return float(step @ (2 * slope + self.matrix @ step))
 
 
@@ -64,7 +64,7 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
 
 
 class LinearSolver:
-    """Solves of systems that differ little: one factorisation serves the next ones as a preconditioner."""
+    """Solver of systems that differ little: one factorisation preconditions the following ones."""
 
     def __init__(self) -> None:
         self._inverse: Solve | None = None
@@ -82,7 +82,7 @@ class LinearSolver:
         return self.attempt(matrix, right, tolerance)[0]
 
     def attempt(self, matrix: Any, right: Floats, tolerance: float) -> tuple[Floats, bool]:
-        """The step by few conjugate gradients with the factorisation at hand; whether they sufficed."""
+        """Try the step with few conjugate gradients; return whether the present factorisation sufficed."""
         inverse = LinearOperator(matrix.shape, matvec=self._inverse, dtype=np.float64)
         pulled = LinearOperator(matrix.shape, matvec=lambda v: matrix @ v + PULL * v, dtype=np.float64)
         step, failed = cg(pulled, right, rtol=tolerance, maxiter=_MOST_STEPS, M=inverse)

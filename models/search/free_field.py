@@ -1,7 +1,7 @@
-"""A field in the making: angles that may be any real numbers, jumps in no range, both free to change.
+"""A field under construction: angles that may be any real numbers, jumps without ranges, both free to change.
 
-Only the windows and ranges of an instance make the label of a cross unique; while a field grows or is
-searched for, they are in the way.
+Windows and ranges of an instance make the label of a cross unique. While a field grows or is searched for,
+they are in the way.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .box_qp import fitted
 
 @dataclass(eq=False)
 class FreeField:
-    """Angles alpha, beta (n,) in radians and jumps p (m,) that change while a field is made."""
+    """Angles alpha, beta (n,) in radians and jumps p (m,) that change during the construction of a field."""
 
     instance: Instance
     alpha: Floats
@@ -56,7 +56,7 @@ class FreeField:
 
 
 def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bound at strokes only."""
+    """Least and greatest (alpha, beta), shapes (2n,): alpha is bounded only at strokes."""
     size, at = instance.grid.size, instance.stroke_index
     lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
     upper = -lower

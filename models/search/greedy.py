@@ -1,8 +1,8 @@
-"""The greedy strategy of BendFields: the baseline to compare with, and the start of solvers and searches.
+"""The greedy strategy of BendFields: the baseline for comparisons, and the start of solvers and searches.
 
-It grows one cell round every stroke pixel, in which all jumps are 0, and then decides the jumps between
-cells, cheapest first, with the angles brought up to date after every batch (docs/mathematics.md, 10; the
-strategy is that of mixed-integer quadrangulation).
+It grows one cell round every stroke pixel, in which all jumps are 0. Then it decides the jumps between
+cells, cheapest first, and updates the angles after every batch (docs/mathematics.md, 10). The strategy is
+that of mixed-integer quadrangulation.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
 JumpProgress = Callable[[int, int], object]
-"""Is told how many jumps are known, and how many there are."""
+"""Receives how many jumps are known, and how many there are."""
 
 _CLOSE_UP_TO: Final = (
-    8192  # pixels: beyond, solves take most of the time, and local updates rank jumps as well
+    8192  # pixels: beyond, solves take most of the time, and local updates rank jumps equally well
 )
 
 
 @dataclass(frozen=True)
 class _Pace:
-    """How much energy one batch of jumps may add, and to which relative residual angles are then brought up
-    to date locally, which leaves the smooth part of the error; None: by factorisations.
+    """Energy that one batch of jumps may add, and relative residual of the local updates of angles after it.
 
-    share: of the energy that all jumps so far have added, that a batch may add if that is more.
+    Local updates leave the smooth part of the error; None: updates by factorisations. share: of the energy
+    that all jumps so far have added, which a batch may add if that is more.
     """
 
     batch: float
@@ -53,11 +53,10 @@ _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, within all bounds.
 
-    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
-    all angles are solved for again (docs/mathematics.md, 10). The windows are kept by the last solve alone,
-    as BendFields knows none. Deterministic.
-    progress: called as progress(jumps known, jumps in all) after every batch. over: says whether the time is
-    over; then all jumps that are left are decided at once.
+    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), which solves for
+    all angles again each time (docs/mathematics.md, 10). Only the last solve respects the windows, because
+    BendFields has none. Deterministic. progress: called as progress(jumps known, jumps in all) after every
+    batch. over: returns whether the time is over; then all remaining jumps are decided at once.
     """
     state, nearest = _cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
@@ -66,9 +65,9 @@ def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Ov
 
 
 def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
-    """As `greedy`, in a tenth of its time: some 60 batches, angles brought up to date locally, no bounds.
+    """As `greedy`, in a tenth of its time: some 60 batches, angles updated locally, no bounds.
 
-    The jumps are others, and as good: which strategy has the best is a matter of luck.
+    The jumps differ but are equally good; which strategy finds the better ones is random.
     """
     state, nearest = _cells(instance)
     _stitch(state, nearest, _ROUGH, over)
@@ -76,7 +75,7 @@ def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
 
 
 def _cells(instance: Instance) -> tuple[FreeField, Ints]:
-    """Each pixel with the angle of its nearest stroke, without a jump; and the numbers of these strokes."""
+    """Each pixel with the angle of its nearest stroke, without a jump, and the numbers of these strokes."""
     nearest = nearest_strokes(instance)
     angle = np.append(instance.target, 0.0)[nearest]
     jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
@@ -109,7 +108,7 @@ def _stitch(
 
 
 def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
-    """Bring angles up to date, enough to rank the unknown jumps."""
+    """Update angles, accurately enough to rank the unknown jumps."""
     energy = energy_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if local is None:

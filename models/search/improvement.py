@@ -1,8 +1,8 @@
-"""Local improvement of a field: angles and jumps in turn, and curves that change their family.
+"""Local improvement of a field: alternating angles and jumps, and curves that change their family.
 
-A stroke is carried by line u. Which of two crossing curves is u where they meet is a choice of the jumps
-between them, and where curves cross at less than 45 degrees the cheapest jump takes both for one family. So
-turning a curve is tried for every curve.
+Line u carries a stroke. Where two curves cross, the jumps between them determine which of them is u. Where
+they cross at less than 45 degrees, the cheapest jump assigns both to one family. So the module tries to
+turn every curve.
 """
 
 from __future__ import annotations
@@ -26,24 +26,23 @@ from .free_field import FreeField, free_bounds
 from .nearest_stroke import chamfer, nearest_strokes
 
 FALL: Final = 1e-9
-"""Of the energy, relative to 1 + energy: less may be rounding."""
+"""Least fall of the energy, relative to 1 + energy: less may be rounding."""
 
 _SETTLED: Final = 1e-4  # slope left while jumps still change
 _ROUNDS: Final = 500  # of solving and choosing jumps again; 3 to 30 are usual
-_MOST_CURVES: Final = 40  # that may change their family, those first that miss their strokes most
-_SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less are one curve
+_MOST_CURVES: Final = 40  # that may change their family, those with the largest deviation first
+_SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less belong to one curve
 
 
 @one_thread()
 def improved(field: CrossField, over: Over = never) -> CrossField:
-    """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
+    """A field whose energy neither best jumps, nor best angles, nor the turn of a curve lower.
 
-    Its 2-norm energy is at most that of the one given.
+    Its 2-norm energy is at most the given field's.
 
     Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
-    turning seldom pays.
-    At most 40 curves are tried, the worst first. over: says whether the time is over; then the best field so
-    far comes back. The energy is that of docs/mathematics.md, 5; deterministic.
+    turning seldom pays. At most 40 curves are tried, the worst first. over: returns whether the time is over;
+    then the best field so far is returned. The energy is that of docs/mathematics.md, 5; deterministic.
     """
     state, solver = FreeField.of(field), LinearSolver()
     settle(state, solver, over)
@@ -54,10 +53,10 @@ def improved(field: CrossField, over: Over = never) -> CrossField:
 
 
 def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
-    """Solve within the bounds and choose jumps, in turn, while the energy falls and time lasts.
+    """Alternate solving within the bounds and choosing jumps, while the energy falls and time lasts.
 
-    enough: relative fall of the energy in a round below which no more rounds follow. Singularities creep by a
-    pixel a round, on fine grids for a hundred rounds.
+    enough: relative fall of the energy in a round below which no more rounds follow. Singularities move by a
+    pixel per round, on fine grids for a hundred rounds.
     """
     bounds = free_bounds(state.instance)
     kept, least = (state.x, state.p), np.inf
@@ -78,7 +77,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
 
 
 def _swap_lines(state: FreeField) -> None:
-    """Exchange u and v where a stroke pixel's alpha has run against its window of the gauge `strokes`.
+    """Exchange u and v where a stroke pixel's alpha has reached a bound of its window in the gauge `strokes`.
 
     There (alpha, beta) and (alpha -+ pi/2, -beta) fit the stroke equally badly, and beyond the bound the
     other fits better.
@@ -110,9 +109,9 @@ def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> No
 
 
 def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Over) -> None:
-    """Turn the crosses round a curve (own = 1) by a quarter either way and keep what lowers the energy most.
+    """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease.
 
-    Without the bounds the energy of a trial is a lower bound, and usually the answer.
+    Without the bounds the energy of a trial is a lower bound, and usually the exact energy.
     """
     enough = state.energy * (1 - 1e-6) - 1e-9
     trials = [_turned(state, quarters, solver) for quarters in (own, -own)]
@@ -124,15 +123,15 @@ def _turn_if_better(state: FreeField, own: Ints, solver: LinearSolver, over: Ove
 
 
 def _turned(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
-    """The state after turning each pixel's labels back by `quarters`, solved: what v was before is now u.
+    """The state after turning each pixel's labels back by `quarters`, solved; the former v is the new u.
 
-    The turn alone leaves the crosses as they are; but the strokes, which pull at u, now pull at the other
+    The turn alone does not change the crosses; but the strokes, which pull at u, now pull at the other
     line.
     """
     grid, sign = state.instance.grid, parity_sign(quarters)
     trial = FreeField(state.instance, *stepped(grid, state.alpha, state.beta, state.p, -quarters))
     energy = energy_at(trial.instance, trial.p)
-    # In the old labels the system has changed at these strokes only, so that the factorisation at hand is
+    # In the old labels the system has changed only at these strokes, so that the present factorisation is
     # close.
     old = np.concatenate([np.ones(grid.size), sign])
     matrix = sparse.diags_array(old) @ energy.matrix @ sparse.diags_array(old)

@@ -1,4 +1,4 @@
-"""The least energy as a function of the jumps, and what each single change of one would do.
+"""The least energy as a function of the jumps, and its change for each single change of a jump.
 
 For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
 (models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
@@ -8,15 +8,14 @@ pair (i, j) that changes by d
 - if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p,
   which by the formula of Woodbury changes G by a matrix of rank 2.
 
-So the gain of every change of one jump is a short formula in entries of G beside the diagonal, and a change
-that is made costs one update of G. Angles outside the patch stay as they are; the energy is that of the
-whole field.
+So the gain of every change of one jump is a short formula in off-diagonal entries of G, and making a change
+costs one update of G. Angles outside the patch stay as they are; the energy is the energy of the whole field.
 
-Updates lose digits. Where the parities of all jumps fit together and every stroke sits on the same sign of
-beta, (alpha + c, beta -+ c) costs w_beta alone: H has an eigenvalue of about w_beta, and a jump that ends
-this state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is taken
-from its definition (models/search/patch_energy.py), and where the updates say another one, G is computed
-anew. Gains that no energy can have are not believed either.
+Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
+(alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
+state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
+from its definition (models/search/patch_energy.py). If the updates give another energy, G is computed anew.
+Gains that no energy can have are discarded too.
 """
 
 from __future__ import annotations
@@ -37,19 +36,17 @@ from .free_field import free_bounds
 from .patch_energy import PatchEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
-"""Changes of one jump that `gains` tells of."""
+"""Changes of one jump in the rows of `gains`."""
 
 _HOLD: Final = 1e4  # weight that holds an angle at its bound, against stiffnesses of 1 to 20
 _OUTSIDE: Final = 1e-4  # radians by which an angle may pass its bound before it is held
 _SOFTEST: Final = 1e-6  # price of beta below which G grows so large that updates lose their digits
 _MOST_HOLDS: Final = 60
-_DRIFT: Final = (
-    1e-8  # by which updates may miss the energy, relative to 1 + energy, before all is solved anew
-)
+_DRIFT: Final = 1e-8  # error of updates, relative to 1 + energy, beyond which everything is solved anew
 
 
 class Point(NamedTuple):
-    """Angles (alpha, beta) (2n,) and jumps (m,) of the whole field; the 2-norm energy they have."""
+    """Angles (alpha, beta) (2n,) and jumps (m,) of the whole field, and their 2-norm energy."""
 
     energy: float
     x: Floats
@@ -97,17 +94,17 @@ class Patch:
 class Landscape:
     """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
 
-    energy: that of the whole field, by its definition, and of the pulls that keep bounds and make H definite.
-    Bounds of the angles are kept by a stiff pull on those that would pass them, so that the energy is exact
-    to about 1e-4 where bounds matter. Without them (`gains` does not look ahead to bounds that a change would
-    meet) walks lead to points that look low and are not, so they are kept at every step.
+    energy: of the whole field, by its definition, plus the penalties that keep bounds and make H definite. A
+    stiff penalty on angles that would pass their bounds keeps them, so the energy is exact to about 1e-4
+    where bounds matter. Without bounds (`gains` does not look ahead to bounds that a change would meet) walks
+    lead to points that look low and are not, so bounds are kept at every step.
 
-    Raises LinAlgError, at the start and in a change, where the jumps leave a system that double precision
+    Raises LinAlgError, at the start and in a change, when the jumps lead to a system that double precision
     cannot solve.
     """
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
-        """Start at the angles x (2n,), of which those in the patch are solved for, and jumps p (m,)."""
+        """Start at the angles x (2n,), which are solved for inside the patch, and jumps p (m,)."""
         self.patch = patch
         self.p = p.copy()
         self._around = x
@@ -135,20 +132,20 @@ class Landscape:
         return Point(self._defined(inside, self.p), x, self.p.copy())
 
     def saved(self) -> _State:
-        """What `restore` takes back later."""
+        """A state for `restore`."""
         return _State(
             self._inverse.copy(order="F"), self._x.copy(), self.p.copy(), self.energy, dict(self._held)
         )
 
     def restore(self, state: _State) -> None:
-        """Go back to a state that was saved."""
+        """Restore a saved state."""
         self._inverse, self._x, self.p = state.inverse.copy(order="F"), state.x.copy(), state.p.copy()
         self.energy, self._held, self._fresh = state.energy, dict(state.held), False
 
     def gains(self) -> Floats:
-        """By how much each jump's change by +1 and by -1 alters the energy; shape (2, e), rows as in STEPS.
+        """Change of the energy when each jump changes by +1 and by -1; shape (2, e), rows as in STEPS.
 
-        Infinite where rounding hides the gain even from an inverse that is fresh.
+        Infinite where rounding hides the gain even from a fresh inverse.
         """
         gains = self._gains()
         if np.isinf(gains).any() and not self._fresh:
@@ -157,7 +154,7 @@ class Landscape:
         return gains
 
     def _gains(self) -> Floats:
-        """The gains by the present inverse, infinite where they cannot be true."""
+        """The gains by the present inverse, infinite where they are impossible."""
         g, x, i, j = self._inverse, self._x, self.patch.first, self.patch.second
         k = len(self.patch.pixels)
         p = self.p[self.patch.pairs]
@@ -182,12 +179,12 @@ class Landscape:
         try:
             self._follow(pairs, steps)
         except np.linalg.LinAlgError:
-            self.energy = np.nan  # which is no energy, so that all is solved anew
+            self.energy = np.nan  # which is not an energy, so that everything is solved anew
         self.p[self.patch.pairs[pairs]] += steps
         self._settle()
 
     def _follow(self, pairs: Ints, steps: Ints) -> None:
-        """Bring energy, angles and inverse up to date with a change of jumps."""
+        """Update energy, angles and inverse after a change of jumps."""
         self._fresh = False
         push, gain = self._pushed(pairs, steps)
         touched = np.nonzero(push)[0]
@@ -204,7 +201,7 @@ class Landscape:
             self._update(-1.0, columns @ small, columns)
 
     def _solve(self) -> None:
-        """Compute inverse, angles and energy from the jumps and from the angles that are held."""
+        """Compute inverse, angles and energy from the jumps and from the held angles."""
         places = self.patch.unknowns
         energy = energy_at(self.patch.instance, self.p)
         rows = energy.matrix[places]
@@ -226,7 +223,7 @@ class Landscape:
         self._fresh = True
 
     def _settle(self) -> None:
-        """Keep the bounds; solve anew where the updates have lost the energy, then bounds once more."""
+        """Keep the bounds; solve anew if the updates have lost the energy, then keep the bounds again."""
         for _ in range(2):
             with suppress(np.linalg.LinAlgError):
                 self._keep_bounds()
@@ -235,18 +232,18 @@ class Landscape:
             self._solve()
 
     def _as_defined(self) -> bool:
-        """Whether the updates say the energy that the angles have; from now on the energy is that."""
+        """Whether the updates give the energy of the angles; from now on the energy is the defined one."""
         followed, self.energy = self.energy, self._defined_energy()
         return bool(abs(followed - self.energy) <= _DRIFT * (1 + self.energy))
 
     def _defined_energy(self) -> float:
-        """The energy of the present angles with all pulls."""
+        """The energy of the present angles with all penalties."""
         held = self._x[list(self._held)] - list(self._held.values())
         pulls = float(self._soft @ (self._x * self._x)) + _HOLD * float(held @ held)
         return self._defined(self._x, self.p) + pulls
 
     def _pushed(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
-        """The change of b, shape (2k,), and what c - 2 x'b gains."""
+        """The change of b, shape (2k,), and the change of c - 2 x'b."""
         i, j = self.patch.first[pairs], self.patch.second[pairs]
         q = HALF * steps
         a = self._x[i] - self._x[j] + HALF * self.p[self.patch.pairs[pairs]]
@@ -257,7 +254,7 @@ class Landscape:
         return push, float(np.sum(2 * q * q + 4 * q * a))
 
     def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
-        """The unknowns beta whose couplings turn, shape (c,), and what is added to H there, shape (c, c)."""
+        """The unknowns beta whose couplings turn, shape (c,), and the additions to H there, shape (c, c)."""
         odd = pairs[(steps & 1) == 1]
         ends = np.concatenate([self.patch.first[odd], self.patch.second[odd]])
         places, where = np.unique(ends, return_inverse=True)
@@ -276,7 +273,7 @@ class Landscape:
         self._inverse = dgemm(factor, left, right, beta=1.0, c=self._inverse, trans_b=1, overwrite_c=1)
 
     def _keep_bounds(self) -> None:
-        """Hold angles that pass their bounds, the worst first, and let go of those that lean inwards."""
+        """Hold angles that pass their bounds, the worst first, and release those that move inwards."""
         for _ in range(_MOST_HOLDS):
             past = np.maximum(self._x - self._upper, self._lower - self._x)
             past[list(self._held)] = 0.0

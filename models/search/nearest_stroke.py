@@ -1,4 +1,4 @@
-"""Which stroke is nearest to a pixel, inside the mask."""
+"""The nearest stroke to a pixel, inside the mask."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def nearest_strokes(instance: Instance) -> Ints:
 
 
 def chamfer(grid: Grid) -> Any:
-    """Distances between neighbours: 3 along the grid, 4 across a corner beside a pixel of the mask."""
+    """Distances between neighbours: 3 along the grid, 4 across a corner next to a pixel of the mask."""
     number = grid.number
     beside = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
     beside.append((beside[0][2], beside[0][3], beside[0][0], beside[0][1]))

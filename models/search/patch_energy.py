@@ -1,4 +1,4 @@
-"""The energy by its definition as a function of the angles in a patch: no update can spoil it."""
+"""The energy by its definition as a function of the angles in a patch, free of errors of updates."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class PatchEnergy:
     """The field's 2-norm energy where only angles and jumps within a patch change."""
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
-        """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the patch stay."""
+        """Store angles x (2n,) and jumps p (m,) of the whole field; values outside the patch stay."""
         instance, grid, free = patch.instance, patch.instance.grid, np.zeros(len(x) // 2, dtype=bool)
         free[patch.pixels] = True
         self._instance = instance
         self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
         ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
-        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        # Local numbers: the pixels of the patch, then their neighbours outside, whose angles stay.
         beside = np.setdiff1d(ends, patch.pixels)
         number = np.zeros(grid.size, dtype=np.int32)
         number[np.concatenate([patch.pixels, beside])] = np.arange(len(patch.pixels) + len(beside))
@@ -54,7 +54,7 @@ class PatchEnergy:
 
 
 def _rest(field: CrossField, free: Bools, pairs: Ints, strokes: Ints) -> float:
-    """The energy that is none of the patch's: of other pixels, without these pairs and strokes."""
+    """The energy outside the patch: other pixels, without these pairs and strokes."""
     instance = field.instance
     pair = field.residual_a**2 + field.residual_b**2
     terms, skew = instance.stroke_terms, field.beta[~free] ** 2

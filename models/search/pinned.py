@@ -1,9 +1,9 @@
-"""The best angles for given jumps, the same on every processor.
+"""The best angles for given jumps, equal on every processor.
 
 Solvers of linear systems round differently on each kind of processor: soft directions of the energy make
 angles differ by up to 1e-10. Here the solution is refined with slopes that are right to twice the digits of
-a double, and then rounded to twelve decimals. Fields with the same jumps get the same angles, wherever their
-angles come from.
+a double, and then rounded to twelve decimals. Fields with the same jumps get the same angles, from any
+initial angles.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .box_qp import fitted
 from .energy import LinearSolver, Quadratic, energy_at
 from .nearest_stroke import nearest_strokes
 
-_DECIMALS: Final = 12  # as directions of strokes have
+_DECIMALS: Final = 12  # as in directions of strokes
 _AT_BOUND: Final = 1e-11  # radians from a bound within which an angle is at the bound
 _SMALLEST: Final = 1e-19  # radians: a smaller step changes no rounded angle
 _MOST_STEPS: Final = 60  # 4 to 8 are usual
@@ -33,8 +33,8 @@ _SPLITTER: Final = 2.0**27 + 1
 def pinned(field: CrossField) -> CrossField:
     """Field of least 2-norm energy with the jumps of `field`, angles rounded to twelve decimals.
 
-    Within the bounds that `fitted` keeps. Parts of the mask without strokes keep the angles that `fitted`
-    gives them, rounded too.
+    Within the bounds that `fitted` keeps. Parts of the mask without strokes keep the angles from `fitted`,
+    also rounded.
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
 """A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
 
-Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
-is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
-one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
-processes, unless seconds are given and run out: then the clock decides where the start, the grids of lower
-resolution and the last round are cut off. What a round that was cut off has found is taken over if it is
-lower.
+Every round explores some patches of the grid (models/search/walk.py) while the rest stays fixed. Lower points
+are adopted, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
+one kind of processor the field at the end of a round depends only on instance and seed, not on the number of
+processes, unless seconds are given and run out. Then the clock decides when the start, the grids of lower
+resolution and the last round are cut off. Results of a round that was cut off are adopted if they are lower.
 """
 
 from __future__ import annotations
@@ -35,23 +34,23 @@ from .starts import first_field, polyvector_start
 from .walk import LOWER, Explored, Task, explore
 
 RoundProgress = Callable[[int, float], object]
-"""Is told how many rounds are done, and the least energy so far."""
+"""Receives the number of finished rounds, and the least energy so far."""
 
 Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
-"""Gives a field of no more energy, told the field, what tells the seconds that are left, and when to end."""
+"""Returns a field of no more energy, given the field, a function for the seconds left, and when to end."""
 
 Explorers = Callable[[list[Task]], list[Explored]]
-"""Explores patches side by side and gives what was found in the order of the tasks."""
+"""Explores patches in parallel and returns the results in the order of the tasks."""
 
 _PATCH: Final = 320  # pixels; its matrix has 640 rows, and a change of one jump costs 0.3 ms
-_PATCHES: Final = 4  # a round
-_FINE: Final = 0.6  # share of the seconds that is kept for the grid of higher resolution
+_PATCHES: Final = 4  # per round
+_FINE: Final = 0.6  # share of the seconds that is reserved for the grid of higher resolution
 _COARSE: Final = 60  # rounds on a grid of lower resolution
 _LATEST: Final = 4  # fields that are brought from there
-_KICKS: Final = 40  # a patch
+_KICKS: Final = 40  # per patch
 _SETTLE: Final = 8  # rounds between two improvements of the whole grid
 _IMPROVE: Final = 32  # rounds between two trials of turning whole curves, which reach beyond a patch
-_PATIENCE: Final = 200  # kicks a pixel without success that end a search
+_PATIENCE: Final = 200  # perturbations per pixel without success that end a search
 _ALONE: Final = 64  # pixels up to which starting processes would take longer than the search
 _HURRY: Final = 5.0  # seconds; with less, starting processes would take a good part of them
 _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last solve after the deadline
@@ -59,9 +58,9 @@ _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found: field, whole rounds, (round, energy) of every improvement, its end.
+    """Result of a search: field, whole rounds, (round, energy) of every improvement, its end.
 
-    ended: `time`, `rounds`, `patience` (nothing better for long) or `interrupted`.
+    ended: `time`, `rounds`, `patience` (no improvement for long) or `interrupted`.
     """
 
     field: CrossField
@@ -82,19 +81,18 @@ def search(
     progress: RoundProgress = lambda *_: None,
     suggest: Suggest = lambda field, *_: field,
 ) -> Search:
-    """The field of least 2-norm energy found, never above `start`.
+    """Search for the field of least 2-norm energy, never above `start`.
 
-    Nor is it above the first field (models/search/starts.py), unless time cuts that off, nor above what
-    `suggest` makes of the best of the fields to begin at, here and on grids of lower resolution.
+    The result is also not above the first field (models/search/starts.py), unless time cuts that off, and not
+    above the result of `suggest` for the best of the starting fields, here and on grids of lower resolution.
 
-    seconds, rounds: when to end, whichever comes first; with neither, after 200 kicks a pixel without
-    success. All work keeps to the seconds, the start too; beyond them goes one step of it (on a grid of 100 x
-    100 a second), and the last solve, with 5 % and half a second more.
-    Without seconds the same instance, seed and rounds give the same field on the same kind of processor.
-    jobs: processes; start: a field to begin at where, improved, it is better than the first,
-    PolyVector and power fields; seed: of all choices by chance. Ctrl-C ends the search with the best field so
-    far. Raises InputError for a limit that is not positive and too many jobs, InstanceError for a start on
-    another one.
+    seconds, rounds: when to end, whichever comes first; with neither, after 200 perturbations per pixel
+    without success. All work respects the seconds, the start too. One step may exceed them (on a grid of 100
+    x 100 a second), and so may the last solve, by 5 % and half a second. Without seconds the same instance,
+    seed and rounds give the same field on the same kind of processor. jobs: number of processes; start: a
+    field that is used if, improved, it is better than the first, PolyVector and power fields; seed: of all
+    random choices. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is
+    not positive and too many jobs, InstanceError for a start on another instance.
     """
     spent = isinstance(seconds, int | float) and not seconds > 0
     if spent or (rounds is not None and rounds < 0) or jobs < 1:
@@ -119,7 +117,7 @@ def search(
 
 
 def _closing(deadline: Deadline) -> Callable[[], Over]:
-    """When the last solve has to end, counted from the end of the search, or from a deadline before that."""
+    """End of the last solve, counted from the end of the search, or from a deadline before that."""
     share, more = _CLOSING
     seconds = share * deadline.left() + more
     return lambda: deadline.within(0.0).later(seconds).passed if np.isfinite(seconds) else never
@@ -127,7 +125,7 @@ def _closing(deadline: Deadline) -> Callable[[], Over]:
 
 @dataclass(frozen=True)
 class _Limits:
-    """When to end: a deadline, rounds, and whether the user asks for it; and what suggests starts."""
+    """When to end: a deadline, rounds, or a request of the user; and the function that suggests starts."""
 
     deadline: Deadline
     rounds: int | None
@@ -135,7 +133,7 @@ class _Limits:
     suggest: Suggest
 
     def met(self, rounds: int) -> str:
-        """Which limit is met after so many rounds; empty when none is."""
+        """The limit that is met after that many rounds; empty when none is."""
         if self.interrupted():
             return "interrupted"
         if rounds == self.rounds:
@@ -143,7 +141,7 @@ class _Limits:
         return "time" if self.deadline.passed() else ""
 
     def over(self) -> bool:
-        """Whether work has to end now, in the midst of a round too."""
+        """Whether work has to end now, even in the middle of a round."""
         return self.interrupted() or self.deadline.passed()
 
     def coarse(self) -> _Limits:
@@ -155,7 +153,7 @@ class _Limits:
 def _from_coarse(
     instance: Instance, seed: int, limits: _Limits, explorers: Explorers
 ) -> Iterator[CrossField]:
-    """Fields found on the grid of half the resolution, brought to this one, the best there first."""
+    """Fields found on the grid of half the resolution, prolonged to this one, the best there first."""
     coarse = halved(instance)
     if coarse is None:
         return
@@ -172,8 +170,9 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of first field, given field and, in time, PolyVector and power field, each improved in time,
-    or what is suggested from it.
+    """The best of first field, given field and, in time, PolyVector and power field, or a suggestion from it.
+
+    Each is improved in time.
     """
     fields = [first_field(instance, limits.over)]
     if given is not None:
@@ -191,7 +190,7 @@ def _energy(field: CrossField) -> float:
 
 
 class _Hunt:
-    """The field that a search has reached, and what it tries next."""
+    """The present field of a search, and its next trials."""
 
     def __init__(self, instance: Instance, seed: int, start: CrossField) -> None:
         self.round = 0
@@ -225,13 +224,13 @@ class _Hunt:
         return [self.best(over), *self._latest[-_LATEST:-1][::-1]]
 
     def offer(self, field: CrossField) -> None:
-        """Go on from this field if it is lower."""
+        """Adopt this field if it is lower."""
         if field.energy().total < self._state.energy - LOWER:
             self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
     def run(self, explorers: Explorers, limits: _Limits, progress: RoundProgress) -> str:
-        """Go on until a limit is met; which one."""
+        """Continue until a limit is met; return the limit."""
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
@@ -244,7 +243,7 @@ class _Hunt:
         return ended
 
     def tasks(self, deadline: Deadline) -> list[Task]:
-        """What to explore in this round, until when."""
+        """The tasks of this round, with their deadline."""
         rng = np.random.default_rng((self._seed, self.round))
         x, p = self._state.x, self._state.p
         return [
@@ -253,7 +252,7 @@ class _Hunt:
         ]
 
     def _patches(self, rng: np.random.Generator) -> Iterator[Bools]:
-        """The patches of a round, round pixels of high energy and others in turn."""
+        """The patches of a round, alternately around pixels of high energy and others."""
         grid = self._instance.grid
         if not self.large:
             yield from [self._reached] * _PATCHES
@@ -265,7 +264,7 @@ class _Hunt:
             yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
 
     def _take(self, tasks: list[Task], found: list[Point | None], over: Over) -> None:
-        """Take over what is lower, the lowest first, and bring the whole grid up to date now and then."""
+        """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
         lower = [(task, better) for task, better in zip(tasks, found, strict=True) if better is not None]
         for task, better in sorted(lower, key=lambda pair: pair[1].energy):
@@ -278,7 +277,7 @@ class _Hunt:
             self.offer(improved(self.best(over), over))
 
     def _adopt(self, task: Task, better: Point, over: Over) -> None:
-        """Take over a patch's angles and jumps if that lowers the energy beside what else was taken over."""
+        """Adopt a patch's angles and jumps if they lower the energy together with other adopted patches."""
         state = self._state
         trial = FreeField(
             self._instance, state.alpha, state.beta, np.where(better.p != task.p, better.p, state.p)
@@ -286,7 +285,7 @@ class _Hunt:
         inside = np.concatenate([task.free, task.free])
         trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
         if not self.large and trial.energy >= state.energy - LOWER:
-            # Others were taken over in the same patch: the angles for all of the new jumps are neither's.
+            # Other patches were adopted in the same place: the angles for all new jumps are neither's.
             trial.x = state.x
             settle(trial, self._solver, over)
         if trial.energy < state.energy - LOWER:
@@ -294,7 +293,7 @@ class _Hunt:
             self.energies.append((self.round, trial.energy))
 
     def _settle(self, over: Over) -> None:
-        """Bring angles and jumps of the whole grid up to date."""
+        """Update angles and jumps of the whole grid."""
         if self._unsettled:
             settle(self._state, self._solver, over)
             self._unsettled = False

@@ -1,8 +1,8 @@
-"""Fields to start from: the greedy one, PolyVector fields, and the best of many made one.
+"""Fields to start from: the greedy field, PolyVector fields, and a fusion of many approximate fields.
 
-Which jumps a strategy finds is a matter of luck, and another one is lucky elsewhere. So on larger grids
-hasty fields of several strategies are made one, region by region (models/field/fusion.py), first on a coarse
-grid, where they cost little; what is found there grows to the fine grid and is one of several again.
+Which strategy finds the better jumps is random, and differs between regions. So on larger grids fast
+approximate fields of several strategies are fused, region by region (models/field/fusion.py), first on a
+coarse grid, where they cost little. The result grows to the fine grid and is one of several fields again.
 """
 
 from __future__ import annotations
@@ -31,22 +31,20 @@ from .improvement import improved, settle
 _Strategy = Callable[[Instance, Over], FreeField]
 
 _SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
-_EFFORT: Final = 32768  # pixels of all hasty fields of one grid
-_LIFTED: Final = (
-    4  # fields of a coarse grid that grow to the next one: what they were made into, and the lowest
-)
-_HASTE: Final = 2  # steps of angles, and of jumps, of a hasty field
+_EFFORT: Final = 32768  # pixels of all approximate fields of one grid
+_LIFTED: Final = 4  # fields of a coarse grid that grow to the next one: their fusion, and the lowest
+_HASTE: Final = 2  # steps of angles, and of jumps, of an approximate field
 _HASTY: Final = 0.1  # relative residual of such a step
-_FAINT: Final = 1e-2  # of the polynomials of a hasty field, whose values fade away from strokes
+_FAINT: Final = 1e-2  # of the polynomials of an approximate field, whose values fade away from strokes
 
 
 @one_thread()
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """A field of low 2-norm energy, as time allows: where searches start, and `qp-fixed`'s jumps.
+    """A field of low 2-norm energy within the time, to start searches and to give `qp-fixed` its jumps.
 
-    Up to 1024 pixels the improved greedy field. On larger grids hasty fields of up to ten strategies, fewer
-    the larger the grid, and what the first field of the grid of half the resolution grows to, made one.
-    Deterministic where time does not cut it off.
+    Up to 1024 pixels it is the improved greedy field. On larger grids it fuses fast approximate fields of up
+    to ten strategies, fewer on larger grids, and a field grown from the grid of half the resolution.
+    Deterministic if time does not cut it off.
     """
     if instance.grid.size <= _SMALL:
         return improved(greedy(instance, over=over), over)
@@ -57,8 +55,8 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
     """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles.
 
-    Which hold has the best jumps depends on how much strokes contradict each other, and a fit costs little.
-    Where the time is over, the best of those that were tried.
+    The hold with the best jumps depends on how much strokes contradict each other, and a fit costs little.
+    When time is over, the best of the fields so far is returned.
     """
     best = fitted(polyvector_field(instance, hold=HOLDS[0]), over)
     for hold in HOLDS[1:]:
@@ -74,7 +72,7 @@ def _polyvector(hold: float, instance: Instance, _: Over) -> FreeField:
 
 
 def _greedy(hold: float, instance: Instance, over: Over) -> FreeField:
-    """Held less, strokes that contradict each other leave fewer vortices."""
+    """The greedy field of a hold: with a smaller hold, contradictory strokes make fewer vortices."""
     light = rough_greedy(replace(instance, stroke_coefficient=hold * instance.stroke_coefficient), over)
     return FreeField(instance, light.alpha, light.beta, light.p)
 
@@ -91,11 +89,11 @@ _STRATEGIES: Final[tuple[_Strategy, ...]] = (
     partial(_polyvector, 100.0),
     partial(_greedy, 0.03),
 )
-"""Two strategies with factors of the stroke weights, those first that add most to the ones before."""
+"""Pairs of a strategy and a factor of the stroke weights, in the order of their additional benefit."""
 
 
 def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
-    """The hasty fields made one, and then they themselves: of strategies here and on coarser grids."""
+    """The fusion of approximate fields, then these fields: from strategies here and on coarser grids."""
     starts: list[FreeField] = []
     coarse = halved(instance) if instance.grid.size > _SMALL else None
     if coarse is not None:
@@ -103,18 +101,18 @@ def _best_of_many(instance: Instance, over: Over) -> list[FreeField]:
             if starts and over():
                 break
             starts.append(lifted(state.field, instance))
-            _hurry(starts[-1])
+            _settle_roughly(starts[-1])
     for strategy in _STRATEGIES[: max(1, _EFFORT // instance.grid.size)]:
         if starts and over():
             break
         starts.append(strategy(instance, over))
-        _hurry(starts[-1])
+        _settle_roughly(starts[-1])
     starts.sort(key=_of_state)
     return [_together(starts, over), *starts]
 
 
-def _hurry(state: FreeField) -> None:
-    """Bring angles and jumps up to date, enough to compare regions: what is smooth needs no comparison."""
+def _settle_roughly(state: FreeField) -> None:
+    """Update angles and jumps, accurately enough to compare regions; the smooth part needs no comparison."""
     bounds = free_bounds(state.instance)
     for _ in range(_HASTE):
         energy = energy_at(state.instance, state.p)
@@ -123,7 +121,7 @@ def _hurry(state: FreeField) -> None:
 
 
 def _together(states: list[FreeField], over: Over) -> FreeField:
-    """The first and lowest field with the regions of others that lower it, settled."""
+    """The first and lowest field, settled, with the regions of others that lower it."""
     best = states[0].field
     for other in states[1:]:
         if over():

@@ -1,7 +1,8 @@
-"""Iterated local search over the jumps of a patch: kick, go down the valley, keep what is lower.
+"""Iterated local search over the jumps of a patch: perturb, descend, keep lower points.
 
-After a kick the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989): the best change of one jump
-at every step, uphill too, but none of a jump that has just changed, unless that is the lowest point so far.
+After a perturbation the walk is a short tabu search (Glover, ORSA J. Computing 1, 1989). Every step makes the
+best change of one jump, uphill too, but not of a jump that has just changed, unless that gives a new lowest
+point.
 """
 
 from __future__ import annotations
@@ -17,24 +18,24 @@ from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from ..smooth.systems import one_thread
-from .kicks import Change, Kicks
 from .landscape import STEPS, Landscape, Patch, Point
+from .perturbations import Change, Perturbations
 
 LOWER: Final = 1e-7
 """Energy by which a field has to be lower to count as better: less may be rounding."""
 
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
 _MOST_STEPS: Final = 1000  # of a walk; 5 to 60 are usual
-_REST: Final = (4, 12)  # changes for which a jump stays as it is once it has changed
+_REST: Final = (4, 12)  # changes for which a jump stays fixed once it has changed
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A patch to explore, from a field on.
+    """A patch to explore from a field.
 
     x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the patch,
-    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); kicks: how many to
-    try; seed: of their choice; deadline: when to end.
+    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); perturbations:
+    how many to try; seed: of their choice; deadline: when to end.
     """
 
     instance: Instance
@@ -42,15 +43,15 @@ class Task:
     p: Ints
     free: Bools
     curve: Ints
-    kicks: int
+    perturbations: int
     seed: tuple[int, ...]
     deadline: Deadline
 
 
 class Explored(NamedTuple):
-    """The point of least energy, the task's outside the patch; None when none was 1e-7 lower.
+    """The point of least energy, with the task's values outside the patch; None if none was 1e-7 lower.
 
-    whole: whether all kicks were tried; if not, the clock has had a say in the point.
+    whole: whether all perturbations were tried; if not, the point depends on the clock.
     """
 
     better: Point | None
@@ -58,10 +59,10 @@ class Explored(NamedTuple):
 
 
 def explore(task: Task) -> Explored:
-    """What was found in a patch; energies are those of the definition, within all bounds of the angles.
+    """Explore a patch; energies follow their definition, within all bounds of the angles.
 
-    The same task gives the same field unless its deadline cuts it off: on one thread, for the sums of several
-    threads end in other digits.
+    The same task gives the same field unless its deadline cuts it off. It runs on one thread, because sums
+    over several threads end in other digits.
     """
     with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
@@ -72,14 +73,14 @@ def _explore(task: Task, over: Over) -> Explored:
     rng = np.random.default_rng(task.seed)
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
-    home, kicks = land.saved(), Kicks(patch, task.curve)
+    home, perturbations = land.saved(), Perturbations(patch, task.curve)
     alpha, beta = np.split(task.x, 2)
     given = CrossField(task.instance, alpha, beta, task.p).energy().total
-    # Solved in the patch alone the angles may be lower already; jumps have to do better than that.
+    # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(given, land.point.energy)
     best: Point | None = None
-    for _ in range(task.kicks if len(patch.pairs) else 0):
-        lower = _kicked(land, kicks.draw(rng, land.p), rng, home.energy - LOWER, over)
+    for _ in range(task.perturbations if len(patch.pairs) else 0):
+        lower = _perturbed(land, perturbations.draw(rng, land.p), rng, home.energy - LOWER, over)
         if lower is not None and lower.point.energy < least - LOWER:
             land, home, best = lower, lower.saved(), lower.point
             least = best.energy
@@ -90,23 +91,23 @@ def _explore(task: Task, over: Over) -> Explored:
     return Explored(best, whole=not over())
 
 
-def _kicked(
-    land: Landscape, kick: Change, rng: np.random.Generator, goal: float, over: Over
+def _perturbed(
+    land: Landscape, perturbation: Change, rng: np.random.Generator, goal: float, over: Over
 ) -> Landscape | None:
-    """The landscape at the lowest point below `goal` of the walk after a kick, anew:
-    rounding of many updates must not add up.
+    """The landscape at the lowest point below `goal` of the walk after a perturbation, computed anew.
 
-    None when there is no such point, or none that can be computed.
+    Rounding of many updates must not accumulate. None when there is no such point, or none that can be
+    computed.
     """
     with suppress(np.linalg.LinAlgError):
-        land.change(*kick)
+        land.change(*perturbation)
         jumps = _walk(land, rng, goal, over)
         return None if jumps is None else Landscape(land.patch, land.angles, jumps)
     return None
 
 
 def _walk(land: Landscape, rng: np.random.Generator, goal: float, over: Over) -> Ints | None:
-    """The jumps (m,) of the lowest point below `goal` of a walk from where the landscape stands."""
+    """The jumps (m,) of the lowest point below `goal` of a walk from the landscape's present state."""
     resting = np.zeros(len(land.patch.pairs), dtype=np.int64)
     low, found = land.energy, None
     fruitless = 0

@@ -1,8 +1,8 @@
-"""Reading bitmaps: ink on paper, and stroke directions by a structure tensor.
+"""Reader of bitmaps: ink on paper, and stroke directions by a structure tensor.
 
-Any paper that is lighter than the strokes will do, and any light on it: its level is taken from the picture,
-place by place where the light is uneven. Directions are found at the picture's own resolution and then
-averaged over grid pixels by the double angle, weighted by darkness and coherence, so that junctions and
+The paper may have any colour lighter than the strokes, and any light on it: its level is taken from the
+picture, place by place where the light is uneven. Directions are found at the picture's own resolution and
+then averaged over grid pixels by the double angle, weighted by darkness and coherence, so that junctions and
 corners drop out (docs/mathematics.md, 1).
 """
 
@@ -29,21 +29,21 @@ from .tiff import unpacked
 Ink = NDArray[np.float32]
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
-"""What is read: formats that Pillow decodes by itself, without starting other programs."""
-_ENOUGH: Final = 8  # picture pixels to a grid pixel; finer pictures are averaged down by whole factors first
+"""Formats that Pillow decodes by itself, without starting other programs."""
+_ENOUGH: Final = 8  # picture pixels per grid pixel; finer pictures are averaged down by whole factors first
 _WORKING_SIDE: Final = 2048
 _DARKEST_PAPER: Final = 64.0  # of 255
 _LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
-_SHADOW: Final = 0.1  # of the longer side: what is darker and wider is a shadow, not ink
-_DARKEST_SHADOW: Final = 0.25  # of the paper's level: what is darker and wide is solid ink after all
-_EVEN: Final = 1.05  # light that differs by less is even, and the picture stays what it is
+_SHADOW: Final = 0.1  # of the longer side: darker and wider regions are shadows, not ink
+_DARKEST_SHADOW: Final = 0.25  # of the paper's level: darker and wide regions are solid ink after all
+_EVEN: Final = 1.05  # light that differs by less counts as even, and the picture is not changed
 _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
-_BAND: Final = 1 << 20  # pixels of a picture that are looked at together
+_BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
-_COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are told apart
+_COLOUR_SHARE: Final = 0.03  # of all ink, for red and for other strokes, before the two are separated
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Picture:
 
     ink: float32 [h, w] in [0, 1], 0 = paper, 1 = as dark as the strokes of the picture.
     red: float32 [h, w] in [0, 1], the part of the ink that is red.
-    reduced: how many pixels of the file make one of these arrays in each direction.
+    reduced: pixels of the file per pixel of these arrays in each direction.
     width, height: size of the file in pixels.
     """
 
@@ -75,20 +75,20 @@ class Picture:
     def stroke_width(self) -> float:
         """Typical width of a stroke in pixels of the arrays, at least 1: twice area over length of edges."""
         down, right = np.diff(self.ink, axis=0) ** 2, np.diff(self.ink, axis=1) ** 2
-        # Mean of the two differences along each axis of a 2 x 2 block: the same however the picture is
-        # turned.
+        # Mean of the two differences along each axis of a 2 x 2 block: equal for every orientation of the
+        # picture.
         edges = float(np.sqrt((down[:, :-1] + down[:, 1:] + right[:-1] + right[1:]) / 2).sum())
         return max(1.0, 2 * float(self.ink.sum()) / edges) if edges > 0 else 1.0
 
     def covers(self, frame: Frame) -> tuple[Cover, Cover]:
-        """The cover by curvature lines and by other strokes, told apart where red and others occur."""
+        """The cover by curvature lines and by other strokes, separated where red and others occur."""
         share = float((self.ink * self.red).sum() / self.ink.sum())
         if not _COLOUR_SHARE < share < 1 - _COLOUR_SHARE:
             return self._cover(self.ink, frame), Cover(np.zeros(frame.shape), np.zeros((*frame.shape, 2)))
         return self._cover(self.ink * self.red, frame), self._cover(self.ink * (1 - self.red), frame)
 
     def ends(self) -> Floats:
-        """Where thin strokes end, in pixels of the file: points and ways out (n, 2, 2), as (x, y)."""
+        """Ends of thin strokes, in pixels of the file: points and ways out (n, 2, 2), as (x, y)."""
         return self.reduced * ink_ends(self.ink, self.stroke_width)
 
     def _cover(self, ink: Ink, frame: Frame) -> Cover:
@@ -124,14 +124,14 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
 def read_picture(data: bytes, size: int) -> Picture:
     """The ink of a bitmap, fine enough for a grid of `size` pixels.
 
-    Raises InputError when the bytes are no picture, are cut off, declare absurd dimensions, or show only
+    Raises InputError when the bytes are not a picture, are cut off, declare absurd dimensions, or show only
     paper, or ink on half of it.
     """
     image = _opened(data)
     width, height = image.size
     reduced = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
     pixels = np.concatenate([_reduced(band, reduced) for band in _bands(image, reduced)])
-    del image  # of all that is held at any time its pixels are the most
+    del image  # the file's pixels take the most memory at any time
     rgb = _on_paper(pixels)
     raw = ink_of(rgb)
     strongest = float(raw.max())
@@ -152,7 +152,7 @@ def read_picture(data: bytes, size: int) -> Picture:
 
 
 def read_white(data: bytes) -> Bools:
-    """The white part of a mask picture, bool [h, w]. Raises InputError as read_picture."""
+    """The white part of a mask picture, bool [h, w]. Raises InputError like read_picture."""
     image = _opened(data)
     white = np.empty(image.size[::-1], dtype=bool)
     top = 0
@@ -163,7 +163,7 @@ def read_white(data: bytes) -> Bools:
 
 
 def _opened(data: bytes) -> Any:
-    """The decoded picture, upright. Its size is looked at before its pixels."""
+    """The decoded picture, upright. Its size is checked before its pixels."""
     from PIL import Image, ImageOps
 
     with warnings.catch_warnings():
@@ -200,8 +200,9 @@ def _short(error: Exception) -> str:
 
 
 def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
-    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows:
-    colours of all pixels at once would take many times the memory of the picture.
+    """The picture on white as uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows.
+
+    Colours of all pixels at once would take many times the memory of the picture.
     """
     width, height = image.size
     rows = max(1, _BAND // (width * multiple)) * multiple
@@ -211,7 +212,7 @@ def _bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
 
 
 def _white(image: Any, bands: list[tuple[int, int, int, int]]) -> float | None:
-    """The value of white in pictures of 16 bit and floating point greys, None in others.
+    """The value of white in pictures of 16 bit and floating point greys, None for other pictures.
 
     Raises InputError for values that are not finite.
     """
@@ -243,7 +244,7 @@ def _eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
 
 
 def _reduced(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
-    """The means over blocks of so many rows and columns."""
+    """The means over blocks of that many rows and columns."""
     from PIL import Image
 
     if factor == 1:
@@ -268,12 +269,12 @@ def _on_paper(pixels: NDArray[np.uint8]) -> Floats:
 
 
 def _light(colours: Floats) -> Ink:
-    """The light on the paper [h, w], 1 where it is that of the whole picture.
+    """The light on the paper [h, w], 1 where it equals the light of the whole picture.
 
-    colours: [h, w, 1 or 3] relative to the paper of the whole. The lighter surroundings close over what is
-    darker and narrower than _SHADOW, so that strokes vanish while shadows stay, be they gradual or sharp
-    (grey closing by a square: the work is linear). Light is found on blocks of pixels whose mean is taken
-    first, which takes noise away, and lies between them on straight lines.
+    colours: [h, w, 1 or 3] relative to the paper of the whole. A grey closing by a square lets lighter
+    surroundings cover darker regions narrower than _SHADOW, in linear time. So strokes vanish while shadows
+    stay, whether gradual or sharp. Light is found on blocks of pixels whose mean is taken first, which
+    removes noise, and interpolated linearly between them.
     """
     from scipy import ndimage
 
@@ -292,7 +293,7 @@ def _light(colours: Floats) -> Ink:
 
 
 def _between(rows: Ink, place: Floats) -> Ink:
-    """Rows at fractional places, on straight lines between those of an array."""
+    """Rows at fractional places, interpolated linearly between the rows of an array."""
     below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
     above = np.minimum(below + 1, len(rows) - 1)
     part = (place - below).astype(np.float32)[:, None]
@@ -311,7 +312,7 @@ def _specks(ink: Ink) -> Bools:
 
 
 def _red_part(rgb: Floats, ink: Floats) -> Ink:
-    """1 where the blurred ink is red, else 0: in JPEG colour is coarser than brightness."""
+    """1 where the blurred ink is red, else 0: colour is coarser than brightness in JPEG."""
     from scipy import ndimage
 
     if rgb.shape[-1] == 1:

@@ -1,7 +1,7 @@
-"""Gaps in an outline: where strokes end, and the short bridges that close one.
+"""Gaps in an outline: ends of strokes, and the short bridges that close gaps.
 
 A drawing's outline is seldom drawn without a break. A bridge is a straight line between two ends of strokes,
-or from an end on to the next stroke; it is kept only where it closes off room that would be open without it
+or from an end to the next stroke; it is kept only if it closes off room that would be open without it
 (`closing`).
 """
 
@@ -21,32 +21,32 @@ from .outline import enclosed, place
 Indices = NDArray[np.intp]
 
 LONGEST: Final = 0.08
-"""Longest bridge, in parts of the grid's longer side: with a wider gap a drawing is meant to be open."""
+"""Longest bridge, as a share of the grid's longer side: with a wider gap a drawing is meant to be open."""
 WIDER: Final = 0.7
-"""Least side of the square as large as what a bridge closes off, in pixels that the bridge takes.
+"""Least side of a square as large as the room that a bridge closes off, relative to the bridge's pixels.
 
-A line takes up to 1 / 0.7 pixels for each that it is long: the room behind a gap is as wide as the gap.
+A line takes up to 1 / 0.7 pixels per unit of its length: the room behind a gap is as wide as the gap.
 """
 AHEAD: Final = 0.5
 ASIDE: Final = -0.1
-"""Least cosines of the turns from the one stroke and from the other into the bridge: 60 and 96 degrees.
+"""Least cosines of the turns from the two strokes into the bridge: 60 and 96 degrees.
 
-A gap may take a corner away, or begin at one.
+A corner may lie in a gap, or at its beginning.
 """
-_TAIL: Final = 11  # pixels round the end of a thinned line that tell where it would go on
-_NEAREST: Final = 8  # other ends that an end may be bridged to: the work stays linear
+_TAIL: Final = 11  # pixels round the end of a thinned line that determine its continuation
+_NEAREST: Final = 8  # most other ends that an end may be bridged to: the work stays linear
 _THINNED: Final = 512  # pixels on the longer side of a bitmap while its ends are sought
 _SAME: Final = 1e-6  # of the longer side: ends that lie closer together are one point
 _INK: Final = 0.3
-_MOST_BRIDGES: Final = 10_000  # the shortest ones: the work has a bound
-_MOST_TRIED: Final = 32  # bridges that are tried whether the others do without them
+_MOST_BRIDGES: Final = 10_000  # only the shortest: the work has a bound
+_MOST_TRIED: Final = 32  # bridges that are tested for being unnecessary
 _MOST_PLACES: Final = 5  # in one warning
 
 
 def curve_ends(points: Floats) -> Floats:
-    """Where one piece alone of all cubics (k, 4, 2) begins or ends: point and way out, (n, 2, 2).
+    """Ends of single pieces of all cubics (k, 4, 2): point and way out, (n, 2, 2).
 
-    The way out is the direction (x, y) in which the curve would go on, of any length.
+    The way out is the direction (x, y) of the curve's continuation, of any length.
     """
     ends = np.concatenate([points[:, 0], points[:, 3]])
     inside = np.concatenate([points[:, 1:], points[:, 2::-1]])
@@ -59,10 +59,10 @@ def curve_ends(points: Floats) -> Floats:
 
 
 def ink_ends(ink: NDArray[np.float32], width: float) -> Floats:
-    """Where thin strokes end: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y).
+    """Ends of thin strokes: point in pixels of `ink` [h, w] and way out, (n, 2, 2), as (x, y).
 
     width: of a stroke in pixels. The ink is thinned to lines of one pixel; a line ends at a pixel that has a
-    single neighbour. A stroke goes on for half its width beyond, which is far below the gaps that count.
+    single neighbour. A stroke extends half its width further, which is far below the gaps that count.
     """
     from scipy import ndimage
 
@@ -98,7 +98,7 @@ def thinned(shape: Bools) -> Bools:
 
 
 def _removable(line: Bools, *, first: bool) -> Bools:
-    """The pixels of a padded shape that one of the two passes of the thinning takes away."""
+    """The pixels of a padded shape that one of the two passes of the thinning removes."""
     # Neighbours from the upper one on, clockwise.
     steps = ((0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0))
     height, width = line.shape
@@ -115,10 +115,10 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
     """The walls with the bridges that close an outline, and those bridges, (m, 2, 2) with x and y.
 
     walls: bool [height, width], pixels that strokes cover. ends: (n, 2, 2), points and ways out. A bridge
-    leads from an end that lies at the outside to another such, or on to the next stroke. It is at most
-    LONGEST, and no longer than the connected strokes at its ends reach; it goes on where they end (AHEAD,
-    ASIDE), and closes off room as wide as the gap (WIDER). Walls that enclose all the room that they can come
-    back as they are.
+    leads from an end at the outside to another such end, or to the next stroke. It is at most
+    LONGEST, and no longer than the extents of the connected strokes at its ends. It continues them (AHEAD,
+    ASIDE), and closes off room as wide as the gap (WIDER). Walls that already enclose all possible room are
+    returned unchanged.
     """
     outside = ~enclosed(walls)
     bridges = _candidates(walls, outside, ends, frame)
@@ -134,7 +134,7 @@ def closing(walls: Bools, ends: Floats, frame: Frame) -> tuple[Bools, Floats]:
 
 
 def opened(openings: Floats) -> tuple[str, ...]:
-    """A warning of the gaps (m, 2, 2) in the outline that were bridged, or none."""
+    """A warning about the gaps (m, 2, 2) in the outline that were bridged, or none."""
     if not len(openings):
         return ()
     wide = vector_length(*(openings[:, 1] - openings[:, 0]).T)
@@ -154,7 +154,7 @@ def as_points(segments: Floats) -> tuple[tuple[Point, Point], ...]:
 
 
 def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
-    """How far (n,) the connected strokes reach that are at or beside these pixels, in pixels."""
+    """Extents (n,) in pixels of the connected strokes that are at or next to these pixels."""
     from scipy import ndimage
 
     label, _ = ndimage.label(walls, np.ones((3, 3), dtype=bool))
@@ -164,7 +164,7 @@ def _extents(walls: Bools, row: Indices, column: Indices) -> Floats:
 
 
 def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Floats:
-    """The lines (m, 2, 2) from ends that lie at the outside to other such ends, or on to the next stroke."""
+    """The lines (m, 2, 2) from ends at the outside to other such ends, or to the next stroke."""
     from scipy import ndimage
 
     place = np.floor((ends[:, 0] - (frame.x, frame.y)) / frame.pixel).astype(np.int64)
@@ -174,15 +174,15 @@ def _candidates(walls: Bools, outside: Bools, ends: Floats, frame: Frame) -> Flo
     on_grid = (ends[open_there] - [(frame.x, frame.y), (0.0, 0.0)]) / frame.pixel
     first = slice(_MOST_BRIDGES)
     on = _prolonged(walls, on_grid[first], longest[first]) * frame.pixel + (frame.x, frame.y)
-    # Of two that do the same the later one is kept: that between two ends.
+    # Of two equivalent lines the later one is kept, which is between two ends.
     lines: Floats = np.concatenate([on, _between(ends[open_there], longest * frame.pixel)])
     return lines
 
 
 def _between(ends: Floats, longest: Floats) -> Floats:
-    """The straight lines (m, 2, 2) from each end to those near it that lie ahead, each once.
+    """The straight lines (m, 2, 2) from each end to the ends near and ahead of it, each once.
 
-    longest: (n,), what a line from each of the ends may be long.
+    longest: (n,), greatest length of a line from each end.
     """
     from scipy.spatial import KDTree
 
@@ -207,9 +207,9 @@ def _between(ends: Floats, longest: Floats) -> Floats:
 
 
 def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
-    """The straight lines (m, 2, 2) on which strokes that go on would meet another stroke, all in pixels.
+    """The straight continuations (m, 2, 2) of strokes up to another stroke, all in pixels.
 
-    ends: (n, 2, 2), points and ways out; longest: (n,), what each line may be long.
+    ends: (n, 2, 2), points and ways out; longest: (n,), greatest length of each line.
     """
     point, out = ends[:, 0], ends[:, 1]
     unit = out / np.maximum(vector_length(*out.T), np.finfo(float).tiny)[:, None]
@@ -228,7 +228,7 @@ def _prolonged(walls: Bools, ends: Floats, longest: Floats) -> Floats:
 
 
 def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices) -> Bools:
-    """The walls and the pixels (bridge, row, column) of those bridges that are kept."""
+    """The walls and the pixels (bridge, row, column) of the bridges that are kept."""
     bridge, row, column = pixels
     drawn = np.isin(bridge, kept)
     closed = walls.copy()
@@ -237,7 +237,7 @@ def _with(walls: Bools, pixels: tuple[Indices, Indices, Indices], kept: Indices)
 
 
 def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple[Bools, Bools]:
-    """The room that bridges at these pixels close off, where it is as wide as the gaps to it, and those gaps.
+    """The room that bridges at these pixels close off, where it is as wide as its gaps, and those gaps.
 
     Both bool [height, width]; the gaps are the bridges' pixels between room and outside.
     """
@@ -252,7 +252,7 @@ def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple
     row, column = np.nonzero(mouths)
     near = np.pad(label, 1)
     room = np.sort([near[row + down, column + right] for down in range(3) for right in range(3)], axis=0)
-    room[1:][np.diff(room, axis=0) == 0] = 0  # each pixel once for each room
+    room[1:][np.diff(room, axis=0) == 0] = 0  # each pixel once per room
     mouth = np.bincount(room.ravel(), minlength=count + 1)
     wide = np.bincount(label.ravel(), minlength=count + 1) >= np.maximum(4, (WIDER * mouth) ** 2)
     wide[0] = False
@@ -260,7 +260,7 @@ def _rooms(walls: Bools, outside: Bools, row: Indices, column: Indices) -> tuple
 
 
 def _needed(walls: Bools, rooms: Bools, mouths: Bools, pixels: tuple[Indices, Indices, Indices]) -> Indices:
-    """The numbers of few bridges that enclose these rooms, those nearest to the outside before others."""
+    """The numbers of few bridges that enclose these rooms, preferring bridges near the outside."""
     from scipy import ndimage
 
     bridge, row, column = pixels

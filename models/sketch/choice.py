@@ -1,7 +1,7 @@
-"""What of a drawing is a curvature line, where more is known than its colours say.
+"""Selection of curvature lines of a drawing by labels, beyond its colours.
 
-Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. What
-stands in a group has the labels of the group too. The strokes that are not chosen cut the field.
+Strokes are chosen by labels: `colour=`, `class=`, `id=` and `layer=` in SVG, `cluster=` in .scap. Elements in
+a group have the labels of the group too. The strokes that are not chosen cut the field.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..errors import InputError, printable, shortened
 
 Silhouette = Literal["none", "outer"]
 KINDS: Final = ("colour", "class", "id", "layer", "cluster")
-"""What strokes can be chosen by."""
+"""Kinds of labels by which strokes can be chosen."""
 _FEW: Final = 4  # labels of each kind that an error lists
 _LONGEST: Final = 40  # characters of each of them there
 _SEEN_FROM: Final = ", seen from "
@@ -23,12 +23,12 @@ _EXAMPLES: Final = "colour=red, class=flow, id=group2, layer=Flow or cluster=3"
 
 @dataclass(frozen=True)
 class Choice:
-    """Which strokes of a drawing are curvature lines, and from where a drawing in space is seen.
+    """Which strokes of a drawing are curvature lines, and the view of a drawing in space.
 
-    silhouette: "outer": what runs along the outline of the drawing carries no direction; "none": all
-    curvature lines count. curvature: labels such as "class=flow", of which each curvature line has one; none:
-    the drawing's colours decide. view: of a .curves file, as in `read_curves`; None: by its principal axes.
-    Raises InputError for what is none of these.
+    silhouette: "outer": lines along the outline of the drawing carry no direction; "none": all
+    curvature lines count. curvature: labels such as "class=flow"; a curvature line has one of them. Without
+    labels the drawing's colours decide. view: of a .curves file, as in `read_curves`; None: by its principal
+    axes. Raises InputError for other values.
     """
 
     silhouette: Silhouette = "none"
@@ -36,7 +36,7 @@ class Choice:
     view: str | None = None
 
     def __post_init__(self) -> None:
-        """Check what can be checked without a drawing."""
+        """Check the values that do not depend on a drawing."""
         if self.silhouette not in get_args(Silhouette):
             known = " or ".join(get_args(Silhouette))
             raise InputError(f"there is no silhouette {shortened(self.silhouette)!r}; choose {known}")
@@ -44,24 +44,24 @@ class Choice:
 
     @property
     def chooser(self) -> Chooser | None:
-        """A fresh look-out for the chosen labels, None when the drawing's colours decide."""
+        """A new matcher for the chosen labels, None when the drawing's colours decide."""
         return Chooser(frozenset(self.curvature)) if self.curvature else None
 
     def source(self, file: str) -> str:
         """Source of an instance read from a file of that name: one printable line, with the view if any.
 
-        `view_in` reads the view back, so that the file can be seen from the same side again.
+        `view_in` recovers the view, so that the file can be seen from the same side again.
         """
         seen = "" if self.view is None else f"{_SEEN_FROM}{self.view}"
         return printable(f"{file}{seen}")
 
     def refuse_labels(self, what: str) -> None:
-        """Nothing, or InputError when strokes are chosen in something that has no labels."""
+        """Raise InputError if strokes are chosen in a sketch without labels."""
         if self.curvature:
             raise InputError(f"{what}; leave the choice of {self.curvature[0]} out")
 
     def refuse_view(self) -> None:
-        """Nothing, or InputError when a view is chosen of something flat."""
+        """Raise InputError if a view is chosen for a flat sketch."""
         if self.view is not None:
             raise InputError(
                 f"is flat: only a .curves file can be seen from {shortened(self.view)}; give one, or leave "
@@ -75,12 +75,12 @@ def view_in(source: str) -> str | None:
 
 
 AS_DRAWN: Final = Choice()
-"""All that is drawn in red, or in the only colour there is."""
+"""Selects everything drawn in red, or in the only colour."""
 
 
 @dataclass(eq=False)
 class Chooser:
-    """A look-out for labels while a drawing is read.
+    """A matcher of labels while a drawing is read.
 
     wanted: the labels of curvature lines. found: those of them that the drawing has; seen: a few of all.
     """
@@ -90,7 +90,7 @@ class Chooser:
     seen: dict[str, list[str]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
 
     def takes(self, labels: Iterable[str]) -> bool:
-        """Whether one of the labels is wanted; all of them are noted."""
+        """Whether one of the labels is wanted; all of them are recorded."""
         taken = False
         for label in labels:
             some = self.seen[label.partition("=")[0]]
@@ -102,7 +102,7 @@ class Chooser:
         return taken
 
     def check(self, *, taken: bool) -> None:
-        """Nothing, or InputError when a wanted label is nowhere, or on nothing that is drawn.
+        """Raise InputError if a wanted label is missing, or only on elements that draw nothing.
 
         taken: whether a stroke was chosen.
         """
@@ -115,7 +115,7 @@ class Chooser:
 
 
 def label_of(selector: str) -> str:
-    """The label that a selector such as "colour=red" names; colours as #rrggbb. Raises InputError."""
+    """The label that a selector such as "colour=red" denotes; colours as #rrggbb. Raises InputError."""
     kind, _, value = (part.strip() for part in selector.partition("="))
     kind = "colour" if kind == "color" else kind
     if kind not in KINDS or not value:
@@ -129,11 +129,11 @@ def colour_label(rgb: tuple[float, float, float]) -> str:
 
 
 def _of_colour(colour: str) -> str:
-    """The label of a colour that has a name or is written as in CSS. Raises InputError for what is none."""
+    """The label of a colour by its name or CSS notation. Raises InputError for other text."""
     from PIL import ImageColor
 
     try:
         red, green, blue = (min(channel, 255) / 255 for channel in ImageColor.getrgb(colour)[:3])
     except ValueError as error:
-        raise InputError(f"{shortened(colour)!r} is no colour; write a name or #rrggbb") from error
+        raise InputError(f"{shortened(colour)!r} is not a colour; write a name or #rrggbb") from error
     return colour_label((red, green, blue))

@@ -1,4 +1,4 @@
-"""Which colours are strokes, and which strokes are red, on white paper.
+"""Recognition of strokes, and of red strokes, by colour on white paper.
 
 Designers mark curvature lines in red and draw silhouettes and creases in black (docs/mathematics.md, 1).
 """
@@ -12,7 +12,7 @@ import numpy as np
 from ..instance.grid import Bools, Floats
 
 PAPER: Final = 0.1
-"""Ink below this is paper."""
+"""Ink below this counts as paper."""
 REDDISH: Final = 0.4
 """Least share of a stroke's ink that must be missing from green and blue alone."""
 
@@ -24,7 +24,7 @@ def ink_of(rgb: Floats) -> Floats:
 
 
 def redness(rgb: Floats) -> Floats:
-    """How much red ink a colour holds, (...,): red - max(green, blue), less orange and purple."""
+    """Amount of red ink in a colour, (...,): red - max(green, blue), less orange and purple."""
     red, green, blue = np.moveaxis(rgb, -1, 0)
     excess: Floats = np.maximum(red - np.maximum(green, blue) - np.abs(green - blue) / 2, 0)
     return excess

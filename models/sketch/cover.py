@@ -1,6 +1,6 @@
-"""Strokes on the pixel grid: how much of each pixel they cover and in which direction.
+"""Strokes on the pixel grid: their cover of each pixel, and its direction.
 
-Sketches have y down, instances have y up; this is where the one becomes the other.
+Sketches have y down, instances have y up; this module converts between them.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ Indices = NDArray[np.intp]
 Pixels = NDArray[np.float64] | NDArray[np.float32] | NDArray[np.uint8]
 
 MARGIN: Final = 0.04
-"""Empty border round a drawing, in parts of its longer side; at least one pixel."""
+"""Empty border round a drawing, as a share of its longer side; at least one pixel."""
 LEAST_R: Final = 0.5
 """Least R of a pixel with a direction.
 
-Two lines at an angle d, half and half, have R = |cos d| and a mean that is neither of them; a single line
-that bends by as much as a right angle inside the pixel still has R = 0.64.
+Two lines at an angle d in equal parts have R = |cos d| and a mean that is neither of them; a single line
+that bends by a right angle inside the pixel still has R = 0.64.
 """
-_NUDGE: Final = 1e-9  # of a pixel: what runs exactly along a pixel edge is shared by both sides
+_NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the grid lies on the sketch: top left (x, y), side of a pixel, rows, columns; y down."""
+    """Position of the grid on the sketch: top left (x, y), side of a pixel, rows, columns; y down."""
 
     x: float
     y: float
@@ -56,7 +56,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """What one kind of stroke does on each pixel.
+    """Cover of each pixel by one kind of stroke.
 
     amount: float [height, width], length of stroke in pixel sides; 1 = one stroke straight across.
     direction: float [height, width, 2], mean double-angle vector (y up) weighted by length; its length R is 1
@@ -95,7 +95,7 @@ def fit_frame(box: tuple[float, float, float, float], size: int, *, margin: bool
 def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
     """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges.
 
-    Raises InputError when they would fall into more than MAX_PIECES pieces.
+    Raises InputError if there would be more than MAX_PIECES pieces.
     """
     cut = _cut(segments, frame)
     unit = cut.unit
@@ -113,7 +113,7 @@ def covering_curves(
     """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
 
     curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
-    `least` pixel sides and more; where no curve reaches that, the longest one does.
+    `least` pixel sides and more; without such a curve the longest one counts.
     """
     cut = _cut(segments, frame)
     number, size = curve[cut.segment].astype(np.int64), frame.height * frame.width
@@ -153,7 +153,7 @@ def _cut(segments: Floats, frame: Frame) -> _Cut:
 
 
 def _clipped(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
-    """The parts of segments (in pixels) that lie on the grid, and their numbers; the others are left out."""
+    """The parts of segments (in pixels) that lie on the grid, and their numbers; others are dropped."""
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     limit = np.array([frame.width, frame.height], dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -201,7 +201,7 @@ def _binned(points: Floats, values: Floats, frame: Frame) -> Floats:
 
 
 def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
-    """Numbers of the pixels, row by row, at those of the points (m, 2) that are on the grid; which are."""
+    """Numbers of the pixels, row by row, at the points (m, 2) on the grid, and which points these are."""
     column, row = np.floor(points).astype(np.int64).T
     kept = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
     return row[kept] * frame.width + column[kept], kept
@@ -210,7 +210,7 @@ def _cells(points: Floats, frame: Frame) -> tuple[Indices, Bools]:
 def block_means(image: Pixels, rows: Floats, columns: Floats) -> Floats:
     """Exact area means of a picture [h, w, ...] over the cells between fractional row and column edges.
 
-    Cells reach over whole and parts of pixels alike; beyond the picture there is 0.
+    Cells cover whole pixels and parts of pixels; values outside the picture are 0.
     """
     means = _strip_means(np.moveaxis(_strip_means(image, rows), 1, 0), columns)
     return np.moveaxis(means, 1, 0)

@@ -20,10 +20,10 @@ class Curves:
     """The strokes of a vector sketch in its own units, x to the right and y **down**.
 
     points: float (k, 4, 2), control points of cubic Beziers; straight lines have theirs at the thirds.
-    curve: int (k,), number of the curve that each of them is a piece of, from 0 in the order of the file.
+    curve: int (k,), number of the curve that contains each of them, from 0 in the order of the file.
     red: bool (k,), True where a stroke is drawn in red.
-    canvas: x, y, width and height of the page, or None when the file does not say.
-    chosen: bool (k,), True where a stroke was chosen as a curvature line, or None when nothing was chosen.
+    canvas: x, y, width and height of the page, or None if the file does not state it.
+    chosen: bool (k,), True where a stroke was chosen as a curvature line, or None without a choice.
     """
 
     points: Floats
@@ -34,7 +34,7 @@ class Curves:
 
     @property
     def line(self) -> Bools:
-        """Which (k,) are curvature lines: those chosen, else red ones among others, else all."""
+        """Which (k,) are curvature lines: the chosen ones, else red ones among others, else all."""
         if self.chosen is not None:
             return self.chosen
         mixed = self.red.any() and not self.red.all()
@@ -49,7 +49,7 @@ def lines_as_cubics(start: Floats, end: Floats) -> Floats:
 
 
 def runs(points: Floats, shape: Ints) -> Ints:
-    """The number (k,), from 0, of the unbroken run of one shape that each cubic (k, 4, 2) is a piece of.
+    """The number (k,), from 0, of the unbroken run of one shape that contains each cubic (k, 4, 2).
 
     shape: int (k,), equal for all pieces of a shape. A run ends where the next piece starts elsewhere.
     """
@@ -59,10 +59,10 @@ def runs(points: Floats, shape: Ints) -> Ints:
 
 
 def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]:
-    """Segments (m, 2, 2) within `tolerance` of the curves (k, 4, 2); the curve (m,) of each.
+    """Segments (m, 2, 2) within `tolerance` of the curves (k, 4, 2), and the curve (m,) of each.
 
-    A cubic cut into n equal steps is off by at most 3/4 M / n^2, with M the longer second difference of its
-    control points, because |B''| <= 6 M. Raises InputError when that needs more than MAX_SEGMENTS.
+    A cubic cut into n equal steps deviates by at most 3/4 M / n^2, with M the longer second difference of its
+    control points, because |B''| <= 6 M. Raises InputError for more than MAX_SEGMENTS segments.
     """
     bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
     steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)

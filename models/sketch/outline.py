@@ -1,4 +1,4 @@
-"""The region that a drawing encloses, for sketches that come without a mask."""
+"""The region that a drawing encloses, for sketches without a mask."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from ..instance.grid import Bools, Floats
 from .cover import Frame
 
 GAPS: Final = (0.03, 0.06, 0.12)
-"""Gaps in an outline that count as closed, in parts of the grid's longer side, tried in turn."""
+"""Gaps in an outline that count as closed, as shares of the grid's longer side, tried in turn."""
 ENCLOSED: Final = 0.25
 """Least share of the strokes' convex hull that a closed drawing fills; otherwise it is open."""
 CRUMB: Final = 0.01
-"""Least share of a region for a part of its own: a stroke that grazes the outline leaves less."""
+"""Least share of a region for a separate part: a stroke that grazes the outline cuts off less."""
 HELD: Final = 2.0
-"""Least stroke length, in pixel sides, for a part of its own: a stroke's loose end has less."""
+"""Least stroke length, in pixel sides, in a separate part: a stroke's loose end has less."""
 
 STEP: Final = 3.0
-"""How far a stroke is followed, in pixels, to see whether it runs along the outline."""
+"""Distance in pixels over which a stroke is followed to determine whether it runs along the outline."""
 
 THICKER: Final = 1.25
-"""Width of the strokes of a picture that are thicker than most."""
+"""Width of strokes of a picture that are thicker than most."""
 
-_NUDGE: Final = 1e-9  # of a pixel: what runs at exactly 30 degrees does so on every processor
+_NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
 
 BLOCK: Final = 4
-"""Side in pixels of a block that strokes fill; no sample has one from 16 pixels on."""
+"""Side in pixels of a block filled by strokes; no sample has one from 16 pixels on."""
 CROWDED: Final = 0.1
-"""Least share of the solved pixels in connected blocks that strokes fill, to be warned of."""
+"""Least share of the solved pixels in connected blocks filled by strokes that causes a warning."""
 
 OFF: Final = 0.01
-"""Least share of the solved pixels that lie more than a pixel off the page, to be warned of."""
+"""Least share of the solved pixels more than a pixel off the page that causes a warning."""
 
 
 def inside_outline(strokes: Bools) -> Bools:
     """The pixels [height, width] that cannot be reached from outside through gaps of the strokes.
 
-    The narrowest of GAPS for which the drawing encloses something decides; an open drawing, which encloses
-    next to nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
+    The narrowest of GAPS for which the drawing encloses something decides. An open drawing, which encloses
+    almost nothing at any of them, gets the full rectangle. Stroke pixels always belong to the region.
     """
     hull = _hull_area(strokes)
     for gap in GAPS:
@@ -52,10 +52,10 @@ def inside_outline(strokes: Bools) -> Bools:
 
 
 def parts_with(region: Bools, weight: Floats) -> Bools:
-    """The 4-connected parts of a region that curvature lines run through: nothing is known of the others.
+    """The 4-connected parts of a region that contain curvature lines; other parts have no data.
 
     weight: float [height, width], w of the stroke pixels and 0 elsewhere. A part needs strokes of HELD in
-    all, and must be no crumb: at least CRUMB of the region and four pixels. The part with most strokes is
+    all, at least CRUMB of the region, and four pixels. The part with most strokes is
     always kept.
     """
     from scipy import ndimage
@@ -75,9 +75,9 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
 
     direction: float [height, width, 2], double-angle vectors (y up); width: of a typical stroke, in pixels,
     some are THICKER. At the border is a pixel from which such a line can reach the outside: a line without
-    width covers two pixels side by side. A stroke runs along the border when, followed by STEP pixels to one
-    side at least, it comes nearer to or goes farther from the outside by half of that at most: 30 degrees. A
-    region without an outside, that of an open drawing, has no border.
+    width covers two adjacent pixels. A stroke is followed by STEP pixels to both sides. It runs along the
+    border if, on at least one side, its distance from the outside changes by at most half of that: 30
+    degrees. A region without an outside, as in an open drawing, has no border.
     """
     from scipy import ndimage
 
@@ -104,7 +104,7 @@ def along_outline(region: Bools, direction: Floats, width: float) -> Bools:
 
 
 def boundless(region: Bools) -> tuple[str, ...]:
-    """A warning when the region is the whole rectangle because the drawing encloses nothing, or none."""
+    """A warning if the region is the whole rectangle because the drawing encloses nothing, or none."""
     if not region.all():
         return ()
     return (
@@ -113,9 +113,9 @@ def boundless(region: Bools) -> tuple[str, ...]:
 
 
 def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
-    """A warning of the largest place where strokes leave no room between them, or none.
+    """A warning about the largest place where strokes leave no room between them, or none.
 
-    filled: bool [height, width], pixels that a stroke or ink covers for half and more.
+    filled: bool [height, width], pixels covered by a stroke or ink for half or more.
     """
     from scipy import ndimage
 
@@ -128,14 +128,14 @@ def crowded(filled: Bools, solve: Bools, frame: Frame) -> tuple[str, ...]:
     middle = np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
     warning = (
         f"strokes leave no room between them round {place(middle)}, all in all on "
-        f"{size.sum() / solve.sum():.0%} of the pixels to solve for, where they tell no direction; choose a "
+        f"{size.sum() / solve.sum():.0%} of the pixels to solve for, where they give no direction; choose a "
         "larger size, or draw fewer lines and no solid ink there"
     )
     return (warning,)
 
 
 def off_page(solve: Bools, frame: Frame, page: tuple[float, float, float, float] | None) -> tuple[str, ...]:
-    """A warning when pixels to solve for lie off the page (x, y, width, height) of the drawing, or none."""
+    """A warning if pixels to solve for lie off the page (x, y, width, height) of the drawing, or none."""
     if page is None:
         return ()
     inside = []
@@ -156,9 +156,9 @@ def place(point: Floats) -> str:
 
 
 def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
-    """What a disc cannot reach when it rolls in from outside and never touches a stroke.
+    """The region that a disc rolling in from outside cannot reach without touching a stroke.
 
-    gap: diameter of the disc in parts of the grid's longer side; it is two pixels at least.
+    gap: diameter of the disc as a share of the grid's longer side; it is two pixels at least.
     """
     from scipy import ndimage
 
@@ -173,7 +173,7 @@ def enclosed(strokes: Bools, gap: float = GAPS[0]) -> Bools:
 
 
 def _solid(region: Bools) -> int:
-    """Number of pixels that are left when lines one or two pixels wide are taken away."""
+    """Number of pixels left after removing lines one or two pixels wide."""
     from scipy import ndimage
 
     return int(ndimage.binary_opening(region, np.ones((3, 3), dtype=bool)).sum())

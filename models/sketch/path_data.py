@@ -1,8 +1,8 @@
 """The outlines of SVG shapes: path data, point lists and basic shapes as straight lines and cubic Beziers.
 
-svgelements knows the grammar of path data, the arcs and the basic shapes. Its own paths look back to the last
-move at each close, which takes time that grows with the square of their length; so its lexer draws on an
-outline here, in one pass.
+svgelements parses path data, arcs and basic shapes. Its own paths look back to the last move at each close,
+which takes time that grows with the square of their length. So its lexer draws on an outline of this module,
+in one pass.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..instance.grid import Floats
 from .curves import lines_as_cubics
 
 PPI: Final = 96.0  # CSS pixels per inch
-EM: Final = 16.0  # CSS pixels of a letter, where the drawing does not choose another font
+EM: Final = 16.0  # CSS pixels per letter, unless the drawing chooses another font
 _BASIC: Final = {
     "line": ("SimpleLine", ("x1", "y1", "x2", "y2")),
     "circle": ("Circle", ("cx", "cy", "r")),
@@ -35,13 +35,13 @@ Coordinates = tuple[float, float] | str
 
 
 def outline(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) -> Floats:
-    """Control points (k, 4, 2) of a shape in its own units. page: width and height that percentages are of.
+    """Control points (k, 4, 2) of a shape in its own units. page: width and height for percentages.
 
     Raises InputError, which does not name the shape, for damaged numbers and for more than MAX_CURVES
     segments.
     """
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is told where it is placed
+        with np.errstate(over="ignore", invalid="ignore"):  # refused when placed
             return _points(tag, attributes, page)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError) as error:
         raise InputError("its numbers cannot be read; export the drawing again") from error
@@ -59,7 +59,7 @@ def _points(tag: str, attributes: Mapping[str, str], page: tuple[float, float]) 
 
 
 def pixels(text: str) -> float | None:
-    """A length in CSS pixels, None for a percentage and what cannot be read."""
+    """A length in CSS pixels, None for a percentage and for unreadable text."""
     from svgelements import Length
 
     if not text or text.endswith("%") or len(text) > MAX_LENGTH:
@@ -115,7 +115,7 @@ def _readable(length: str) -> str | float:
 
 
 def too_many_curves() -> InputError:
-    """The refusal of a drawing with more than MAX_CURVES segments."""
+    """The error for a drawing with more than MAX_CURVES segments."""
     return InputError(
         f"draws more than {MAX_CURVES} segments of curves, those repeated by <use> counted each time; "
         "simplify the drawing"
@@ -124,7 +124,7 @@ def too_many_curves() -> InputError:
 
 @dataclass(frozen=True)
 class _Point:
-    """What svgelements' lexer asks of a point."""
+    """A point with the attributes that svgelements' lexer needs."""
 
     x: float
     y: float
@@ -132,10 +132,10 @@ class _Point:
 
 @dataclass(eq=False)
 class _Outline:
-    """What svgelements' lexer draws on: straight lines and cubics as points of the complex plane.
+    """The target of svgelements' lexer: straight lines and cubics as points of the complex plane.
 
-    The lexer gives absolute points and says beside them what they were; only `horizontal` and `vertical` are
-    left to do.
+    The lexer passes absolute points together with their kind; only `horizontal` and `vertical` remain to be
+    resolved.
 
     smooth: the kind of the last curve (2: quadratic, 3: cubic) and its last control point.
     """
@@ -199,12 +199,12 @@ class _Outline:
         self.quad((control.real, control.imag), point)
 
     def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
-        """others: rotation, large, sweep, point."""
+        """Add an arc; others: rotation, large, sweep, point."""
         from svgelements import Arc
 
         rotation, large, sweep, point = others
         end = self._at(point)
-        if rx == 0 or ry == 0:  # as SVG has it
+        if rx == 0 or ry == 0:  # as in SVG
             self.line((end.real, end.imag))
         elif end != self.here:
             self.add(Arc(self.here, abs(rx), abs(ry), rotation, large, sweep, end))

@@ -1,15 +1,16 @@
-"""Reading pen strokes as text: .scap, drawn on paper, and .curves, drawn in space.
+"""Readers of pen strokes as text: .scap, drawn on paper, and .curves, drawn in space.
 
-.scap is the format of StrokeStrip and StripMaker for over-sketched drawings. Line 1 `#width height`, then
+.scap is the format of StrokeStrip and StripMaker for over-sketched drawings. Line 1 is `#width height`, then
 optionally `@thickness`, then strokes: `{`, `#stroke cluster`, optionally `@thickness`, one sample
-`x y pressure` a line, `}`. Fields are parted by tabs or blanks; y runs downwards. The declared size need not
-bound the samples. Strokes of one cluster are meant as one curve, and are one here when a curve is asked for
-by its number; their directions count one by one. A file that has all strokes in one cluster says nothing of
-curves: there each stroke is one.
+`x y pressure` per line, `}`. Fields are separated by tabs or blanks; y runs downwards. The declared size need
+not bound the samples. Strokes of one cluster are meant as one curve, and form one when a curve is requested
+by its number; their directions count separately. If all strokes of a file are in one cluster, each stroke is
+a curve of its own.
 
 .curves is the format of CASSIE: for each stroke a line `v N` and N lines `x y z`, y upwards. The strokes are
-projected at right angles to a plane; those at the back are drawn too. CASSIE: E. Yu, R. Arora, T. Stanko, J.
-A. Baerentzen, K. Singh, A. Bousseau, *CASSIE: Curve and Surface Sketching in Immersive Environments*, 2021.
+projected at right angles to a plane; strokes at the back are drawn too. CASSIE: E. Yu, R. Arora, T. Stanko,
+J. A. Baerentzen, K. Singh, A. Bousseau, *CASSIE: Curve and Surface Sketching in Immersive Environments*,
+2021.
 """
 
 from __future__ import annotations
@@ -28,20 +29,20 @@ from .curves import Curves, lines_as_cubics
 
 _GREATEST: Final = 1e9
 SPATIAL: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
-"""How a .curves file begins; a mesh, whose vertices begin with v as well, has three numbers there."""
+"""First line of a .curves file; a mesh, whose vertices begin with v as well, has three numbers there."""
 SIDE: Final = 1000.0
 """Longer side of the projected drawing, in the units of its page."""
 BORDER: Final = 40.0
 """Empty border of the page round it."""
 VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
-"""Where views are from: azimuth, from z towards x, and elevation, in degrees."""
+"""Directions of views: azimuth, from z towards x, and elevation, in degrees."""
 
 
 def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
-    """The strokes of a .scap file.
+    """Read the strokes of a .scap file.
 
-    chooser: looks for the clusters of curvature lines, cluster=NAME; None: all strokes are. Raises InputError
-    with the number of the line that breaks the layout, and for clusters that are not there.
+    chooser: matches the clusters of curvature lines, cluster=NAME; None: all strokes are. Raises InputError
+    with the number of the line that breaks the layout, and for missing clusters.
     """
     lines = _lines(data)
     canvas = _canvas(lines[0] if lines else "")
@@ -76,12 +77,12 @@ def read_scap(data: bytes, chooser: Chooser | None = None) -> Curves:
 
 
 def read_curves(data: bytes, view: str | None = None) -> Curves:
-    """The strokes of a .curves file as they are seen from somewhere, on a page of their own.
+    """Read the strokes of a .curves file as seen from one side, on a page of their own.
 
     view: "front", "side", "top", or azimuth and elevation in degrees as in "30,25"; None: along the third of
     the strokes' principal axes. The longer side of the drawing becomes SIDE, and the page, in whole units,
-    leaves BORDER round it. Raises InputError with the number of the line that breaks the layout, and for a
-    view that is none.
+    has a border of BORDER. Raises InputError with the number of the line that breaks the layout, and for an
+    unknown view.
     """
     strokes = _spatial(data)
     axes = _principal(strokes) if view is None else axes_of(view)
@@ -113,10 +114,10 @@ def axes_of(view: str) -> Floats:
 
 
 def _principal(strokes: list[Floats]) -> Floats:
-    """The two principal axes (2, 3) along which strokes reach farthest, as in `axes_of`.
+    """The two principal axes (2, 3) along which strokes extend farthest, as in `axes_of`.
 
-    The one nearer to the vertical of space points up. A piece of a stroke counts by its length, however many
-    samples it has.
+    The axis nearer to the vertical of space points up. A piece of a stroke counts by its length, regardless
+    of its number of samples.
     """
     starts = np.concatenate([stroke[:-1] for stroke in strokes])
     ends = np.concatenate([stroke[1:] for stroke in strokes])
@@ -125,7 +126,7 @@ def _principal(strokes: list[Floats]) -> Floats:
     length = np.sqrt((half**2).sum(axis=1, keepdims=True))
     middle -= (length * middle).sum(axis=0) / (length.sum() or 1.0)
     spread = (length * middle).T @ middle + (length * half).T @ half / 3
-    # Processors differ in the last digits: those are cut off.
+    # Processors differ in the last digits, which are cut off.
     axes = np.linalg.eigh(spread)[1].T[1:].round(9)
     across, up = sorted(axes, key=lambda axis: (abs(axis[1]), *axis))
     return np.stack([_forward(across), -(np.sign(up[1]) * up if up[1] else _forward(up))])
@@ -159,7 +160,7 @@ def _spatial(data: bytes) -> list[Floats]:
 
 
 def _announced(line: str, number: int) -> int:
-    """The number of points that the first line of a stroke announces."""
+    """The number of points announced in the first line of a stroke."""
     match = re.fullmatch(r"v\s+([0-9]{1,9})", line)
     if match is None:
         raise InputError(f"line {number}: expected 'v N', found {line[:30]!r}")
@@ -175,7 +176,7 @@ def _lines(data: bytes) -> list[str]:
 
 
 def _numbers_in(line: str, number: int, layout: str, count: int) -> list[float]:
-    """The first `count` coordinates in a line, whose number and layout an InputError names."""
+    """The first `count` coordinates in a line; an InputError names the line and its layout."""
     fields = line.split(maxsplit=count)[:count]
     try:
         found = [float(field) for field in fields]
@@ -193,7 +194,7 @@ def _polylines(
 ) -> Curves:
     """The curves of pen strokes, each of two or more samples (n, 2).
 
-    curve: int (s,), the number of each stroke's curve; taken: bool (s,), which were chosen, None: none.
+    curve: int (s,), the number of each stroke's curve; taken: bool (s,), which were chosen, None: no choice.
     """
     count = [len(stroke) - 1 for stroke in strokes]
     points = np.concatenate([lines_as_cubics(stroke[:-1], stroke[1:]) for stroke in strokes])
@@ -219,13 +220,13 @@ def _curves(
 
 
 def _cluster(line: str, stroke: int) -> str:
-    """The name of the cluster in a stroke's first line, `#stroke cluster`; the stroke's own without one."""
+    """The name of the cluster in a stroke's first line, `#stroke cluster`; without one the stroke's own."""
     fields = line.strip().removeprefix("#").split()
     return fields[1] if len(fields) == 2 and line.strip().startswith("#") else f"stroke {stroke}"
 
 
 def _numbers(clusters: list[str]) -> Ints:
-    """The number of each stroke's curve: its cluster, or the stroke itself where there is but one cluster."""
+    """The number of each stroke's curve: its cluster, or the stroke itself if there is only one cluster."""
     numbers = {name: number for number, name in enumerate(dict.fromkeys(clusters))}
     return np.array(
         [numbers[name] for name in clusters] if len(numbers) > 1 else range(len(clusters)), dtype=np.int32

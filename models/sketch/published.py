@@ -1,4 +1,4 @@
-"""Sketches as a library publishes them: their content, and the suffix of their file."""
+"""Sketches as published in a library: their content, and the suffix of their file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _RED: Final = ' stroke="#c8102e"'
 
 
 def published(data: bytes, suffix: str) -> tuple[bytes, str]:
-    """Content under which a sketch is published, and the suffix that its file then has.
+    """Content under which a sketch is published, and the suffix of its published file.
 
-    data: content of the file; suffix: of its name, for content that does not show its kind. An SVG drawing is
-    drawn again from the strokes that were read, so that no script, link, style or text of the file is
-    published. Other kinds run nothing and stay as they are. The suffix follows from the content. What is
-    published once stays as it is when it is published again. Raises InputError for a drawing that cannot be
-    read or that is too large.
+    data: content of the file; suffix: of its name, for content that does not reveal its kind. An SVG drawing
+    is drawn again from the strokes that were read, so that no script, link, style or text of the file is
+    published. Other kinds execute nothing and are not changed. The suffix follows from the content.
+    Publishing a published sketch again does not change it. Raises InputError for a drawing that is unreadable
+    or too large.
     """
     kind = kind_of(data, suffix)
     if kind == "svg":
@@ -34,7 +34,7 @@ def published(data: bytes, suffix: str) -> tuple[bytes, str]:
 
 
 def redrawn(curves: Curves) -> bytes:
-    """SVG of these curves alone. Reading it gives the same numbers, but for control points of straight lines.
+    """SVG of only these curves. Reading it gives the same numbers, except control points of straight lines.
 
     Red strokes are red and all others are black, in lines of one width. Raises InputError for more than
     MAX_DATA characters.
@@ -57,7 +57,7 @@ def redrawn(curves: Curves) -> bytes:
 
 
 def _paths(curves: Curves) -> list[tuple[bool, list[str]]]:
-    """Path data by path: of runs in order that have one colour and one letter and do not touch.
+    """Path data by path, for consecutive runs of one colour and one letter that do not touch.
 
     A reader lists lines of a path before its cubics, and joins runs of a path that touch.
     """
@@ -85,5 +85,5 @@ def _data(run: Floats, *, straight: bool) -> str:
 
 
 def _numbers(values: Floats) -> str:
-    """Numbers with all digits, so that the same ones are read back."""
+    """Numbers with all digits, so that reading them gives the same numbers."""
     return " ".join(repr(value).removesuffix(".0") for value in values.ravel().tolist()).replace(" -", "-")

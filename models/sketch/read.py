@@ -1,8 +1,8 @@
 """From a sketch to an instance: SVG, bitmap, .scap or .curves, with or without a mask.
 
 Strokes drawn in red are curvature lines when a sketch has red strokes and others; the others then cut the
-field, so their pixels leave the mask. A sketch in one colour is all curvature lines (docs/mathematics.md, 1).
-A Choice says otherwise.
+field, so their pixels leave the mask. In a sketch of one colour all strokes are curvature lines
+(docs/mathematics.md, 1). A Choice overrides this.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from .outline import along_outline, boundless, crowded, inside_outline, off_page
 from .pen_strokes import SPATIAL, read_curves, read_scap
 from .svg import read_svg
 
-DEFAULT_SIZE: Final = 24  # few enough pixels for every formulation to be tried
+DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
 BYTES_PER_PIXEL: Final = 5000
 """Memory for one pixel of the grid while its problem is written."""
 LEAST_WEIGHT: Final = 0.1
-"""Stroke pixels with a smaller w carry no direction worth a constraint: grazed corners, crossings."""
+"""Stroke pixels with a smaller w carry no useful direction: grazed corners, crossings."""
 CUT: Final = 0.5 - 1e-9
-"""Length in pixel sides from which another stroke (silhouette, crease) takes a pixel out of the mask.
+"""Least length in pixel sides at which another stroke (silhouette, crease) removes a pixel from the mask.
 
 A line crosses each column (or row, if it is steep) over a length of at least one pixel, in two pixels at
 most: so one half is the greatest threshold that never leaves a gap between 4-neighbours.
@@ -55,7 +55,7 @@ _PICTURES: Final = {
     ".gif": rb"GIF8",
     ".pnm": rb"P[1-6]\s",
 }
-"""How pictures begin, by the suffix of their files."""
+"""First bytes of pictures, by the suffix of their files."""
 _PICTURE: Final = re.compile(b"|".join(_PICTURES.values()), re.DOTALL)
 Kind = Literal["svg", "scap", "curves", "picture"]
 _FLATNESS: Final = 0.02  # of a pixel
@@ -63,10 +63,10 @@ _FLATNESS: Final = 0.02  # of a pixel
 
 @dataclass(frozen=True, eq=False)
 class _Sketch:
-    """What every kind of sketch knows of itself, in its own units with y down.
+    """Attributes of every kind of sketch, in its own units with y down.
 
     box: left, top, right, bottom of the strokes; page: x, y, width, height, or None.
-    covers: the cover of a frame by curvature lines and by other strokes. ends: where strokes end,
+    covers: the cover of a frame by curvature lines and by other strokes. ends: ends of strokes,
     points and ways out (n, 2, 2). stroke_width: as drawn in a picture, 0 for the lines without width of a
     vector sketch.
     """
@@ -91,11 +91,11 @@ def read_sketch(
     curvature: Iterable[str] = (),
     view: str | None = None,
 ) -> Instance:
-    """The instance of a sketch: an SVG drawing, a bitmap, a .scap or .curves file, told apart by content.
+    """Read the instance of a sketch: an SVG drawing, a bitmap, a .scap or .curves file, detected by content.
 
     size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
     of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
-    in the parts that curvature lines run through; an open drawing gets the whole rectangle.
+    in the parts that contain curvature lines; an open drawing gets the whole rectangle.
     mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
     (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
     from half its area on.
@@ -107,9 +107,9 @@ def read_sketch(
     colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
 
     Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
-    length of the mean double-angle vector; pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
-    none. Raises InputError, with the file, for anything that cannot be used, and InstanceError for a weight
-    that cannot be.
+    length of the mean double-angle vector. Pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
+    no direction. Raises InputError, with the file, for unusable input, and InstanceError for a weight
+    out of range.
     """
     path = Path(path)
     check_size(size)
@@ -143,7 +143,7 @@ def instance_of(
     gauge: Gauge = "strokes",
     choice: Choice = AS_DRAWN,
 ) -> Instance:
-    """The instance of a sketch, given as a file's bytes, under the default weights. Raises InputError."""
+    """Read the instance of a sketch from a file's bytes, with the default weights. Raises InputError."""
     sketch = _sketch(data, size, Path(source).suffix.lower(), choice)
     if mask is None:
         frame, given = _framed(sketch.box, size, margin=True), None
@@ -180,7 +180,7 @@ def name_from(text: str) -> str:
 
 
 def check_memory(pixels: int, available: int | None) -> None:
-    """Nothing, or InputError when a grid needs more bytes than available (None: not known)."""
+    """Raise InputError if a grid needs more bytes than available (None: unknown)."""
     needed = pixels * BYTES_PER_PIXEL
     if available is not None and needed > available:
         raise InputError(
@@ -190,13 +190,13 @@ def check_memory(pixels: int, available: int | None) -> None:
 
 
 def check_size(size: int) -> None:
-    """Nothing, or InputError when a grid cannot have so many pixels on its longer side."""
+    """Raise InputError if a grid cannot have that many pixels on its longer side."""
     if not 1 <= size <= MAX_SIZE:
         raise InputError(f"size is {size}; choose 1 to {MAX_SIZE} pixels for the longer side")
 
 
 def bytes_of(path: Path) -> bytes:
-    """The content of a regular file of bearable length, at least one byte."""
+    """Read a regular file of acceptable length, at least one byte."""
     if path.exists() and not path.is_file():
         raise InputError("is not a file; give a sketch as SVG, picture, .scap or .curves", file=path)
     data = read_bytes(path, MAX_BYTES, "simplify the sketch")
@@ -206,7 +206,7 @@ def bytes_of(path: Path) -> bytes:
 
 
 def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
-    """The sketch that bytes hold, by content first and suffix second."""
+    """The sketch in a file's bytes, by content first and suffix second."""
     curves = curves_in(data, suffix, choice)
     if curves is not None:
         return _of_curves(curves)
@@ -219,7 +219,8 @@ def _sketch(data: bytes, size: int, suffix: str, choice: Choice) -> _Sketch:
 def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | None:
     """The curves of a vector sketch, None for a picture. Raises InputError.
 
-    suffix: of the file, for content that does not tell. choice: of curvature lines and of the view.
+    suffix: of the file, for content that does not reveal its kind. choice: of curvature lines and of the
+    view.
     """
     kind = kind_of(data, suffix)
     if kind == "curves":
@@ -228,7 +229,7 @@ def curves_in(data: bytes, suffix: str, choice: Choice = AS_DRAWN) -> Curves | N
     choice.refuse_view()
     if kind != "picture":
         return (read_svg if kind == "svg" else read_scap)(data, choice.chooser)
-    choice.refuse_labels("is a picture, whose strokes have no labels: only red ones are told from others")
+    choice.refuse_labels("is a picture, whose strokes have no labels: only red strokes are recognised")
     return None
 
 
@@ -251,7 +252,7 @@ def kind_of(data: bytes, suffix: str) -> Kind:
 
 
 def suffix_of_picture(data: bytes) -> str:
-    """Suffix of a picture by its content; that of Netpbm for all beginnings that are not known."""
+    """Suffix of a picture by its content; Netpbm's for unknown content."""
     return next((suffix for suffix, start in _PICTURES.items() if re.match(start, data)), ".pnm")
 
 
@@ -265,7 +266,7 @@ def _of_curves(curves: Curves) -> _Sketch:
 
 
 def segments_of(curves: Curves, frame: Frame) -> tuple[Floats, Ints, Bools]:
-    """Segments (m, 2, 2), the number (m,) of each one's curve, and which (m,) are curvature lines."""
+    """Segments (m, 2, 2), the number (m,) of each segment's curve, and which (m,) are curvature lines."""
     segments, owner = flatten(curves.points, _FLATNESS * frame.pixel)
     return segments, curves.curve[owner], curves.line[owner]
 
@@ -279,7 +280,7 @@ def _framed(box: tuple[float, float, float, float], size: int, *, margin: bool) 
 
 
 def _masked(path: Path, page: tuple[float, float, float, float] | None, size: int) -> tuple[Frame, Bools]:
-    """The frame round the white part of a mask file, and the mask on it, or InputError about the file."""
+    """The frame round the white part of a mask file, and the mask on it. Raises InputError about the file."""
     with naming(path):
         return _mask_on_grid(read_white(bytes_of(path)), page, size)
 
@@ -297,7 +298,7 @@ def _mask_on_grid(
             f"but the sketch {wanted[0]} x {wanted[1]}; make them equal"
         )
     if not white.any():
-        raise InputError("the mask is black all over; paint white what shall be solved")
+        raise InputError("the mask is black all over; paint the region to solve white")
     across, down = width / wanted[0], height / wanted[1]
     high, wide = (np.nonzero(white.any(axis=axis))[0] for axis in (1, 0))
     left, right = x + across * wide[0], x + across * (wide[-1] + 1)
@@ -311,9 +312,10 @@ def _mask_on_grid(
 def _solve_mask(
     lines: Cover, others: Cover, given: Bools | None, sketch: _Sketch, frame: Frame
 ) -> tuple[Bools, Reading]:
-    """The pixels to solve for, and what is to be said of them.
+    """The pixels to solve for, and warnings about them.
 
-    They are the mask, or the inside of the outline, its gaps bridged, less what other strokes cut out.
+    They are the mask, or the inside of the outline with its gaps bridged, without the pixels of other
+    strokes.
     """
     cut = others.amount >= CUT
     filled = lines.amount + others.amount >= CUT

@@ -1,4 +1,4 @@
-"""The built-in sketches and surfaces, ready to play with: drawn for crossfield, or exact by computation."""
+"""The built-in sketches and surfaces: drawn for crossfield, or computed exactly."""
 
 from __future__ import annotations
 
@@ -82,10 +82,10 @@ def sample(
 ) -> Instance:
     """The instance of a built-in sample on a grid whose longer side has `size` pixels.
 
-    name: of one in `samples()`; size: 1..4096; gauge: as in Instance; stroke_weight, skew_weight: as in
+    name: a name in `samples()`; size: 1..4096; gauge: as in Instance; stroke_weight, skew_weight: as in
     `Instance.with_weights`; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an
     analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight
-    that cannot be.
+    out of range.
     """
     check_size(size)
     choice = Choice(silhouette)
@@ -100,7 +100,7 @@ def sample(
 
 
 def sample_svg(name: str) -> str:
-    """The SVG text of a built-in sketch. Raises InputError for a name that is none, or no drawing."""
+    """The SVG text of a built-in sketch. Raises InputError for an unknown name and for a computed sample."""
     if _known(name).kind == "analytic":
         drawings = ", ".join(sample.name for sample in samples() if sample.kind == "sketch")
         raise InputError(f"sample {name!r} is computed, not drawn; choose one of {drawings}")

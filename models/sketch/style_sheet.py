@@ -1,8 +1,8 @@
-"""Style sheets of SVG drawings: which properties they give to an element.
+"""Style sheets of SVG drawings: the properties that they give to an element.
 
-tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and what
-these make together. Selectors that look at other elements are left out, because matching them takes time that
-grows without bound in the depth of a drawing.
+tinycss2 parses, in time linear in the text. Only simple selectors count: a tag, an id, classes, and
+combinations of these. Selectors that depend on other elements are ignored, because matching them takes time
+that grows without bound in the depth of a drawing.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ..errors import InputError
 from ..input_limits import MAX_RULE_CHECKS, MAX_STYLE
 
 PAINT: Final = ("stroke", "fill", "visibility", "color", "stroke-width", "stroke-opacity", "fill-opacity")
-"""The properties that decide how a stroke shows; elements inside of others inherit them."""
+"""The properties that determine how a stroke appears; nested elements inherit them."""
 KNOWN: Final = frozenset({*PAINT, "display", "opacity", "transform"})
-"""The properties that decide which strokes there are."""
+"""The properties that determine which strokes there are."""
 
 
 class _Selector(NamedTuple):
@@ -35,7 +35,7 @@ class _Selector(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Where it is looked up: every element that it fits has this key."""
+        """Key in the table of rules, which every matching element has."""
         if self.id:
             return f"#{self.id}"
         return f".{min(self.classes)}" if self.classes else self.tag
@@ -43,7 +43,7 @@ class _Selector(NamedTuple):
 
 @dataclass(eq=False)
 class StyleSheet:
-    """The rules of a drawing: for each simple selector its properties, with the place where they stand."""
+    """The rules of a drawing: for each simple selector its properties, with the place of each."""
 
     rules: dict[str, dict[_Selector, dict[str, tuple[int, str]]]] = field(default_factory=dict)
     checks: int = 0
@@ -52,7 +52,7 @@ class StyleSheet:
     def properties(self, tag: str, identifier: str, classes: str) -> Mapping[str, str]:
         """The properties of an element: the most specific rule decides, and of equal ones the last.
 
-        Raises InputError when rules and elements are so many that looking takes more than MAX_RULE_CHECKS
+        Raises InputError when the search through rules and elements takes more than MAX_RULE_CHECKS
         comparisons.
         """
         asked = (tag, identifier if f"#{identifier}" in self.rules else "", classes)
@@ -74,7 +74,7 @@ class StyleSheet:
         return {name: value for name, (_, value) in found.items()}
 
     def count(self, more: int) -> None:
-        """Note comparisons. Raises InputError beyond MAX_RULE_CHECKS."""
+        """Add to the number of comparisons. Raises InputError beyond MAX_RULE_CHECKS."""
         self.checks += more
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
@@ -114,7 +114,7 @@ def style_sheet(texts: Iterable[str]) -> StyleSheet:
 
 @lru_cache(maxsize=1024)
 def style_properties(text: str) -> Mapping[str, str]:
-    """The properties that a `style` attribute gives."""
+    """The properties in a `style` attribute."""
     try:
         return _declared(text)
     except ValueError:  # a whole number of thousands of digits
@@ -134,7 +134,7 @@ def _declared(content: Any) -> dict[str, str]:
 
 
 def _text(tokens: list[Any]) -> str:
-    """The value as text; empty when it is nested beyond all sense."""
+    """The value as text; empty when it is nested too deeply."""
     import tinycss2
 
     try:
@@ -157,7 +157,7 @@ def _selectors(prelude: list[Any]) -> Iterator[_Selector]:
 
 
 def _selector(part: list[Any]) -> _Selector | None:
-    """The selector that tokens make, None when it is not a simple one."""
+    """The selector formed by tokens, None when it is not a simple one."""
     tag, ids, classes = "", set[str](), set[str]()
     left = deque(part)
     while left and left[0].type == "whitespace":

@@ -1,6 +1,6 @@
 """Instances with a known answer: curved surfaces, projected, with their exact curvature lines.
 
-Each surface is parametrised by its lines of curvature: position(s, t), turned in space and looked at along
+Each surface is parametrised by its lines of curvature: position(s, t), turned in space and viewed along
 -z. A line s = const or t = const of the drawing is then exactly a projected curvature line. x runs to the
 right, y up, z towards the viewer.
 """
@@ -24,7 +24,7 @@ from .outline import largest_part
 from .read import DEFAULT_SIZE, LEAST_WEIGHT, check_size
 
 _NEWTON: Final = 12
-_SEEDS: Final = 120  # lattice of starting points a side
+_SEEDS: Final = 120  # lattice of starting points per side
 _SAMPLES: Final = 600  # points along a drawn line
 _BISECTIONS: Final = 12
 
@@ -40,7 +40,7 @@ class CurvaturePatch:
 
     position, along_s, along_t: the point and its derivatives by s and t, before turning, shape (..., 3).
     s_range, t_range: ends of the parameters. turn: rotation matrix (3, 3) applied to all of them.
-    share: part of the pixels that shall carry strokes.
+    share: intended part of the pixels with strokes.
     """
 
     position: Chart
@@ -112,10 +112,10 @@ def _revolved(
 def _ellipsoid(long: float, deep: float, short: float) -> CurvaturePatch:
     """The front of an ellipsoid with semi-axes long > deep > short along x, z and y.
 
-    Its curvature lines are where it meets confocal quadrics: the roots m in [deep^2, long^2] and n in
+    Its curvature lines are its intersections with confocal quadrics: the roots m in [deep^2, long^2] and n in
     [short^2, deep^2] of x^2 / (long^2 - m) + z^2 / (deep^2 - m) + y^2 / (short^2 - m) = 1 are constant on
     them. They are m = long^2 - (long^2 - deep^2) cos^2 s and n = deep^2 - (deep^2 - short^2) sin^2 t, so
-    that nothing has to be chosen where a line passes a plane of symmetry. The four umbilics, where no
+    there is no choice where a line passes a plane of symmetry. The four umbilics, where no
     direction is principal, are at multiples of pi of both.
     """
     k = (long**2 - deep**2) / (long**2 - short**2)
@@ -215,11 +215,11 @@ def analytic(
     """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
 
     A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are
-    evenly parametrised curvature lines of both families, so many that the share of stroke pixels comes as
+    evenly parametrised curvature lines of both families. Their number brings the share of stroke pixels as
     close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
     drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance;
     stroke_weight, skew_weight: as in `Instance.with_weights`. Raises InputError for an unknown name or size,
-    InstanceError for a weight that cannot be.
+    InstanceError for a weight out of range.
     """
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
@@ -307,7 +307,7 @@ def _kept_near(value: Floats, ends: tuple[float, float]) -> Floats:
 
 
 def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats, Bools]:
-    """Weight [height, width] of drawn lines; which pixels (n,) carry a line of family u.
+    """Weight [height, width] of drawn lines; and which pixels (n,) have a line of family u.
 
     The spacing of the lines is bisected by ratio; the best share seen wins.
     """
@@ -325,7 +325,7 @@ def _strokes(surface: CurvaturePatch, frame: Frame, mask: Bools) -> tuple[Floats
 
 
 def _drawn(surface: CurvaturePatch, frame: Frame, mask: Bools, *, spacing: float) -> tuple[Floats, Bools]:
-    """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one a family."""
+    """Weight and family, as in _strokes, of lines `spacing` pixels apart, at least one per family."""
     u_lines, v_lines = _lines(surface, frame, spacing)
     of_u, of_v = cover_by_segments(u_lines, frame), cover_by_segments(v_lines, frame)
     both = cover_by_segments(np.concatenate([u_lines, v_lines]), frame)

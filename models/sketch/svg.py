@@ -1,14 +1,13 @@
-"""Reading SVG drawings: the outlines of everything that is painted, as cubic Beziers.
+"""Reader of SVG drawings: the outlines of everything that is painted, as cubic Beziers.
 
-svgelements knows the grammars of path data, transforms, lengths and colours, tinycss2 that of style sheets.
-The document itself is walked here: what it leaves to a browser (style sheets at any place, `use` of symbols,
-invisible parts) decides which strokes there are. Each element is parsed once, however often it is used, and
-the work is bounded by the limits of `input_limits`. The bytes first pass defusedxml, which refuses entities;
-nothing outside the file is ever loaded: pictures and `use` of other files are left out. Clip paths, masks,
-dashes and text are not looked at.
+svgelements parses path data, transforms, lengths and colours, tinycss2 parses style sheets. This module walks
+through the document: style sheets at any place, `use` of symbols and invisible parts determine which strokes
+there are. Each element is parsed once, for any number of uses, and the work is bounded by the limits of
+`input_limits`. The bytes first pass defusedxml, which refuses entities. Files outside the drawing are never
+loaded: pictures and `use` of other files are ignored. So are clip paths, masks, dashes and text.
 
-What counts as a stroke: the path of every shape with a visible `stroke`; and the outline of a shape that is
-only filled, since drawing programs export strokes as filled outlines. White (paper) counts as invisible.
+Strokes are the path of every shape with a visible `stroke`, and the outline of a shape that is only filled:
+drawing programs export strokes as filled outlines. White (paper) counts as invisible.
 """
 
 from __future__ import annotations
@@ -52,9 +51,9 @@ _START: Final = {"stroke": "none", "fill": "black", "visibility": "visible", "co
 
 @dataclass(frozen=True)
 class _Place:
-    """An element to visit: its inherited style, its transform, and how deep in `use` it is.
+    """An element to visit: its inherited style, its transform, and its depth in `use`.
 
-    chosen: whether it, or what it stands in, has a label that is chosen.
+    chosen: whether it, or an element around it, has a chosen label.
     """
 
     element: Element
@@ -65,10 +64,10 @@ class _Place:
 
 
 def read_svg(data: bytes, chooser: Chooser | None = None) -> Curves:
-    """The strokes of an SVG drawing in the units of its viewBox.
+    """Read the strokes of an SVG drawing in the units of its viewBox.
 
-    chooser: looks for the labels of curvature lines; None: colours decide. Raises InputError for malformed or
-    unsafe XML, damaged path data, too many elements, when nothing is drawn, and for labels that nothing has.
+    chooser: matches the labels of curvature lines; None: colours decide. Raises InputError for malformed or
+    unsafe XML, damaged path data, too many elements, an empty drawing, and for missing labels.
     """
     root = _parsed(data)
     if _tag(root) != "svg":
@@ -112,7 +111,7 @@ def _parsed(data: bytes) -> Element:
 
 @dataclass(eq=False)
 class _Walk:
-    """A walk through a drawing. What depends on an element alone is found once and kept for all its uses."""
+    """A walk through a drawing. Results that depend only on an element are computed once for all its uses."""
 
     sheet: StyleSheet
     canvas: tuple[float, float, float, float] | None
@@ -126,8 +125,9 @@ class _Walk:
     curves: int = 0
 
     def shapes(self, root: Element) -> Iterator[tuple[tuple[float, float, float], Floats, bool]]:
-        """Of every visible shape in drawing order: colour, control points in the root's units, and whether
-        it is chosen.
+        """Every visible shape in drawing order: colour, control points in the root's units, and choice.
+
+        The choice is True where a label of the shape is chosen.
         """
         from svgelements import Matrix
 
@@ -168,7 +168,7 @@ class _Walk:
         return _Place(place.element, style, matrix, place.uses, chosen)
 
     def _chosen(self, element: Element) -> bool:
-        """Whether an element itself has a label that is chosen; all of its labels are noted."""
+        """Whether an element itself has a chosen label; all of its labels are recorded."""
         if self.chooser is None:
             return False
         if element not in self.taken:
@@ -176,7 +176,7 @@ class _Walk:
         return self.taken[element]
 
     def _used(self, place: _Place, named: Mapping[str, Element]) -> list[_Place]:
-        """What a `use` element stands for; nothing when it points into another file or at itself."""
+        """The elements that a `use` refers to; none when it points into another file or at itself."""
         from svgelements import Matrix
 
         self.used += 1
@@ -234,7 +234,7 @@ class _Walk:
 
 
 def _labels(element: Element) -> Iterator[str]:
-    """What strokes in an element can be chosen by: its id, its classes, its name as a layer of Inkscape."""
+    """Labels of the strokes in an element: its id, its classes, its name as a layer of Inkscape."""
     if identifier := element.get("id"):
         yield f"id={identifier}"
     for name in element.get("class", "").split():
@@ -244,7 +244,7 @@ def _labels(element: Element) -> Iterator[str]:
 
 
 def _own_style(element: Element, sheet: StyleSheet) -> dict[str, str]:
-    """What an element says of itself: by attributes, style sheets and its `style`, the last ones stronger."""
+    """The element's own style: attributes, style sheets and its `style`, of increasing priority."""
     attributes = element.attrib
     own = {key: value.strip() for key, value in attributes.items() if key in KNOWN}
     given = sheet.properties(_tag(element), attributes.get("id", ""), attributes.get("class", ""))
@@ -287,14 +287,14 @@ def _view(place: _Place, element: Element) -> Any:
 
 
 def _painted(style: Mapping[str, str]) -> bool:
-    """True when a shape shows: a stroke or a fill that is neither none, transparent, nor white like paper."""
+    """Whether a shape is visible: its stroke or fill is neither none, transparent, nor white like paper."""
     return style["visibility"] not in ("hidden", "collapse") and not bool(
         is_paper(np.array([_paint(style)]))[0]
     )
 
 
 def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
-    """Red, green, blue in [0, 1] of the stroke, else of the fill; white when there is neither."""
+    """Red, green, blue in [0, 1] of the stroke, else of the fill; white without either."""
     for kind in ("stroke", "fill"):
         colour = style[kind]
         colour = style["color"] if colour.lower() == "currentcolor" else colour
@@ -308,7 +308,7 @@ def _paint(style: Mapping[str, str]) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=1024)
 def _rgb(colour: str) -> tuple[float, float, float]:
-    """The colour on white paper; black for gradients and for what cannot be read."""
+    """The colour on white paper; black for gradients and for unreadable colours."""
     from svgelements import Color
 
     if len(colour) > MAX_LENGTH:
@@ -355,7 +355,7 @@ def _length(element: Element, key: str, default: float) -> float:
 
 
 def _number(text: str | None) -> float:
-    """The number that a style value starts with; 1 when there is none."""
+    """The number at the start of a style value; 1 without one."""
     match = re.match(r"[+-]?(?:\d+\.?\d*|\.\d+)", text or "")
     return float(match[0]) if match else 1.0
 

@@ -1,7 +1,8 @@
-"""Compressed TIFF pictures, decoded in a process of their own.
+"""Compressed TIFF pictures, decoded in a separate process.
 
-Pillow hands compressed pictures to libtiff, which prints complaints to standard error and cannot be told not
-to. Standard error belongs to the whole process, so another process decodes: this file, as a program.
+Pillow passes compressed pictures to libtiff, which prints complaints to standard error and has no setting
+against that. Standard error belongs to the whole process, so another process decodes: this file, as a
+program.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import sys
 def unpacked(data: bytes) -> bytes:
     """The first picture of a compressed TIFF as an upright TIFF without compression.
 
-    Raises ValueError with the decoder's message where it cannot be decoded.
+    Raises ValueError with the decoder's message if decoding fails.
     """
     command = [sys.executable, "-P", __file__]
     done = subprocess.run(command, input=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
@@ -24,7 +25,7 @@ def unpacked(data: bytes) -> bytes:
 
 
 def main() -> int:
-    """Print what `unpacked` returns; 1 with the error's message instead where decoding fails."""
+    """Print the result of `unpacked`, or the error's message with exit code 1 if decoding fails."""
     from PIL import Image, ImageOps
 
     found = io.BytesIO()

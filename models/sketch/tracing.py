@@ -1,9 +1,9 @@
-"""Which curve of a sketch each stroke pixel comes from: known beside the instance, never a part of it.
+"""The curve of a sketch that each stroke pixel belongs to; not part of the instance.
 
 In a vector sketch a curve is an unbroken run of a path (SVG), a cluster of strokes (.scap), or a stroke
-(.curves), with the shorter ones that redraw it: those that have more than half of their stroke pixels in
-common with it. A picture does not say; there, and where no sketch is at hand, a curve is a chain of stroke
-pixels that go on in each other's direction. A chain ends at a corner, and may end at a crossing.
+(.curves), together with shorter ones that redraw it: they share more than half of their stroke pixels with
+it. Pictures do not record curves. For them, and without a sketch, a curve is a chain of stroke pixels that
+continue in each other's direction. A chain ends at a corner, and may end at a crossing.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from .read import LEAST_WEIGHT, bytes_of, curves_in, segments_of
 from .samples import SAMPLES, sample_svg
 
 REACH: Final = 2
-"""Rows and columns from a pixel of a chain to the next: a crossing, which has no direction, is bridged."""
+"""Rows and columns from a pixel of a chain to the next, which bridges crossings without a direction."""
 ASIDE: Final = np.radians(27.0)
-"""Most that a chain's direction differs from the way to its next pixel.
+"""Greatest angle between a chain's direction and the way to its next pixel.
 
 A little more than atan(1/2): of the 16 ways within REACH one is as near as that to every direction.
 """
 TURN: Final = np.radians(15.0)
-"""Most that a chain turns from a pixel to the next: on a circle four pixels in radius."""
+"""Greatest turn of a chain from a pixel to the next, as on a circle four pixels in radius."""
 REDRAWN: Final = 0.5
-"""Share of its stroke pixels from which on a curve only redraws another one."""
+"""Least share of its stroke pixels at which a curve only redraws another one."""
 SEVERAL: Final = -1
-"""The number of a stroke pixel through which several curves run."""
+"""The number of a stroke pixel on several curves."""
 _NONE: Final = -2
 
 
 def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choice = AS_DRAWN) -> Ints:
-    """The number of the one curve of each stroke pixel, int (s,), SEVERAL where more run through its pixel.
+    """The number of the only curve of each stroke pixel, int (s,), SEVERAL where more curves pass through it.
 
-    sketch: the file that the instance was read from, or the name of a sample; None: not at hand. Pictures,
-    computed samples and instance files count as not at hand. choice: with which the sketch was read. Raises
-    InputError for what cannot be read, and for a sketch that has no curve where the instance has a stroke.
+    sketch: the file that the instance was read from, or the name of a sample; None: not available. Pictures,
+    computed samples and instance files count as not available. choice: with which the sketch was read. Raises
+    InputError for an unreadable sketch, and for a sketch without a curve at a stroke of the instance.
     """
     found = None if sketch is None else _drawn(sketch, choice)
     if found is None:
@@ -72,14 +72,14 @@ def curves_of(instance: Instance, sketch: str | Path | None = None, choice: Choi
 
 
 def has_curves(sketch: str | Path | None, choice: Choice = AS_DRAWN) -> bool:
-    """Whether a sketch is at hand and says what its curves are; else chains are taken for them."""
+    """Whether a sketch is available and records its curves; otherwise chains are taken as curves."""
     return sketch is not None and _drawn(sketch, choice) is not None
 
 
 def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
-    """The number of the one curve through each of `count` stroke pixels (s,), SEVERAL, or _NONE.
+    """The number of the only curve through each of `count` stroke pixels (s,), SEVERAL, or _NONE.
 
-    owner, stroke: (k,), a curve and a stroke pixel that it runs through, each pair once.
+    owner, stroke: (k,), a curve and a stroke pixel on it, each pair once.
     """
     names, curve = np.unique(owner, return_inverse=True)
     through = csr_array((np.ones(len(curve)), (curve, stroke)), shape=(len(names), count))
@@ -97,7 +97,7 @@ def _only(owner: Indices, stroke: Indices, count: int) -> Ints:
 def _redrawn(through: csr_array) -> Indices:
     """The curve (c,) that each curve counts as: a longer one that it redraws, or itself.
 
-    through: 1 where a curve runs through a stroke pixel, (c, s).
+    through: 1 where a curve passes through a stroke pixel, (c, s).
     """
     at_stroke = through.T.tocsr()
     length = np.diff(through.indptr)
@@ -138,7 +138,7 @@ def chains(instance: Instance) -> Ints:
 
 
 def _drawn(sketch: str | Path, choice: Choice) -> Curves | None:
-    """The curves of a vector sketch, in a file or a sample; None of anything else."""
+    """The curves of a vector sketch, in a file or a sample; None for other sources."""
     path = Path(sketch)
     if not path.is_file() and str(sketch) in SAMPLES:
         analytic = SAMPLES[str(sketch)].kind == "analytic"

@@ -1,6 +1,6 @@
-"""Fields by one sparse system.
+"""Fields from one sparse system.
 
-The power field and the PolyVector field: unknowns that do not see labels or jumps are smoothed, and crosses,
-labels and jumps are read off. The bend field goes on from one of them, with one system a round. Whatever
-changes jumps afterwards is models/search.
+The power field and the PolyVector field smooth unknowns that do not depend on labels or jumps; crosses,
+labels and jumps follow from them. The bend field starts from one of them and solves one system per round.
+Changes of jumps after that belong to models/search.
 """

@@ -1,9 +1,9 @@
-"""The bend field: lines of one family change little along those of the other.
+"""The bend field: lines of one family change little along the lines of the other family.
 
 Iarussi, Bommes, Bousseau: BendFields: Regularized Curvature Fields from Rough Concept Sketches (ACM
-Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, lets no line turn for
-nothing. Curvature lines do turn along themselves, as the surface bends; what changes little is their
-direction from one of them to the next.
+Transactions on Graphics 34, 2015). The smoothness energy of docs/mathematics.md, 5, penalises every turn of a
+line. Curvature lines do turn along themselves, as the surface bends; their direction changes little from one
+of them to the next.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from .systems import factored, one_thread
 _Places = NDArray[np.intp]
 
 HARMONIC: Final = 0.05
-"""Weight of plain smoothness beside bend for strokes that tremble by `TREMBLE` or more.
+"""Weight of plain smoothness next to bend for strokes that tremble by `TREMBLE` or more.
 
-A greater one evens out rough strokes further, and leaves too many of them.
+A greater weight smooths rough strokes further, and deviates from too many of them.
 """
 TREMBLE: Final = np.radians(1.2)
-"""About what 3 degrees of noise on each stroke pixel leave between strokes and lines at 48 pixels."""
+"""Approximate deviation of lines from strokes at 48 pixels with 3 degrees of noise on each stroke pixel."""
 HOLD: Final = 0.25
 """Factor of the stroke weights: under the default ones, 3 degrees of noise show in the field from 0.3 on."""
 
-_LEAST_HARMONIC: Final = 0.01  # follows clean strokes best
+_LEAST_HARMONIC: Final = 0.01  # smallest deviation from clean strokes
 _SIGMA: Final = 1.4826  # standard deviation of a normal error in units of its median size
 _ROUNDS: Final = 20  # 2 to 6 are usual
-_FALL: Final = 1e-4  # share of the energy that a round has to take off for another one to be made
+_FALL: Final = 1e-4  # least share of the energy that a round has to remove before another one
 
 
 @one_thread()
@@ -49,19 +49,19 @@ def bend_field(
     With line angles u, v in radians the energy is the sum of (v . grad u)^2 + (u . grad v)^2 over pixels, of
     2 `harmonic` (du^2 + dv^2) over pairs, of hold w_strokes w (line - theta)^2 over strokes, and of
     w_beta beta^2 over pixels (docs/mathematics.md, 10). In the brackets u and v stand for unit vectors. The
-    jumps of `start` say which lines of neighbours belong together, and the nearer line of `start` carries a
-    stroke; both stay. So the start decides where singularities are: that of the method `bend` is the
+    jumps of `start` determine which lines of neighbours belong together, and its nearer line carries a
+    stroke; both stay. So the start decides where singularities are. The method `bend` starts from the
     PolyVector field with the hardest hold.
 
-    Each round takes the unit vectors as they are and minimises over the angles: one sparse system. The energy
-    is then computed anew; rounds end when it has hardly fallen, at the latest after 20, and one in which it
-    rises is left out.
+    Each round keeps the unit vectors and minimises over the angles: one sparse system. The energy is then
+    computed anew. Rounds end when it has hardly fallen, at the latest after 20; a round in which it rises is
+    discarded.
     Labels are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic.
 
-    harmonic: weight of plain smoothness, above 0; None: as the strokes tremble in the field of `HARMONIC`,
-    that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05. hold: factor of the stroke weights, above 0.
-    over: asked before each round whether to end. If so, the function returns the field of the rounds so far,
-    or `start` before the first round.
+    harmonic: weight of plain smoothness, above 0; None: adapted to the strokes' tremble in the field of
+    `HARMONIC`, this weight times (tremble / TREMBLE)^2, from 0.01 to 0.05. hold: factor of the stroke
+    weights, above 0. over: called before each round, returns whether to end. If so, the function returns the
+    field of the rounds so far, or `start` before the first round.
     """
     if over():
         return start
@@ -73,9 +73,9 @@ def bend_field(
 
 
 def tremble(field: CrossField) -> float:
-    """How far single strokes are off the lines of a field, in radians; 0 where there is none.
+    """Deviation of single strokes from the lines of a field, in radians; 0 without strokes.
 
-    The standard deviation that a normal error of the same median has: a few strokes that contradict others
+    The standard deviation of a normal error with the same median, so that a few contradictory strokes
     do not count.
     """
     deviation = field.stroke_deviation
@@ -99,7 +99,7 @@ def _bent(start: CrossField, harmonic: float, hold: float, over: Over) -> CrossF
 
 @dataclass(frozen=True, eq=False)
 class _Bend:
-    """The energy of line angles x = (u, v), shape (2n,), as squares: those of bend, and linear ones.
+    """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones.
 
     difference x - offset are the differences of pairs, (2m,), to the right and upwards: row e for the line u
     of the first pixel of pair e, row m + e for its v. Bend has a square for each quadrant (pixel, line, a
@@ -187,7 +187,7 @@ def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:
 def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Places]:
     """The rows of differences that begin and that end at each line, (2n,) each; -1 where there is none.
 
-    Of the chosen pairs, all upright or all level.
+    For the chosen pairs, all vertical or all horizontal.
     """
     grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
     at = np.nonzero(chosen)[0]
@@ -200,7 +200,7 @@ def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Pl
 
 
 def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
-    """The nearer line to each stroke, as a place in x, the stroke's angle near it, and its weight; (s,)."""
+    """The nearer line to each stroke, as a place in x, the stroke's nearest angle, and its weight; (s,)."""
     instance = field.instance
     at = instance.stroke_index
     lines = np.stack([line[at] for line in _lines(field)])

@@ -1,8 +1,8 @@
 """The PolyVector field: crosses of any angle from one linear system, without labels or jumps.
 
 Diamanti, Vaxman, Panozzo, Sorkine-Hornung: Designing N-PolyVector Fields with Complex Polynomials (Computer
-Graphics Forum 33, 2014). A cross is the pair of roots exp(2 i u), exp(2 i v) of z^2 + X1 z + X0, whose
-coefficients do not see which line is u and how often an angle was turned.
+Graphics Forum 33, 2014). A cross is the pair of roots exp(2 i u), exp(2 i v) of z^2 + X1 z + X0. The
+coefficients do not depend on the order of the lines or on the number of turns of an angle.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .systems import factored, locally, one_thread, smoothness
 _Complex = NDArray[np.complex128]
 
 HOLDS: Final = (0.1, 1.0, 100.0)
-"""Factors of the stroke weights that are worth trying: loose, that of the energy, hard."""
+"""Factors of the stroke weights worth trying: loose, as in the energy, hard."""
 
 _HARDEST: Final = 1e4
-"""Greatest weight of a stroke: beside it the 2 of a pair is nothing, and `PULL` still counts in 16 digits."""
+"""Greatest weight of a stroke, which dominates the 2 of a pair; `PULL` still counts in 16 digits."""
 
-_DECIMALS: Final = 9  # of line angles in quarter turns: what rounding leaves beyond must not decide jumps
+_DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must not decide jumps
 
 
 @one_thread()
@@ -35,17 +35,16 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
 
     X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
-    where s = exp(2 i theta) is to be a root, and w_beta |X1|^2 over pixels, which
-    asks for right angles where nothing else says. Near a right-angled cross along the stroke that is 16 times
-    the energy of docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha =
-    beta = 0. Labels are then moved into the windows of the instance (docs/mathematics.md, 10).
+    where s = exp(2 i theta) should be a root, and w_beta |X1|^2 over pixels, which prefers right angles where
+    nothing else counts. Near a right-angled cross along the stroke this is 16 times the energy of
+    docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels
+    are then moved into the windows of the instance (docs/mathematics.md, 10).
 
-    hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them: among those
-    of `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings,
-    where strokes contradict each other and a hard hold makes singularities between them, and a hard one on
-    clean curves that cross.
-    tolerance: relative residual that is left in the polynomials, found without a factorisation, in a third of
-    the time; None: none.
+    hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them. Among
+    `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings: there
+    strokes contradict each other, and a hard hold makes singularities between them. A hard hold has the
+    lowest energy on clean curves that cross. tolerance: relative residual of the polynomials, solved without
+    a factorisation in a third of the time; None: solve exactly.
     """
     found = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))
@@ -65,14 +64,14 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_pixels(weight, size))
     once = sums(weight * root)
-    matrix = _beside(alike, once, instance.skew_coefficient)
+    matrix = _coupled(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
     x = factored(matrix)(right) if tolerance is None else locally(matrix, right, tolerance)
     return x[:size], x[size:]
 
 
-def _beside(alike: Any, cross: _Complex, skew: float) -> Any:
-    """The Hermitian matrix (2n, 2n) of both coefficients: `alike` for each, diagonals that tie them."""
+def _coupled(alike: Any, cross: _Complex, skew: float) -> Any:
+    """The Hermitian matrix (2n, 2n) of both coefficients: `alike` for each, diagonals that couple them."""
     size = len(cross)
     at = np.nonzero(cross)[0]
     tie = sparse.csr_array((cross[at], (at, at)), shape=(size, size))
@@ -82,7 +81,7 @@ def _beside(alike: Any, cross: _Complex, skew: float) -> Any:
 
 
 def roots(x0: _Complex, x1: _Complex) -> tuple[Floats, Floats]:
-    """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; those of z^2 = 1 where both are 0."""
+    """The angles u, v (n,) in radians of the roots of z^2 + X1 z + X0; as for z^2 = 1 where both are 0."""
     x0 = np.where((x0 == 0) & (x1 == 0), -1.0, x0)
     apart = np.sqrt(x1**2 - 4 * x0)
     return np.angle(apart - x1) / 2, np.angle(-apart - x1) / 2

@@ -1,6 +1,6 @@
 """The power field: crosses by smoothing exp(4 i theta), which needs no jumps.
 
-The usual quick cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles
+The usual fast cross field of geometry processing (Knoppel et al., ACM Trans. Graph. 32, 2013): right angles
 everywhere.
 """
 

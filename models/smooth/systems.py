@@ -19,7 +19,7 @@ from ..instance.instance import Instance
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
 PULL: Final = 1e-9
-"""Pull towards the present values: parts without strokes, or w_beta = 0, leave a system singular."""
+"""Pull towards the present values: parts without strokes, or w_beta = 0, make a system singular."""
 
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
@@ -47,11 +47,11 @@ def symmetric(row: Ints, column: Ints, beside: Floats, diagonal: Floats) -> Any:
 
 
 def factored(matrix: Any) -> Solve:
-    """The solver of a Hermitian system that is positive semidefinite: of H + 1e-9, so that it is definite."""
+    """The solver of a positive semidefinite Hermitian system H, made definite as H + 1e-9."""
     pulled = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsc()
     with one_thread():
-        # A definite matrix needs no pivots, so that the ordering can keep the factors sparse. So sparse that
-        # columns taken together, as dense blocks, would mostly hold zeros.
+        # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In such sparse factors,
+        # dense blocks of several columns would mostly hold zeros.
         factors = splu(
             pulled,
             permc_spec="MMD_AT_PLUS_A",
@@ -72,7 +72,7 @@ def factored(matrix: Any) -> Solve:
 def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
     """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients.
 
-    Step k of the method reaches k pixels far: what is smooth over longer distances stays as it is, near 0.
+    Step k of the method reaches k pixels far; components that are smooth over longer distances stay near 0.
     """
     inverse = 1 / (matrix.diagonal().real + PULL)
     scaled = LinearOperator(matrix.shape, matvec=lambda v: inverse * v, dtype=matrix.dtype)
@@ -85,11 +85,11 @@ def locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.nd
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Context, and decorator, in which BLAS keeps to one thread.
+    """Context, and decorator, that limits BLAS to one thread.
 
-    The dense blocks of sparse factors are tiny, and so are products of two vectors: threads would cost many
-    times the work, most of all where other processes are busy. Sums do not depend on the number of threads
-    either.
+    The dense blocks of sparse factors are tiny, and so are products of two vectors. Threads would cost many
+    times the work, most of all when other processes are busy. With one thread, sums do not depend on the
+    number of threads.
 
     Contexts may be nested, and several threads may be inside at once. The number of threads of BLAS is a
     setting of the whole process: it returns to its old value when the last context ends. A BLAS that
@@ -103,7 +103,7 @@ def one_thread() -> Iterator[None]:
 
 
 class _SharedLimit:
-    """Limit of BLAS to one thread, held as long as anyone is inside."""
+    """Limit of BLAS to one thread, held while any thread is inside."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -111,7 +111,7 @@ class _SharedLimit:
         self._held: Any = None
 
     def enter(self) -> None:
-        """Set the limit, if nobody else is inside."""
+        """Set the limit, if no other thread is inside."""
         with self._lock:
             if not self._inside:
                 with _any_thread_may_set():
@@ -119,7 +119,7 @@ class _SharedLimit:
             self._inside += 1
 
     def leave(self) -> None:
-        """Restore the old setting, if nobody else is inside."""
+        """Restore the old setting, if no other thread is inside."""
         with self._lock:
             self._inside -= 1
             if not self._inside:
@@ -134,8 +134,8 @@ _LIMIT: Final = _SharedLimit()
 def _any_thread_may_set() -> Iterator[None]:
     """Context in which threadpoolctl lets this thread set the number of threads of OpenBLAS.
 
-    Since version 3.8 it ignores all threads but the one that set the number first, and the last thread to
-    leave `one_thread` may be another one.
+    Since version 3.8 it ignores all threads except the first that set the number, and another thread may be
+    the last to leave `one_thread`.
     """
     release = getattr(OpenBLASController, "clear_controlling_thread", None)
     if release is None:

@@ -1,1 +1,1 @@
-"""From crosses to the surface that has them."""
+"""Surfaces from cross fields."""

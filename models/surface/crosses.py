@@ -1,4 +1,4 @@
-"""Means of crosses whose lines have no order: of the polynomials that have both lines as roots."""
+"""Means of crosses whose lines have no order: means of the polynomials that have both lines as roots."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..smooth.polyvector import roots
 class Crosses:
     """Two lines at each of n places. product, total: complex (n,), of the numbers exp(2 i angle) of the two.
 
-    Neither depends on the order of the lines or on turns by pi, and so nothing here does.
+    Neither depends on the order of the lines or on turns by pi, and so no result here does.
     """
 
     product: NDArray[np.complex128]
@@ -25,7 +25,7 @@ class Crosses:
 
     @classmethod
     def of(cls, field: CrossField) -> Crosses:
-        """The crosses of a field. From u at alpha + beta and v at alpha + pi/2 - beta."""
+        """The crosses of a field, from u at alpha + beta and v at alpha + pi/2 - beta."""
         return cls(-np.exp(4j * field.alpha), 2j * np.sin(2 * field.beta) * np.exp(2j * field.alpha))
 
     def averaged(self, mean: Any) -> Crosses:
@@ -33,7 +33,7 @@ class Crosses:
         return Crosses(mean @ self.product, mean @ self.total)
 
     def at(self, places: Bools) -> Crosses:
-        """Those at some places, a mask (n,)."""
+        """The crosses at some places, a mask (n,)."""
         return Crosses(self.product[places], self.total[places])
 
     @property

@@ -12,8 +12,8 @@ from ..smooth.systems import factored
 from .equations import Equations
 
 _ROUNDS: Final = 60  # 5 to 25 are usual
-_TRIALS: Final = 12  # of a damping in a round
-_FALL: Final = 2e-4  # share of the energy that a round has to take off for another one to be made
+_TRIALS: Final = 12  # increases of the damping in a round
+_FALL: Final = 2e-4  # least share of the energy that a round has to remove before another one
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
 _UP: Final = 5.0
@@ -21,10 +21,10 @@ _DOWN: Final = 8.0
 
 
 def descended(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
-    """The energy of heights to which there is a way down from z, and these heights.
+    """Minimise from heights z, and return the energy reached and its heights.
 
-    Every round computes the energy anew, and takes only what is lower. It ends when hardly anything is
-    gained, after 60 rounds, or when time is over.
+    Every round computes the energy anew and adopts only lower points. The descent ends when there is hardly
+    any gain, after 60 rounds, or when time is over.
     """
     energy, damping = equations.energy(z), _DAMPING
     for _ in range(_ROUNDS):

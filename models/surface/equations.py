@@ -1,4 +1,4 @@
-"""What a surface over crosses minimises, and its slope and curvature for a descent."""
+"""The energy that a surface over crosses minimises, with its slope and curvature for a descent."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from .stencils import Stencils, scaled
 CONJUGACY: Final = 0.1
 """Weight of conjugacy: from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree."""
 FORGIVEN: Final = 0.007
-"""Cosine of the angle in space, of what should be a right one, from which a cross counts less and less."""
+"""Cosine of the angle in space, ideally a right one, from which a cross counts less and less."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """How much is asked of a surface beside the equations of its crosses.
+    """Weights of a surface's energy besides the equations of its crosses.
 
-    even: of the normals of neighbours, times the number of pixels, to be alike. facing: of every normal to
-    point to the viewer. forgiven: as FORGIVEN; infinity for plain squares.
+    even: differences of the normals of neighbours, times the number of pixels. facing: deviation of every
+    normal from the viewer. forgiven: as FORGIVEN; infinity for plain squares.
     """
 
     even: float
@@ -74,8 +74,8 @@ class Equations:
     def conjugacy(self) -> Any:
         """The matrix (2b, N) of u . d_v g, then of v . d_u g, at the centres of blocks.
 
-        There all derivatives are central ones: at the border, where a surface is steep, one-sided ones of
-        pixels spoil more than the crosses do.
+        All derivatives there are central ones. At the border, where a surface is steep, one-sided derivatives
+        at pixels would cause larger errors than the crosses do.
         """
         blocks = self.stencils.blocks
         count = blocks.shape[1]
@@ -130,7 +130,8 @@ class Equations:
     def model(self, z: Floats) -> tuple[Floats, Any]:
         """Half the slope (N,) of the energy at z, and half a curvature (N, N) that is nowhere negative.
 
-        The curvature is that of Gauss and Newton; of `facing`, that of |g|^2 weighed as at z.
+        The curvature is the one of Gauss and Newton; for `facing`, the curvature of |g|^2 with weights as at
+        z.
         """
         linear, squares = self._squares
         down, angles = self._of_angles(z)
@@ -168,14 +169,14 @@ class Equations:
 
 
 def normals_of(stencils: Stencils, z: Floats) -> Floats:
-    """The unit normals of the pixels, their parts x, y and z one below the other: shape (3, n)."""
+    """The unit normals of the pixels, with their parts x, y and z one below the other: shape (3, n)."""
     x, y = (slope @ z for slope in stencils.slopes)
     normals: Floats = np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y)
     return normals
 
 
 def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
-    """How the parts of the normals change with dz/dx and dz/dy at the same pixel: shape (3, 2, n)."""
+    """Derivatives of the parts of the normals by dz/dx and dz/dy at the same pixel: shape (3, 2, n)."""
     x, y = (slope @ z for slope in stencils.slopes)
     changes: Floats = np.array([[-1 - y * y, x * y], [x * y, -1 - x * x], [-x, -y]])
     changes *= (1 + x * x + y * y) ** -1.5
@@ -183,7 +184,7 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
 
 
 def _in_blocks(values: Floats, row: Any, column: Any, size: int) -> Any:
-    """The matrix (2n, 2n) of 2 x 2 blocks of (n, n), that hold values (2, 2, k) at these places; n = size."""
+    """The matrix (2n, 2n) of 2 x 2 blocks (n, n) with values (2, 2, k) at these places; n = size."""
     places = [
         np.concatenate([each + size * block[axis] for block in np.ndindex(2, 2)])
         for axis, each in enumerate((row, column))

@@ -1,4 +1,4 @@
-"""What is known of the surface at a place, beside the crosses."""
+"""Known normals of the surface at single pixels, in addition to the crosses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .equations import Rows
 from .levels import Level
 
 WEIGHT: Final = 0.1
-"""Weight of each pixel of the disc about a hint: its neighbours lean a little otherwise."""
+"""Weight of each pixel of the disc about a hint: the normals of its neighbours differ a little."""
 _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
 
 
@@ -25,7 +25,7 @@ class Hint:
     """The normal of the surface at a pixel.
 
     row, column: of the pixel. slant: angle between the normal and the direction to the viewer, in
-    [0, pi/2) radians. tilt: direction to which the normal leans in the picture, in radians counter-clockwise
+    [0, pi/2) radians. tilt: direction in which the normal leans in the picture, in radians counter-clockwise
     from +x with y up.
     """
 
@@ -42,7 +42,7 @@ class Hint:
 
 
 def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
-    """Nothing, when every hint can be used on the instance. Raises InputError."""
+    """Raise InputError unless every hint can be used on the instance."""
     mask = instance.mask
     for hint in hints:
         place = f"the hint at row {hint.row}, column {hint.column}"
@@ -59,12 +59,12 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
                 f"{place} has a slant of {np.degrees(hint.slant):g} degrees; give one from 0 to less than 90"
             )
         if not np.isfinite(hint.tilt):
-            raise InputError(f"{place} has the tilt {hint.tilt}, which is no direction; give a finite angle")
+            raise InputError(f"{place} has the tilt {hint.tilt}, not a direction; give a finite angle")
 
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """The pixels of a level about a hint, a mask (n,), and the slopes that they shall have."""
+    """The pixels of a level about a hint, a mask (n,), and the slopes required there."""
 
     level: Level
     pixels: Bools
@@ -82,7 +82,7 @@ class Disc:
 
     @property
     def rows(self) -> Rows:
-        """The squares that ask for the slopes."""
+        """The squares that require the slopes."""
         chosen = [slope[self.pixels] for slope in self.level.stencils.slopes]
         weight = np.sqrt(WEIGHT)
         return Rows(weight * sparse.vstack(chosen), weight * np.repeat(self.slopes, int(self.pixels.sum())))

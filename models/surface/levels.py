@@ -13,8 +13,8 @@ from .crosses import Crosses
 from .stencils import Stencils, around
 
 SMALL: Final = 500
-"""Pixels of the coarsest level, at most, unless it cannot be halved: there all starts are tried."""
-_DOME: Final = 0.7  # height of a dome, in parts of that of a half sphere
+"""Most pixels of the coarsest level, unless it cannot be halved: all starts are tried there."""
+_DOME: Final = 0.7  # height of a dome, relative to a half sphere
 _PLANE: Final = 0.5  # slope of a plane
 
 
@@ -36,7 +36,7 @@ class Level:
         return self.stencils.grid
 
     def coarser(self) -> Level:
-        """The level of pixels twice as large: one for each 2 x 2 that holds any, with their mean cross."""
+        """The level of pixels twice as large: one for each nonempty 2 x 2, with its mean cross."""
         grid = self.grid
         larger = Grid(_halved(grid.mask))
         at = larger.number[grid.rows // 2, grid.columns // 2]
@@ -45,7 +45,7 @@ class Level:
         return Level(Stencils(larger), self.crosses.averaged(mean), self.corner, self.halved + 1)
 
     def refined(self, coarse: Level, heights: Floats) -> Floats:
-        """The heights (N,) between those of the coarser level, which is made of this one."""
+        """The heights (N,) interpolated from the coarser level, which was made from this one."""
         picture = np.zeros(coarse.stencils.used.shape)
         picture[coarse.stencils.used] = heights
         row, column = np.nonzero(self.stencils.used)
@@ -55,7 +55,7 @@ class Level:
 
     @property
     def starts(self) -> list[Floats]:
-        """Heights to begin with: a dome over the mask, and planes that rise to the right and upwards."""
+        """Initial heights: a dome over the mask, and planes that rise to the right and upwards."""
         from scipy import ndimage
 
         used = self.stencils.used

@@ -1,4 +1,4 @@
-"""From a cross field to the surface whose curvature lines its crosses look like."""
+"""From a cross field to a surface with the crosses as curvature lines."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from .surface import Surface
 from .trust import confidence_of, doubts_of, firmness, freedom_of, off_right_angles
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)
-"""The first pass from a start: stiff, so that starts come together."""
+"""The first pass from a start: stiff, so that starts converge to the same surface."""
 WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)
 """Found on cylinder, torus, vase and spheroid of docs/surface.md, exact and from strokes."""
 
 CLEARLY: Final = 0.8
-"""Share of the energy from a dome below which that from a plane is preferred: bodies bulge more often."""
+"""Ratio of energies below which the plane's surface is preferred to the dome's: bodies bulge more often."""
 
 TELLING: Final = np.radians(10)
-"""Least slant of a hint that tells z from -z: with less slant, both sides fit it nearly alike."""
-_LEVEL: Final = 0.05  # share of what leans at the border to which the leanings cancel, where none is outward
+"""Least slant of a hint that distinguishes z from -z: with less slant, both sides fit it nearly alike."""
+_LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
 @one_thread()
@@ -45,21 +45,22 @@ def surface(
     over: Over = never,
     progress: Progress = silent,
 ) -> Surface:
-    """The surface whose curvature lines the crosses of a field look most like, seen from the front.
+    """The surface whose curvature lines fit the crosses of a field best, seen from the front.
 
     One height at each corner of a pixel, found by minimising the energy of `Equations` from three starts on
     a coarse grid, and then on finer ones. Neither the order of the two lines nor jumps matter. Parts of the
     mask that share no corner are independent; the mean height of each is 0. Deterministic.
 
     Turned inside out, z to -z, a surface has the same crosses. So each part leans outward at its border on
-    the whole, or where that is undecided upward, as a floor seen from above. hints: normals that are known at
-    some pixels; a part with one that is slanted by 10 degrees or more takes its side from there. flip: turns
-    all other parts inside out. Hints also choose among surfaces of different depth with the same crosses.
-    over: says whether the time is over; then the best heights so far come back, and a doubt says so.
+    the whole, or, if that is undecided, upward, as a floor seen from above. hints: known normals at some
+    pixels; a part with a hint that is slanted by 10 degrees or more takes its side from it. flip: turns all
+    other parts inside out. Hints also choose among surfaces of different depth with the same crosses. over:
+    returns whether the time is over; then the best heights so far are returned, with a doubt that states
+    this.
 
     Raises InputError for a hint outside the mask, or with angles that no normal has. See docs/surface.md.
     """
-    instance, given, cut = field.instance, tuple(hints), Cut(over)
+    instance, given, cut = field.instance, tuple(hints), TimeLimit(over)
     check_hints(given, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
@@ -74,11 +75,11 @@ def surface(
         found.append((level.grid.size, level, z, own))
     _, level, z, own = max(found, key=lambda each: each[0])
     firm = firmness(level, z, [Disc.of(hint, level).rows for hint in own])
-    return _judged(field, heights, firm, hinted=_tells(own), cut=cut.off)
+    return _judged(field, heights, firm, hinted=_decide_side(own), cut=cut.off)
 
 
 def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cut: bool) -> Surface:
-    """The surface of heights, with what is to be said of it."""
+    """The surface of heights, with its doubts and freedom."""
     off = off_right_angles(field, heights)
     found = Surface(field, heights, confidence_of(field, off), (), freedom_of(firm, hinted=hinted), firm)
     slant = np.arccos(np.minimum(found.normals[:, 2], 1.0))
@@ -87,8 +88,8 @@ def _judged(field: CrossField, heights: Floats, firm: float, *, hinted: bool, cu
 
 
 @dataclass
-class Cut:
-    """Whether time is over, asked of another; keeps in mind that it once was."""
+class TimeLimit:
+    """A time limit that remembers whether it was ever over."""
 
     over: Over
     off: bool = False
@@ -124,26 +125,26 @@ def _energy(found: tuple[float, Floats]) -> float:
 def _from_start(
     level: Level, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
 ) -> Iterator[tuple[float, Floats]]:
-    """Energies and heights to which a start leads, with hints from the sides that are possible."""
+    """Energies and heights reached from a start, with hints from the possible sides."""
     _, z = descended(Equations(level.stencils, level.crosses, FIRST), z, over)
     z = _oriented(level, z, flip=flip)
-    for side in (z, -z) if _tells(hints) else (z,):
+    for side in (z, -z) if _decide_side(hints) else (z,):
         yield _settled(level, side, hints, over)
 
 
-def _tells(hints: Sequence[Hint]) -> bool:
-    """Whether hints tell z from -z."""
+def _decide_side(hints: Sequence[Hint]) -> bool:
+    """Whether hints distinguish z from -z."""
     return any(hint.slant >= TELLING for hint in hints)
 
 
 def _settled(level: Level, z: Floats, hints: Sequence[Hint], over: Over) -> tuple[float, Floats]:
-    """The energy and heights to which z leads down, with the hints."""
+    """The energy and heights reached from z by descent, with the hints."""
     extra = [Disc.of(hint, level).rows for hint in hints]
     return descended(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
 
 
 def _oriented(level: Level, z: Floats, *, flip: bool) -> Floats:
-    """The heights or their negatives: that lean outward at the border, else upwards; or those that do not."""
+    """The heights or their negatives, whichever lean outward at the border, else upwards; or the opposite."""
     lean = normals_of(level.stencils, z)[:2].T
     inside = np.pad(level.grid.mask, 1)
     row, column = level.grid.rows + 1, level.grid.columns + 1

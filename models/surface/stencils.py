@@ -1,4 +1,4 @@
-"""From heights at the corners of pixels to slopes, and to how slopes change: sparse matrices."""
+"""Sparse matrices from heights at the corners of pixels to slopes and to changes of slopes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Stencils:
 
     @cached_property
     def twist(self) -> Any:
-        """The matrix (n, N) of what slopes do not see: the two diagonals of a pixel against each other."""
+        """The matrix (n, N) of the component without slope: the difference of a pixel's two diagonals."""
         return self._at_pixels(-1.0, 1.0, 1.0, -1.0)
 
     @cached_property
@@ -80,7 +80,7 @@ def around(corners: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
 
 
 def scaled(matrix: Any, by: Floats) -> Any:
-    """The sparse matrix with each of its rows times a number."""
+    """The sparse matrix with each row multiplied by a number."""
     return sparse.diags_array(by) @ matrix
 
 

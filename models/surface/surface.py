@@ -22,11 +22,11 @@ class Surface(Pictured):
 
     field: the cross field, its pixels in the order of `instance.grid`. heights: float (height + 1, width + 1)
     at the corners of pixels, [0, 0] the upper left one, in pixels; NaN at a corner of no pixel of the mask.
-    confidence: float (n,) in [0, 1], how well the equations hold at each pixel, which is not how near the
-    surface is to the one that was meant. doubts: sentences that say why the surface should not be trusted;
-    empty where nothing speaks against it. freedom: sentences that say which other surfaces have the same
-    crosses. firmness: by how much the angles between its lines in space change when its normals turn, in
-    radians for each radian, where they change least (docs/surface.md); of the largest part of the mask.
+    confidence: float (n,) in [0, 1], how well the equations hold at each pixel, which does not measure the
+    distance from the intended surface. doubts: sentences with reasons not to trust the surface;
+    empty if there are none. freedom: sentences that describe other surfaces with the same
+    crosses. firmness: change of the angles between its lines in space when its normals turn, in radians per
+    radian, where they change least (docs/surface.md); of the largest part of the mask.
     """
 
     field: CrossField
@@ -38,7 +38,7 @@ class Surface(Pictured):
 
     @property
     def instance(self) -> Instance:
-        """The instance of its field."""
+        """The instance of the field."""
         return self.field.instance
 
     @cached_property

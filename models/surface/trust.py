@@ -1,4 +1,4 @@
-"""How far a surface can be trusted: how well its crosses fit it, and what they leave open."""
+"""Trust in a surface: how well its crosses fit it, and what they do not determine."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from .levels import Level
 from .stencils import Stencils, around, scaled
 
 OFF: Final = np.radians(10)
-"""Lines whose angle in space is further than this from a right one do not fit."""
+"""Lines whose angle in space deviates more than this from a right angle do not fit."""
 UNFIT: Final = 0.25
-"""Share of the crosses that do not fit from which a surface is doubted; docs/surface.md has the figures."""
+"""Share of misfit crosses from which a surface is doubted; docs/surface.md has the figures."""
 SPOTS: Final = 4
 """Singular spots that a surface may show: an ellipsoid has four umbilics."""
 FLAT: Final = np.radians(10)
 """Mean slant below which a surface is called flat."""
 LOOSE: Final = 0.01
-"""Firmness below which the crosses do not tell a surface from others: see `firmness`."""
+"""Firmness below which the crosses do not determine the surface: see `firmness`."""
 
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
 _VECTORS: Final = 4
-_ROUNDS: Final = 12  # the least value has two digits after six
-_PULL: Final = 1e-7  # of the normals, so that what costs nothing does not make the system singular
+_ROUNDS: Final = 12  # the least value has two of six digits
+_PULL: Final = 1e-7  # of the normals, so that directions without cost do not make the system singular
 _TWIST: Final = 1e-3
 
 
 def off_right_angles(field: CrossField, heights: Floats) -> Floats:
-    """How far from a right angle both lines of each cross are on the surface, in [0, pi/2] radians; (n,)."""
+    """Deviation from a right angle between each cross's lines on the surface, in [0, pi/2] radians; (n,)."""
     stencils = Stencils(field.instance.grid)
     cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
     off: Floats = np.arcsin(np.minimum(np.abs(cosine), 1.0))
@@ -52,7 +52,7 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
 
 
 def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
-    """Sentences that say why a surface should not be trusted. slant: of its normals, radians (n,)."""
+    """Sentences with reasons not to trust a surface. slant: of its normals, radians (n,)."""
     unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
     found = []
     if unfit > UNFIT:
@@ -65,13 +65,13 @@ def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
     if slant.mean() < FLAT:
         found.append(
             f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
-            "lines that cross at right angles everywhere say nothing of a shape"
+            "lines that cross at right angles everywhere do not determine a shape"
         )
     return tuple(found)
 
 
 def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
-    """Sentences that say which other surfaces have the same crosses."""
+    """Sentences that describe other surfaces with the same crosses."""
     found = [] if hinted else ["inside out it has the same crosses: see whether it bulges the right way"]
     if firm < LOOSE:
         found.append(
@@ -83,11 +83,11 @@ def freedom_of(firm: float, *, hinted: bool) -> tuple[str, ...]:
 
 
 def firmness(level: Level, z: Floats, extra: Sequence[Rows] = ()) -> float:
-    """How much the equations change, at least, when the normals turn: radians for each radian, both rms.
+    """Least change of the equations when the normals turn: radians per radian, both rms.
 
     The root of the least eigenvalue of the curvature of right angles, conjugacy and hints at heights z,
-    against that of the normals; by inverse iteration. Along a family of surfaces with the same crosses it
-    is 0. 0 too for masks too small to say.
+    relative to the curvature of the normals; by inverse iteration. It is 0 along a family of surfaces with
+    the same crosses, and for masks that are too small.
     """
     count = level.stencils.count
     if level.grid.size < 2 * _VECTORS:

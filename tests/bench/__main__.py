@@ -37,7 +37,7 @@ FORMULATIONS = (
 )
 MILP = "milp-mccormick"
 LONG = 75.0
-"""Seconds that the next size may be expected to take a peer."""
+"""Seconds that the next size of a peer may be expected to take."""
 MUCH = 8e9
 """Bytes of memory that it may be expected to need."""
 
@@ -45,7 +45,7 @@ Found = dict[str, Any]
 
 
 class Bench:
-    """Runs measurements in a folder and remembers them by what was measured."""
+    """Runs measurements in a folder and remembers them by their arguments."""
 
     def __init__(self, folder: Path, measure: Callable[[Found], Found | None]) -> None:
         self._folder = folder
@@ -55,7 +55,7 @@ class Bench:
     def run(
         self, task: str, size: int, formulation: str = MILP, suffix: str = "lp", **given: Any
     ) -> Found | None:
-        """What was measured, or None when the task failed."""
+        """Measure a task; return None when it failed."""
         key = " ".join(map(str, (task, formulation, suffix, size, *given.values())))
         whole = {
             "task": task,
@@ -72,7 +72,7 @@ class Bench:
 
 
 def in_child(given: Found) -> Found | None:
-    """A measurement in a process of its own; None, with the reason on standard error, when it fails."""
+    """Measure in a separate process; return None, with the reason on standard error, when it fails."""
     command = [sys.executable, str(HERE / "work.py"), json.dumps(given)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -119,7 +119,7 @@ def cases(names: tuple[str, ...]) -> Iterator[tuple[str, tuple[str, str]]]:
 
 
 def ours(bench: Bench, sizes: tuple[int, ...], pixels: int) -> None:
-    """What has no peer: all formats, growth, where the time goes, pictures and solutions."""
+    """Measurements without a peer: all formats, growth, sections, pictures and solutions."""
     for size in sizes[-2:]:
         for suffix, dialect in (("nl", "text"), ("nl", "binary"), ("gms", "scalar"), ("gms", "indexed")):
             bench.run("ours", size, MILP, suffix, dialect=dialect)

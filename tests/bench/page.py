@@ -1,4 +1,4 @@
-"""docs/performance.md from what the benchmark measured."""
+"""docs/performance.md from the measurements of the benchmark."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PACKAGES = ("numpy", "sympy", "pyomo", "linopy", "highspy", "pyoptinterface")
 
 
 def machine() -> dict[str, str]:
-    """What the numbers depend on, without the name of the host."""
+    """Facts about the machine that the numbers depend on, without the name of the host."""
     found = {"Python": platform.python_version(), "system": platform.system()}
     info = Path("/proc/cpuinfo")
     model = re.search(r"model name\s*:\s*(.+)", info.read_text()) if info.exists() else None
@@ -48,7 +48,7 @@ def machine() -> dict[str, str]:
 
 
 class Page:
-    """The measurements, by what was measured, and tables of them."""
+    """The measurements by their arguments, and tables of them."""
 
     def __init__(self, document: Found) -> None:
         self.found: dict[str, Found] = document["found"]
@@ -60,7 +60,7 @@ class Page:
         return self.found.get(" ".join(map(str, (task, formulation, suffix, size, *rest))))
 
     def ratio(self, other: Found | None, one: Found | None, what: str = "seconds") -> float | None:
-        """How many times as much the other one takes."""
+        """The ratio of the other measurement to this one."""
         return other[what] / one[what] if other and one and one[what] else None
 
 
@@ -70,7 +70,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def seconds(found: Found | None, what: str = "seconds") -> str:
-    """Seconds with three digits that mean something."""
+    """Seconds with three significant digits."""
     return "" if found is None else f"{found[what]:.3g}" if found[what] < 100 else f"{found[what]:.0f}"
 
 
@@ -148,19 +148,19 @@ def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
         for suffix in ("lp", "mps")
         if (found := at("ours", size, suffix))
     }
-    told = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
+    rates = " and ".join(f"{suffix} at {speed:.0f} MB/s" for suffix, speed in speeds.items())
     all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
     took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
     return (
         f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} targets are met; "
         "the first table has them all. "
-        f"At {size} x {size} pixels the writers make {told or 'what was not measured'}. All formats of the "
+        f"At {size} x {size} pixels the writers make {rates or 'what was not measured'}. All formats of the "
         f"largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
     )
 
 
 def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
-    """What limits the writers, in numbers of the same run."""
+    """The limits of the writers, in numbers of the same run."""
     lines = [
         linopy_reason(at, half),
         pyomo_reason(at, middle),
@@ -171,7 +171,7 @@ def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
 
 
 def pyomo_reason(at: Page, size: int) -> str:
-    """How fast a small file with products is written beside a larger one without."""
+    """Comparison of a small file with products and a larger one without."""
     mine, other = (at("ours", size, "lp", name) for name in ("qp-fixed", MILP))
     if not (mine and other):
         return ""
@@ -184,7 +184,7 @@ def pyomo_reason(at: Page, size: int) -> str:
 
 
 def linopy_reason(at: Page, size: int) -> str:
-    """What linopy is spared, and what our CPU seconds go to."""
+    """Work that linopy does not do, and the distribution of our CPU seconds."""
     mine, theirs = at("ours", size), at("linopy", size)
     made, hashed, written = (
         at(*step) for step in (("rendered", size, "lp", MILP, ""), ("hashed", size), ("copied", size))
@@ -204,7 +204,7 @@ def linopy_reason(at: Page, size: int) -> str:
 
 
 def write_reason(at: Page, size: int, suffix: str) -> str:
-    """What hashing alone takes beside one write: a file is not closed before its last byte is hashed."""
+    """Time of hashing compared with one write: a file is not closed before its last byte is hashed."""
     mine, hashed, written = at("ours", size, suffix), at("hashed", size, suffix), at("copied", size, suffix)
     if not (mine and hashed and written):
         return ""
@@ -217,7 +217,7 @@ def write_reason(at: Page, size: int, suffix: str) -> str:
 
 
 def growth_reason(at: Page, half: int, big: int) -> str:
-    """How the parts grow."""
+    """The growth of the parts with size."""
     made = {
         s: at.ratio(at("rendered", big, s, MILP, ""), at("rendered", half, s, MILP, ""), "cpu")
         for s in ("lp", "mps", "nl")
@@ -236,7 +236,7 @@ def growth_reason(at: Page, half: int, big: int) -> str:
 
 
 def times(value: float | None) -> str:
-    """A ratio with digits that mean something."""
+    """A ratio with significant digits."""
     return "" if value is None else f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
@@ -273,7 +273,7 @@ def linopy_target(at: Page, size: int, what: str) -> list[str]:
 
 
 def pyomo_target(at: Page, names: Sequence[str], size: int, what: str) -> list[str]:
-    """Pyomo over ours, where that is least."""
+    """Pyomo over ours, at its smallest ratio."""
     ratios = {
         f"{name} {suffix}": at.ratio(*pair(at, name, suffix, size), what)
         for name in names
@@ -306,7 +306,7 @@ def everything_targets(at: Page, size: int) -> list[list[str]]:
 
 
 def growth_target(at: Page, half: int, big: int, what: str) -> list[str]:
-    """How much more four times the pixels take."""
+    """Ratio of times for four times the pixels."""
     grown = {
         s.upper(): at.ratio(at("ours", big, s, MILP, *rest), at("ours", half, s, MILP, *rest), what)
         for s, rest in (("lp", ()), ("mps", ()), ("nl", ("text",)), ("gms", ("scalar",)))
@@ -315,7 +315,7 @@ def growth_target(at: Page, half: int, big: int, what: str) -> list[str]:
 
 
 def small_targets(at: Page, size: int) -> list[list[str]]:
-    """What is small: one drawing in everything, and the help."""
+    """Targets of small tasks: one drawing in everything, and the help."""
     found = at("everything", size, "indexed", "all", 1)
     spent = {"": found and found["seconds"]}
     return [
@@ -375,7 +375,7 @@ def against_pyomo(at: Page, names: Sequence[str], size: int) -> list[str]:
 
 
 def where(at: Page, size: int) -> list[str]:
-    """What making, hashing and writing cost, and the sections of a file."""
+    """Times of making, hashing and writing, and the sections of a file."""
     lines = [
         (
             f"`{MILP}`, {size} x {size}. CPU seconds: the bytes alone, their SHA-256, one write of them, "
@@ -417,7 +417,7 @@ def where(at: Page, size: int) -> list[str]:
 
 
 def others(at: Page, sizes: Sequence[int], pixels: int) -> list[str]:
-    """All formats at the two largest sizes, and what else users wait for."""
+    """All formats at the two largest sizes, and other tasks that users wait for."""
     rows = []
     for size in sizes[-2:]:
         for suffix, rest in (

@@ -26,13 +26,13 @@ from crossfield.models.instance.instance import Instance
 
 Measured = Callable[[], object]
 WARM = 6
-"""Pixels a side of the model that goes first."""
+"""Pixels per side of the warm-up model."""
 ONCE = 5.0
-"""What takes longer is measured once, the rest three times."""
+"""Seconds above which a task is measured once, instead of three times."""
 
 
 def square(size: int) -> Instance:
-    """A full square of pixels, a fifth of them with a stroke, each in a direction of its own."""
+    """A full square of pixels, a fifth of them with a stroke, each in its own direction."""
     row, column = np.mgrid[:size, :size]
     pixels = np.argwhere((7 * row + 3 * column) % 5 == 0)
     theta = (2 * np.arctan2(pixels[:, 0] + 0.5, pixels[:, 1] + 0.5) + 1e-3 * pixels[:, 0]) % np.pi
@@ -195,7 +195,7 @@ def pyoptinterface(instance: Instance, formulation: str, suffix: str, path: Path
 def copied(
     instance: Instance, formulation: str, suffix: str, path: Path, dialect: str | None = None
 ) -> Measured:
-    """The bytes of the finished file with one write: no writer can be faster."""
+    """Write the bytes of the finished file at once: no writer can be faster."""
     write(formulated(formulation, instance), path, dialect=dialect)
     data = path.read_bytes()
     copy = path.with_name("copy")
@@ -330,7 +330,7 @@ TASKS = {
 
 
 READERS = ("picture", "solution")
-"""Tasks that read the file that they prepared."""
+"""Tasks that read a file that they prepared."""
 
 
 def peak_memory() -> int:
@@ -342,7 +342,7 @@ def peak_memory() -> int:
 
 
 def measured(task: str, size: int, folder: str, *, once: bool = False, **given: Any) -> dict[str, Any]:
-    """What a task took: after the small model, and after what is not measured.
+    """Measure a task, after the small model and after unmeasured preparation.
 
     Median of three, or one run when it is long.
 
@@ -371,7 +371,7 @@ def remove_written(path: Path) -> None:
 
 
 def timed(run: Measured, before: Measured) -> dict[str, Any]:
-    """Wall and CPU seconds of one run, and what it found. before: what is done first, not measured."""
+    """Wall and CPU seconds of one run, and its result. before: unmeasured preparation."""
     before()
     gc.collect()
     cpu, wall = time.process_time(), time.perf_counter()

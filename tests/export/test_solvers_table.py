@@ -1,4 +1,4 @@
-"""Facts of solvers stand once: in the table, from which everything else is made."""
+"""The table of solvers is the only place with their facts."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_what_the_table_names_is_there():
 
 
 def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """`list`, the manifest and the table of programs tell of it, and nothing else was touched."""
+    """`list`, the manifest and the table of programs show it without other changes."""
     monkeypatch.setitem(SOLVERS, "toy", TOY)
     columns, rows = tables()["externals"]
     assert "toy" in columns
@@ -66,7 +66,7 @@ def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_solver_is_one_entry_and_the_module_of_its_program(monkeypatch: pytest.MonkeyPatch):
-    """Under another name HiGHS solves, for everything is read from the table."""
+    """HiGHS solves under another name, because everything is read from the table."""
     twin = Solver("twin", "Twin", ("lp",), "highs", start=StartFile("highs", ".sol", "as HiGHS does"))
     monkeypatch.setitem(SOLVERS, "twin", twin)
     problem = cf.formulate(make_instance("hole"), "milp-mccormick", relax=True)

@@ -1,4 +1,4 @@
-"""Files that are written beside and renamed: what others left in a folder stands in nobody's way."""
+"""Files are written under another name and renamed; leftovers of others do not interfere."""
 
 import os
 import subprocess
@@ -25,10 +25,10 @@ def left_by_the_dead(path):
 from pathlib import Path
 from crossfield.models.storage import neighbour
 print(neighbour(Path(sys.argv[1])))"""
-    said = subprocess.run(
+    output = subprocess.run(
         [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
     ).stdout
-    return Path(said.strip())
+    return Path(output.strip())
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0, reason="acts as two users, which only root can")

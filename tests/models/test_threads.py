@@ -36,27 +36,27 @@ methods = {
     "fitted_1norm": lambda: fitted_1norm(power)[0], "first": lambda: first_field(instance),
     "surface": lambda: cf.surface(power),
 }
-told = {}
+results = {}
 for name, method in methods.items():
     whole, mine = time.process_time(), time.thread_time()
     found = method()
     others = (time.process_time() - whole) - (time.thread_time() - mine)
     arrays = [found.heights] if name == "surface" else [found.alpha, found.beta, found.p]
     digest = hashlib.sha256(b"".join(each.tobytes() for each in arrays)).hexdigest()
-    told[name] = [digest, others, time.thread_time() - mine]
-print(json.dumps(told))
+    results[name] = [digest, others, time.thread_time() - mine]
+print(json.dumps(results))
 """
 
 
 @pytest.mark.slow
 def test_methods_run_in_one_thread_whatever_blas_may_take():
-    told = {}
+    results = {}
     for threads in ("1", "4"):
         environment = os.environ | {"OPENBLAS_NUM_THREADS": threads}
         command = [sys.executable, "-c", PROGRAM]
-        said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-        told[threads] = json.loads(said)
-    assert len(told["1"]) == 10
-    for name, (digest, others, mine) in told["4"].items():
-        assert digest == told["1"][name][0], name
+        output = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        results[threads] = json.loads(output)
+    assert len(results["1"]) == 10
+    for name, (digest, others, mine) in results["4"].items():
+        assert digest == results["1"][name][0], name
         assert others < 0.1 + 0.1 * mine, name  # seconds of CPU, not of a clock

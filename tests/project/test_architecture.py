@@ -1,4 +1,4 @@
-"""docs/architecture.md and its picture say of the folders what is so, and no import leads upwards."""
+"""docs/architecture.md and its picture describe the present folders, and no import leads upwards."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def rooms():
 
 @pytest.fixture(scope="module")
 def listed():
-    """The rows of the page's table: folder -> (what lives there, what it uses), from the ground up."""
+    """The rows of the page's table: folder -> (description, imports), from the ground up."""
     page = (ROOT / "docs" / "architecture.md").read_text()
     rows = re.findall(r"^\| `([a-z/]+)/` \| (.+?) \| (.+) \|$", page, re.MULTILINE)
     return {folder: (text, re.findall(r"`([a-z/]+)`", used)) for folder, text, used in rows}
@@ -42,7 +42,7 @@ def test_every_folder_says_what_lives_there(rooms, listed):
 
 
 def upwards(listed):
-    """Arrows to a folder that stands later in the table, or nowhere."""
+    """Arrows to a folder that comes later in the table, or is missing."""
     order = list(listed)
     return [
         (folder, other)

@@ -1,4 +1,4 @@
-"""What comments, docstrings and pages cite is there: rules, sections, tests, files and links;
+"""Citations in comments, docstrings and pages exist: rules, sections, tests, files and links;
 and every page is reached from the index.
 """
 
@@ -23,7 +23,7 @@ NOT_HERE = (
     "the brief",
     "design.md",
 )
-"""What only those had who wrote the first version."""
+"""Things that only the authors of the first version had."""
 
 
 @cache
@@ -34,8 +34,8 @@ def modules() -> list[Path]:
 
 
 @cache
-def said(path: Path) -> str:
-    """Comments and docstrings of a module; all of a page or layout."""
+def text_of(path: Path) -> str:
+    """Comments and docstrings of a module; the whole text of a page or layout."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         return text
@@ -74,7 +74,7 @@ def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
         (place(path), rule)
         for path in modules()
         if path.is_relative_to(ROOT / "export") or path.is_relative_to(ROOT / "templates")
-        for rule in rules(said(path))
+        for rule in rules(text_of(path))
     }
     assert len(cited) > 40
     assert {(where, rule) for where, rule in cited if rule not in listed} == set()
@@ -87,7 +87,7 @@ def test_every_rule_that_the_code_cites_is_on_the_page_of_rules():
 
 
 def test_nothing_is_cited_that_only_others_have():
-    texts = {path: " ".join(said(path).split()) for path in [*modules(), *PAGES]}
+    texts = {path: " ".join(text_of(path).split()) for path in [*modules(), *PAGES]}
     del texts[Path(__file__).resolve()]
     assert [(place(path), words) for path in texts for words in NOT_HERE if words in texts[path]] == []
 
@@ -96,7 +96,7 @@ def test_cited_pages_and_their_sections_are_there():
     sections = re.findall(r"^## (\d+)\.", (ROOT / "docs" / "mathematics.md").read_text(), re.MULTILINE)
     assert sections == [str(number) for number in range(1, len(sections) + 1)]
     for path in modules():
-        text = " ".join(said(path).split())
+        text = " ".join(text_of(path).split())
         for page in re.findall(r"\bdocs/[\w-]+\.md\b", text):
             assert (ROOT / page).exists(), (place(path), page)
         for numbers in re.findall(r"docs/mathematics\.md, (\d+(?:(?:,| and| to) \d+)*)", text):
@@ -139,14 +139,14 @@ def test_paths_that_pages_and_comments_name_are_there():
     path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
     missing = []
     for path in [*PAGES, *modules()]:
-        for found in path_like.findall(said(path)):
+        for found in path_like.findall(text_of(path)):
             if path.suffix == ".j2" or (path.suffix == ".py" and "." not in found.rpartition("/")[2]):
                 # layouts name each other from their own folder, and in code words with a / may be anything
                 continue
             if not any(ROOT.glob(found.rstrip("/").replace("NAME", "*"))):
                 missing.append((place(path), found))
         for dotted in re.findall(
-            r"\bcrossfield\.((?:models|export|templates)[a-z_0-9.]*[a-z_0-9])", said(path)
+            r"\bcrossfield\.((?:models|export|templates)[a-z_0-9.]*[a-z_0-9])", text_of(path)
         ):
             target = ROOT.joinpath(*dotted.split("."))
             if not (target.is_dir() or target.with_suffix(".py").exists()):
@@ -155,12 +155,12 @@ def test_paths_that_pages_and_comments_name_are_there():
 
 
 def test_modules_that_comments_name_without_a_folder_are_there():
-    """Words like `worker.py`; numpy.py is a file that a user may have by mistake."""
+    """Words like `worker.py`; a user may have a file numpy.py by mistake."""
     there = {path.name for path in modules()} | {"numpy.py"}
     named = {
         (place(path), name)
         for path in modules()
-        for name in re.findall(r"(?<![\w/.*<{-])([a-z_]+\.py)\b", said(path))
+        for name in re.findall(r"(?<![\w/.*<{-])([a-z_]+\.py)\b", text_of(path))
     }
     assert len(named) > 10
     assert {(where, name) for where, name in named if name not in there} == set()

@@ -1,4 +1,4 @@
-"""The wheel: everything of the tree that is needed, nothing that is not, and one top-level name."""
+"""The wheel: every needed file of the tree, no other file, and one top-level name."""
 
 import os
 import shutil
@@ -33,7 +33,7 @@ def wheel(tmp_path_factory):
 
 
 def in_tree():
-    """What belongs into the wheel: every module and every data file of the package's parts."""
+    """Files that belong in the wheel: every module and every data file of the package's parts."""
     files = [*ROOT.glob("*.py"), ROOT / "py.typed"]
     for part in PARTS:
         files += [path for path in (ROOT / part).rglob("*") if path.suffix in {".py", *DATA}]

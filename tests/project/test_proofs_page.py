@@ -1,4 +1,4 @@
-"""The page of proofs is what its command makes of the rows that were measured, and these agree with it."""
+"""The page of proofs equals its command's output for the measured rows, which agree with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The face of the package: its names, their docstrings, and what importing it costs."""
+"""The top-level package: its names, their docstrings, and the cost of importing it."""
 
 import inspect
 import re
@@ -116,7 +116,7 @@ def test_everything_public_says_what_it_is_in_a_first_sentence():
 
 
 def _is_sentence(line):
-    """It begins like one, and ends like one or goes on with details on the next line."""
+    """Whether it begins and ends like a sentence, or continues with details on the next line."""
     return bool(re.match(r"[A-Z0-9`.]", line)) and line[-1] in ".:"
 
 

@@ -1,4 +1,4 @@
-"""The README's blocks run as they stand, and its generated tables are up to date."""
+"""The README's blocks run as they are, and its generated tables are up to date."""
 
 from __future__ import annotations
 

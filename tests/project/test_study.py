@@ -1,4 +1,4 @@
-"""The study goes on where it was killed, each run with one row; its page is made from the rows beside it."""
+"""The study continues after a kill, each run with one row; its page is made from its rows."""
 
 from __future__ import annotations
 
@@ -167,14 +167,14 @@ def practice_rows(study, errors, size=24.0):
 
 def test_the_recommendation_follows_the_rows(study):
     slow = {"search": (5.0, 1.0, 10.0, 10.0), "two-stage": (6.0, 2.0, 10.0, 10.0)}
-    said = []
+    texts = []
     for bend, greedy in ((3.0, 4.0), (4.0, 3.0)):
         ways = {"bend": (bend, 1.5, 0.1, 0.0), "greedy": (greedy, 1.2, 0.1, 0.0)} | slow
         kept = {"practice": list(practice_rows(study, ways)), "solvers": [], "proofs": []}
-        said.append(study.practice_page.recommendation(kept))
-    assert [sentences[0].split("`")[1] for sentences in said] == ["bend", "greedy"]
-    assert {sentences[1] for sentences in said} == {"For the least energy take `search, 10 s` at 24 pixels."}
-    assert all(len(sentences) == 3 and "No solver proves half" in sentences[2] for sentences in said)
+        texts.append(study.practice_page.recommendation(kept))
+    assert [sentences[0].split("`")[1] for sentences in texts] == ["bend", "greedy"]
+    assert {sentences[1] for sentences in texts} == {"For the least energy take `search, 10 s` at 24 pixels."}
+    assert all(len(sentences) == 3 and "No solver proves half" in sentences[2] for sentences in texts)
     sizes = {
         24.0: {"bend": (3.0, 1.5, 0.1, 0.0), "greedy": (4.0, 1.2, 0.1, 0.0)} | slow,
         48.0: {"bend": (3.0, 1.5, 2.0, 0.0), "greedy": (4.0, 1.2, 0.9, 0.0)} | slow,

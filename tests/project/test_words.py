@@ -1,4 +1,4 @@
-"""The words of the docs: every one stands once in the glossary, and the methods are those of the table."""
+"""The words of the docs: each is once in the glossary, and the methods are those of the table."""
 
 import re
 from pathlib import Path

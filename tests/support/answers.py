@@ -108,7 +108,7 @@ FILES = {
 
 STATUS_ALONE = {"gams-lst", "baron-tim"}
 RELAXATIONS = {"milp_time_without_point", "milp_relaxed"}
-"""Files that hold the point of a relaxation, as the solver leaves it."""
+"""Files that hold the point of a relaxation, as the solver writes it."""
 
 OPTIMA = {
     "milp": 0.5565360828459345,

@@ -1,4 +1,4 @@
-"""A site in a real browser: served, shown as a desktop or a phone shows it, and measured."""
+"""A site in a real browser: served, shown as on a desktop or a phone, and measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What turning, mirroring and transposing a sketch does to pictures and to lines."""
+"""Effects of turning, mirroring and transposing a sketch on pictures and on lines."""
 
 import numpy as np
 from crossfield.models.instance.instance import HALF
@@ -8,7 +8,7 @@ MOVES = {
     "mirrored": (lambda picture: picture[:, ::-1], lambda angle: np.pi - angle),
     "transposed": (lambda picture: picture.T, lambda angle: -HALF - angle),
 }
-"""By the method of Instance: what becomes of a picture, and of an angle in radians."""
+"""By the method of Instance: the new picture, and the new angle in radians."""
 
 
 def lines(field):

@@ -79,12 +79,12 @@ def absence(program: str) -> str:
 
 
 def by_asl(path: Path) -> tuple[dict[str, Any], float, Floats, Floats, Floats]:
-    """What the AMPL Solver Library says of an .nl file at its starting point.
+    """The AMPL Solver Library's report on an .nl file at its starting point.
 
     Statistics, objective, gradient, rows, Jacobian (rows, columns).
     """
-    said = asl_program.at_start(path)
-    statistics, values = said["problem statistics"], said["initial evaluations"]
+    answer = asl_program.at_start(path)
+    statistics, values = answer["problem statistics"], answer["initial evaluations"]
     columns, rows = statistics["total no. of variables"], statistics["total no. of constraints"]
     goal = values["objective function"]["0"]
     gradient, jacobian = np.zeros(columns), np.zeros((rows, columns))

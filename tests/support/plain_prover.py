@@ -83,7 +83,7 @@ class Table:
         return theta
 
     def most(self, e, side, other):
-        """The most that a pair can give at one end beside its shares at the other."""
+        """The largest share of a pair at one end, given its shares at the other."""
         left = self.pairs[e] if side == 0 else self.pairs[e].T
         taken = np.where(np.isfinite(self.unary[other]), self.shares[e][1 - side], -np.inf)
         return (left - taken).min(axis=1)

@@ -9,7 +9,7 @@ from crossfield.models.processes.deadline import Deadline
 
 
 def until_stopped(begun: Path) -> str:
-    """Wait until the parent asks to stop."""
+    """Wait until the parent requests a stop."""
     begun.touch()
     while not control.stopped():
         time.sleep(0.01)
@@ -17,18 +17,18 @@ def until_stopped(begun: Path) -> str:
 
 
 def deaf(begun: Path) -> None:
-    """Work on, whatever the parent asks."""
+    """Work on, ignoring requests of the parent."""
     begun.touch()
     time.sleep(600)
 
 
 def left(deadline: Deadline) -> float:
-    """Seconds that are left of a deadline that was sent."""
+    """Seconds left of a deadline that was sent."""
     return deadline.left()
 
 
 def hooked(begun: Path) -> list[str]:
-    """What a hook did when the parent asked to stop."""
+    """Calls of a hook after the parent requested a stop."""
     heard: list[str] = []
     with control.on_stop(lambda: heard.append("hook")):
         begun.touch()

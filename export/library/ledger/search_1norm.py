@@ -53,11 +53,11 @@ def _solved(problem: Problem, nodes: int, start: CrossField | None) -> CrossFiel
 
 
 def _run(model: Path, first: Path, answer: Path, nodes: int) -> None:
-    from ...programs.highs import leave, loaded, set_options, solved
+    from ...programs.highs import loaded, set_options, solved, write_solution
 
     highs = loaded(model, threads=1, parallel="off", mip_rel_gap=1e-6, mip_abs_gap=1e-9)
     if nodes:
         set_options(highs, mip_max_nodes=nodes)
     if first.exists():
         highs.readSolution(str(first), 0)
-    leave(solved(highs, model), answer)
+    write_solution(solved(highs, model), answer)

@@ -15,9 +15,9 @@ def _row(words: list[str]) -> tuple[str, ...]:
 
     Earlier versions have no memory and no progress. Empty for another line.
     """
-    told = [word for word in words if word != "*" and not word.endswith(("B", "%"))]
-    is_row = len(told) == _CELLS and whole(told[0]) is not None and number(told[2]) is not None
-    return tuple(told[1:]) if is_row else ()
+    shown = [word for word in words if word != "*" and not word.endswith(("B", "%"))]
+    is_row = len(shown) == _CELLS and whole(shown[0]) is not None and number(shown[2]) is not None
+    return tuple(shown[1:]) if is_row else ()
 
 
 def _parse(text: str) -> RunLog:
@@ -27,10 +27,10 @@ def _parse(text: str) -> RunLog:
     before = last(r"^ *Lower bound is +(\S+)$", text)
     bound = number(exact) if exact else at_least(rows[-1][1] if rows else before)
     found = number(last(r"^Solution += +(\S+)", text))
-    told = last(r"^ +\*\*\* (.+?) \*\*\* *$", text)
+    shown = last(r"^ +\*\*\* (.+?) \*\*\* *$", text)
     return RunLog(
         "baron",
-        ended=None if told is None else "optimal" if told == "Normal completion" else "limit",
+        ended=None if shown is None else "optimal" if shown == "Normal completion" else "limit",
         bound=bound,
         objective=trace[-1].objective if found is None and trace else found,
         seconds=number(last(r"^ *Wall clock time: +(\S+)$", text)),

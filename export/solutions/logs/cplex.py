@@ -1,7 +1,7 @@
 """Logs of CPLEX: of its own shell, of its Python API, and of GAMS.
 
-Its table stands in columns of fixed width, with bounds to four decimals and the time on lines of its own. The
-Python API writes no more than that; then the bound is the least number that is shown so.
+Its table has columns of fixed width, with bounds to four decimals and the time on separate lines. The Python
+API writes only this table; then the bound is the least number that rounds to the printed one.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _OBJECTIVE: Final = r"^MIP - Integer optimal solution: +Objective = +(\S+)"
 def _parse(text: str) -> RunLog:
     rows = list(_rows(text))
     exact = last(r"^Current MIP best bound = +(\S+)", text) or last(_OBJECTIVE, text)
-    told = last(r"^Best possible: +(\S+)", text) or next((b for b, _ in reversed(rows) if number(b)), None)
-    bound = at_least(told) if exact is None else number(exact)
+    printed = last(r"^Best possible: +(\S+)", text) or next((b for b, _ in reversed(rows) if number(b)), None)
+    bound = at_least(printed) if exact is None else number(exact)
     proven = re.search(r"^(?:MIP - Integer optimal|Proven optimal solution)", text, re.MULTILINE)
     stopped = re.search(r"^MIP - .*(?:limit|abort|exceeded)", text, re.MULTILINE)
     spent = last(r"^Total \(root\+branch&cut\) = +(\S+) sec", text) or last(
@@ -42,7 +42,7 @@ def _parse(text: str) -> RunLog:
 
 
 def _rows(text: str) -> Iterator[tuple[str, str]]:
-    """Bound and best objective of each row of the table, as they are written."""
+    """Bound and best objective of each row of the table, as printed."""
     yield from (_cells(line) for line in _table(text) if _NODE.match(line))
 
 
@@ -56,7 +56,7 @@ def _cells(line: str) -> tuple[str, str]:
 
 
 def _steps(text: str) -> Iterator[Step]:
-    """What the table says at each line that tells the time."""
+    """Steps from the table, at each line with a time."""
     bound: float | None = None
     best: float | None = None
     for line in _table(text):

@@ -1,4 +1,4 @@
-"""Logs of HiGHS, of its search over integers; those of LPs and QPs tell no bound."""
+"""Logs of HiGHS, of its search over integers; logs of LPs and QPs state no bound."""
 
 from __future__ import annotations
 

@@ -19,10 +19,10 @@ LOG_READERS: Final[tuple[LogReader, ...]] = tuple(
 
 
 def read_log(path: str | Path) -> RunLog:
-    """What a solver's log says of the last run that it tells of.
+    """Read a solver's log for the last run that it describes.
 
-    Raises InputError when the file cannot be opened or has more than MAX_LOG bytes, SolutionError when it is
-    no log of a known solver, or tells neither a bound nor an objective.
+    Raises InputError when the file cannot be opened or has more than MAX_LOG bytes. Raises SolutionError when
+    it is not a log of a known solver, or states neither a bound nor an objective.
     """
     data = read_bytes(Path(path), MAX_LOG, "give the part of the last run")
     with naming(path):
@@ -30,7 +30,7 @@ def read_log(path: str | Path) -> RunLog:
 
 
 def parse_log(data: bytes) -> RunLog:
-    """What the content of a log says. Raises SolutionError."""
+    """Read the content of a log. Raises SolutionError."""
     text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n")
     for reader in LOG_READERS:
         starts = [found.start() for found in reader.start.finditer(text)]
@@ -38,17 +38,17 @@ def parse_log(data: bytes) -> RunLog:
             found = reader.parse(text[starts[-1] :])
             if (found.bound, found.objective) == (None, None) and not found.trace:
                 raise SolutionError(
-                    f"this log of {reader.title} tells neither a bound nor an objective; give one of a run "
-                    "that came to its search"
+                    f"this log of {reader.title} states neither a bound nor an objective; give one of a run "
+                    "that began its search"
                 )
             version = last(reader.version, text)
             return replace(found, version=version, trace=_trace(found), stamps=stamps(text), text=text)
     known = ", ".join(sorted(reader.title for reader in LOG_READERS))
-    raise SolutionError(f"this is no log of a known solver; give one of {known}, or the bound itself")
+    raise SolutionError(f"this is not a log of a known solver; give one of {known}, or the bound itself")
 
 
 def _trace(found: RunLog) -> tuple[Step, ...]:
-    """The steps of a run, its end among them where that is told."""
+    """The steps of a run, including its end if the log states it."""
     if found.seconds is None:
         return thinned(found.trace, found.bound)
     before = found.trace[-1].objective if found.trace else None

@@ -1,4 +1,4 @@
-"""What the log of a run says, and how its numbers are read."""
+"""Content of the log of a run, and parsing of its numbers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Final, Literal, NamedTuple
 MOST_STEPS: Final = 40
 """Steps of a trace that are kept: enough for a plot."""
 
-_HUGE: Final = 1e19  # what solvers write for infinity begins at 1e20
-_LONGEST: Final = 300  # characters of a line of a table
+_HUGE: Final = 1e19  # solvers write infinity as 1e20 and more
+_LONGEST: Final = 300  # most characters of a line of a table
 _TIMES: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _STAMP: Final = re.compile(r"sha256_[0-9a-f]{12}(?![0-9a-f])")
 
@@ -28,10 +28,10 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class RunLog:
-    """What the log of one run says; None, or nothing, where it does not say it.
+    """Facts from the log of one run; None or empty if the log lacks them.
 
-    solver: its name in the table of solvers. ended: `optimal` where it says that the optimum is proven, else
-    `limit`. bound: the dual bound at the end; where the log rounds it, the least number that is shown so.
+    solver: its name in the table of solvers. ended: `optimal` if the log states a proven optimum, else
+    `limit`. bound: the dual bound at the end; if the log rounds it, the least number that rounds to it.
     limit: seconds it was allowed. columns, rows: of the model that it read. trace: in the order of time.
     stamps: of the problems that it names (`Problem.stamp`); text: the whole.
     """
@@ -55,8 +55,8 @@ class RunLog:
 class LogReader:
     """A reader of the logs of one solver.
 
-    start: where a run begins in a log; parse: what a run says; version: the pattern of the solver's version,
-    which may stand before the first run.
+    start: pattern of the start of a run in a log; parse: function for the text of a run; version: pattern of
+    the solver's version, which may precede the first run.
     """
 
     title: str
@@ -66,13 +66,13 @@ class LogReader:
 
 
 def last(pattern: str, text: str) -> str | None:
-    """The first group of the last place where a pattern matches lines of a text."""
+    """The first group of the last match of a pattern with lines of a text."""
     found = re.findall(pattern, text, re.MULTILINE)
     return str(found[-1]) if found else None
 
 
 def number(word: str | None) -> float | None:
-    """The number that a word is, None for anything else and for what stands for infinity."""
+    """The number in a word, None for anything else and for infinity."""
     try:
         value = float(word or "nan")
     except ValueError:
@@ -81,7 +81,7 @@ def number(word: str | None) -> float | None:
 
 
 def whole(word: str | None) -> int | None:
-    """The whole number that a word is."""
+    """The whole number in a word."""
     return int(word) if word is not None and re.fullmatch(r"\d{1,9}", word) else None
 
 
@@ -93,7 +93,7 @@ def seconds(word: str) -> float | None:
 
 
 def at_least(word: str | None) -> float | None:
-    """The least number that is shown so when digits are cut off by rounding: half a unit less."""
+    """The least number that rounds to a printed one: half a unit less."""
     if number(word) is None:
         return None
     try:
@@ -105,15 +105,15 @@ def at_least(word: str | None) -> float | None:
 
 
 def stamps(text: str) -> frozenset[str]:
-    """The stamps of the problems that a text names."""
+    """The stamps of the problems named in a text."""
     return frozenset(_STAMP.findall(text))
 
 
 def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:
-    """A trace without steps at which nothing changes, at most MOST_STEPS of them, the first and last kept.
+    """A trace without steps that change nothing, at most MOST_STEPS of them, with the first and last kept.
 
-    Of steps at one time, which logs round, the last one counts. A bound only grows: one that is above the
-    bound at the end, by the rounding of the log, is cut to it.
+    Of steps at one time, which logs round, the last one counts. A bound only grows: a bound above the
+    bound at the end, by the rounding of the log, is reduced to it.
     """
     kept: list[Step] = []
     for each in steps:
@@ -129,7 +129,7 @@ def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:
 
 
 def step(time: str, bound: str, best: str) -> Step | None:
-    """A row of a table of progress; None where that is no time."""
+    """A row of a table of progress; None if the first word is not a time."""
     spent = seconds(time)
     return None if spent is None else Step(spent, number(bound), number(best))
 
@@ -137,6 +137,6 @@ def step(time: str, bound: str, best: str) -> Step | None:
 def table_steps(
     text: str, row: Callable[[list[str]], Step | None], mark: str | None = None
 ) -> tuple[Step, ...]:
-    """What a reader of rows makes of the words of each line, or of the cells between marks."""
+    """Steps that a reader of rows makes from the words of each line, or from the cells between marks."""
     found = (row(line.split(mark)) for line in text.splitlines() if len(line) < _LONGEST)
     return tuple(each for each in found if each is not None)

@@ -12,7 +12,7 @@ _SIZE: Final = r"^original problem has (\d+) variables \([^)]*\) and (\d+) const
 
 
 def _rows(text: str) -> tuple[Step, ...]:
-    """The rows of the table; where its bounds stand says its header, which versions have changed."""
+    """The rows of the table; its header gives the columns of bounds, which differ between versions."""
     header = re.search(_HEADER, text, re.MULTILINE)
     if header is None:
         return ()
@@ -20,7 +20,7 @@ def _rows(text: str) -> tuple[Step, ...]:
     bound, best = names.index("dualbound"), names.index("primalbound")
 
     def row(cells: list[str]) -> Step | None:
-        """The time stands behind a letter in the first cell."""
+        """A row whose first cell holds the time after a letter."""
         if len(cells) != len(names) or not cells[0].strip():
             return None
         return step(cells[0].split()[-1], cells[bound].strip(), cells[best].strip())

@@ -1,6 +1,6 @@
-"""Logs of Xpress, whose tables stand in columns of fixed width.
+"""Logs of Xpress, whose tables have columns of fixed width.
 
-A best solution is left blank until there is one.
+The best solution is blank until there is one.
 """
 
 from __future__ import annotations

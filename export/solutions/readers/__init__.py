@@ -1,5 +1,5 @@
-"""One module a kind of solution file.
+"""Readers of solution files, one module per kind.
 
-The table of readers, what they share (text), and a reader for each kind. A reader says what stands in a file;
-what that means for a problem is export/solutions.
+The table of readers, shared parsing (text), and a reader for each kind. A reader returns the content of a
+file; export/solutions interprets it for a problem.
 """

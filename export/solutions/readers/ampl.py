@@ -18,14 +18,15 @@ Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl an
     objno 0 0                       objective's number and solve code; code or line may be missing
     suffix ...                      suffixes and other text, not needed here
 
-If the .nl file begins with g0 there is neither an Options block nor a count: duals and values cannot be told
-apart without the problem. The binary form has the same parts as records between their lengths, as Fortran
-writes them: integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes
+If the .nl file begins with g0 there is neither an Options block nor a count: without the problem, duals and
+values cannot be distinguished. The binary form has the same parts as records between their lengths, as in
+Fortran: integers of 4 bytes, numbers of 8, low byte first. With vbtol its Options record states 8 bytes
 too few.
 
-The solve code says `solved` and no more. It counts as a global proof only where the message names a solver
-that proves global optimality; Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is
-left out for saying Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp, include/mp/common.h.
+The solve code states only `solved`. It counts as a global proof only if the message names a solver that
+proves global optimality. Ipopt, Knitro and Bonmin (exact for convex problems) do not, and Couenne is
+excluded because it reports Optimal at its time limit (AmplNLWriter.jl#160). Codes: ampl/mp,
+include/mp/common.h.
 """
 
 from __future__ import annotations
@@ -58,11 +59,11 @@ _GLOBAL = re.compile(
     r"(optimal solution found$|(baron|cbc|copt|cplex|gurobi|highs|scip|xpress)\b(?!.*\blocal).*\boptimal)",
     re.IGNORECASE,
 )
-# SCIP writes those three words and not its name; Ipopt writes them behind its own
+# SCIP writes those three words instead of its name; Ipopt writes them after its own
 
 
 class _Code(NamedTuple):
-    """What solve codes up to `last` mean: with values in the file and without."""
+    """Meaning of solve codes up to `last`, with values in the file and without."""
 
     last: int
     with_point: Status
@@ -77,7 +78,7 @@ _CODES: Final = (
     _Code(299, Status.INFEASIBLE, Status.INFEASIBLE),
     _Code(399, Status.UNBOUNDED, Status.UNBOUNDED),
     _Code(449, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    # up to 469: infeasible or unbounded, which no point can be; older SCIP uses 450 for interrupted
+    # up to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
     _Code(469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
     _Code(499, Status.LIMIT_WITHOUT_POINT, Status.LIMIT_WITHOUT_POINT),
 )
@@ -88,7 +89,7 @@ def _recognises_text(head: bytes) -> bool:
 
 
 def parse_text(data: bytes) -> RawSolution:
-    """The content of a text file. Raises SolutionError where it is cut off or numbers do not fit."""
+    """Read a text file. Raises SolutionError if it is cut off or numbers do not fit."""
     found = _OPTIONS.search(data, 0, HEAD)
     if found is None:
         return _parse_without_options(data)
@@ -100,7 +101,7 @@ def parse_text(data: bytes) -> RawSolution:
 
 
 def _start_of_numbers(head: bytes) -> int | None:
-    """Where the first number or `objno` on a line after an empty one is; None when there is none."""
+    """Start of the first number or `objno` on a line after an empty one; None without one."""
     start, after_empty = 0, False
     for line in head.split(b"\n"):
         word = line.strip()
@@ -120,7 +121,7 @@ class _Counts(NamedTuple):
 
     @property
     def complaint(self) -> str | None:
-        """What is wrong with them, if anything."""
+        """The contradiction between the counts, if any."""
         if self.duals in {0, self.rows} and self.values in {0, self.columns}:
             return None
         return (
@@ -190,7 +191,7 @@ def _parse_without_options(data: bytes) -> RawSolution:
 def _solution(message: bytes, code: int | None, values: Floats, rows: int | None) -> RawSolution:
     words = one_line(message)
     if code is not None and 0 <= code <= 99 and not values.size:
-        raise SolutionError("the file says solved and holds no values; let the solver write the file again")
+        raise SolutionError("the file states solved but holds no values; let the solver write the file again")
     status = _status(code, words, with_point=values.size > 0)
     return RawSolution(status, words, None, None, values, rows=rows)
 
@@ -207,7 +208,7 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
 
 
 def parse_binary(data: bytes) -> RawSolution:
-    """The content of a binary file. Raises SolutionError where it is cut off or does not fit."""
+    """Read a binary file. Raises SolutionError if it is cut off or does not fit."""
     records = _Records(data, len(_MAGIC))
     message = b"\n".join(iter(records.take, b""))
     counts = records.take_counts()
@@ -225,7 +226,7 @@ def parse_binary(data: bytes) -> RawSolution:
 
 @dataclass
 class _Records:
-    """A place in a binary file that moves on record by record."""
+    """A position in a binary file that moves on record by record."""
 
     data: bytes
     position: int
@@ -234,12 +235,12 @@ class _Records:
         return SolutionError(f"byte {self.position}: {text}; let the solver write the file again")
 
     def take(self, unstated: int = 0) -> bytes:
-        """The next record, which is `unstated` bytes longer than its length says."""
+        """The next record, which is `unstated` bytes longer than its stated length."""
         start = self.position + 4
         length = self._length(self.position)
         end = start + length + unstated
         if self._length(end) != length:
-            raise self.fault(f"a record of {length} bytes does not end where it should")
+            raise self.fault(f"a record of {length} bytes does not end at its stated length")
         self.position = end + 4
         return self.data[start:end]
 
@@ -293,11 +294,11 @@ def write_ampl_sol(
     columns: int | None = None,
     binary: bool = False,
 ) -> Path:
-    """The path, now holding an AMPL solution file, text or binary.
+    """Write an AMPL solution file, text or binary, and return its path.
 
     primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
-    rows: number of constraints. code: solve code as in the head of this module. Numbers are read back bit by
-    bit.
+    rows: number of constraints. code: solve code as in the head of this module. Reading gives the same
+    numbers, bit by bit.
 
     Raises SolutionError when a value is not finite, OutputError when the file cannot be written.
     """
@@ -315,7 +316,7 @@ def write_ampl_sol(
 
 
 def _lines_of(message: str) -> bytes:
-    """The message so that no line of it is empty or says Options."""
+    """The message without lines that are empty or read Options."""
     words = [
         one_line(line.encode(errors="replace")) for line in message[:_LONGEST_MESSAGE].strip().splitlines()
     ]

@@ -1,4 +1,4 @@
-"""Files of BARON: the results res.lst, and the line tim.lst for the status alone.
+"""Files of BARON: the results res.lst, and the line tim.lst for the status only.
 
     ...                                      res.lst: log of all points found, by number; not read
                 *** Normal completion ***    how the search ended
@@ -9,17 +9,17 @@
 
     The above solution has an objective value of:  -14.4
 
-Normal completion is a global proof: of the optimum, of infeasibility when there is no table, of unboundedness
-when a ray follows it. It is none when the options FirstFeas or FirstLoc stopped the search: then the point is
-called feasible. That bounds were missing, so that nothing is proven, only tim.lst says. sum.lst begins like
-res.lst and has no values: it is refused. A tim.lst has one line:
+Normal completion is a global proof: of the optimum, of infeasibility without a table, of unboundedness
+when a ray follows it. It is not a proof when the options FirstFeas or FirstLoc stopped the search: then the
+point counts as feasible. Only tim.lst reports missing bounds, without which nothing is proven. sum.lst begins
+like res.lst and has no values: it is refused. A tim.lst has one line:
 
     problem 2 16 10189 50 0.18 0.19 1 1 0 13 5 3 0.24 0.37
 
-that is name, constraints, variables, (two more,) lower and upper bound, solver status, model status, missing
-bounds, iterations, node of the best point (-3: there is none), nodes in memory, seconds of processor and
-clock; older versions have fewer at the end. We always minimise. Model status 1 is claimed for FirstFeas too,
-which tim.lst does not tell. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
+These are name, constraints, variables, (two more,) lower and upper bound, solver status, model status,
+missing bounds, iterations, node of the best point (-3: there is none), nodes in memory, seconds of processor
+and clock; older versions have fewer at the end. We always minimise. Model status 1 also occurs with
+FirstFeas, which tim.lst does not report. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
 """
 
 from __future__ import annotations
@@ -82,27 +82,25 @@ _UNPROVEN: Final = {
     Status.OPTIMAL_GLOBAL: Status.OPTIMAL_LOCAL,
     Status.INFEASIBLE: Status.LIMIT_WITHOUT_POINT,
 }
-"""What remains of a claim when bounds of columns are missing."""
+"""Remaining status of a claim when bounds of columns are missing."""
 
 _NO_NODE: Final = b"-3"
 
 
 def _recognises_times(head: bytes) -> bool:
-    """Whether a file that begins so is a tim.lst: one line of a name and numbers."""
+    """Whether a file with this start is a tim.lst: one line of a name and numbers."""
     words = head.split()
     alone = len(head.strip().splitlines()) == 1 and _FEWEST_WORDS <= len(words) <= _MOST_WORDS
     return alone and not is_number(words[0]) and all(map(is_number, words[1:]))
 
 
 def parse_results(data: bytes) -> RawSolution:
-    """The content of a res.lst. Raises SolutionError for a sum.lst and what is cut off or no number."""
+    """Read a res.lst. Raises SolutionError for a sum.lst, a cut, and words that are not numbers."""
     if _SUMMARY in data:
         raise SolutionError("this is the summary of BARON, which holds no values; give its results, res.lst")
     banners = [found[1] for found in _BANNER.finditer(data)]
     if not banners:
-        raise SolutionError(
-            "the file is cut off: it does not say how the search ended; let BARON write it again"
-        )
+        raise SolutionError("the file is cut off: the end of the search is missing; let BARON write it again")
     words = one_line(banners[-1])
     at = data.rfind(_TABLE)
     status = _status(banners[-1], has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
@@ -148,7 +146,7 @@ def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
 
 
 def parse_times(data: bytes) -> RawSolution:
-    """The status in a tim.lst, without a point. Raises SolutionError for unknown codes or a cut."""
+    """Read the status in a tim.lst, without a point. Raises SolutionError for unknown codes or a cut."""
     if not data.endswith(b"\n"):
         raise SolutionError("line 1: the line is cut off; let BARON write the file again")
     words = data.split()

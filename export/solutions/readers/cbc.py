@@ -2,12 +2,12 @@
 
     Optimal - objective value -14.40000000
           0 x                     10                    -1.9      number, name, value, reduced cost
-    **    3 y                    200                       0      ** before what is out of its bounds
+    **    3 y                    200                       0      ** before values out of their bounds
 
-Values have 8 significant digits, so that violations up to about 1e-7 of a value's size are due to the file.
-`printingOptions all` or `rows` puts the rows before the columns: their numbers start again, and what stands
-before must be no columns. Some versions and options omit columns at 0; a file that holds a value of 0 does
-not. A file of an infeasible problem looks the same, and one of a search that found nothing holds the
+Values have 8 significant digits, so violations up to about 1e-7 of a value's size are due to the file.
+`printingOptions all` or `rows` puts the rows before the columns. Their numbers then start again, and names
+before that must not be columns. Some versions and options omit columns at 0; a file with a value of 0 does
+not. A file of an infeasible problem looks the same, and a file of a search without result holds the
 relaxation, (no integer solution - continuous used): both hold no point. Layouts: CBC 2.10.8.
 """
 
@@ -48,7 +48,7 @@ _WORDS: Final = (
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for what is not a number and files that are cut off."""
+    """Read a file. Raises SolutionError for words that are not numbers and files that are cut off."""
     cursor = Cursor(data)
     line = cursor.line("the status and the objective")
     head = _HEAD.fullmatch(line)

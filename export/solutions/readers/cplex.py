@@ -1,4 +1,4 @@
-"""Solution files of CPLEX, XML: one solution, or a pool, of which the first is the incumbent.
+"""Solution files of CPLEX, XML: one solution, or a pool whose first solution is the incumbent.
 
     <CPLEXSolution version="1.2">          a pool has <CPLEXSolutions> around several of these
      <header objectiveValue="-14.4" writeLevel="1"
@@ -7,10 +7,10 @@
      <variables>
       <variable name="x" index="0" value="10"/>
 
-writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold the integer columns only.
+writeLevel 1 writes every column and 3 omits those at 0; 2 and 4 (and a .mst) hold only the integer columns.
 Status codes are those of CPXgetstat: 1 to 25 for continuous problems, from 101 for integer ones. A file of an
-infeasible problem has values too, which are no point. Without any solution CPLEX writes no file (error 1217).
-Nothing but elements is accepted: no DTD and no entities. Layouts: CPLEX 22.2.0.
+infeasible problem also has values, which are not a point. Without any solution CPLEX writes no file (error
+1217). Only elements are accepted: no DTD and no entities. Layouts: CPLEX 22.2.0.
 """
 
 from __future__ import annotations
@@ -44,13 +44,14 @@ _CODES: Final = {
 }
 _STATUS: Final = {code: status for status, codes in _CODES.items() for code in codes}
 _STOPPED: Final = {10, 11, 12, 13, 21, 22, 25}
-"""A continuous problem was stopped; the header says whether the point is feasible."""
+"""A continuous problem was stopped; the header states whether the point is feasible."""
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file, of a pool its first solution, which the message then says.
+    """Read a file; of a pool, the first solution, which the message then states.
 
-    Raises SolutionError, with the line, for XML that is damaged or has entities, and for what is no number.
+    Raises SolutionError, with the line, for XML that is damaged or has entities, and for values that are not
+    numbers.
     """
     first = _parsed(data)
     if first.header is None:
@@ -91,7 +92,7 @@ def _status(header: dict[str, str]) -> Status:
 
 
 class _FirstSolution:
-    """Takes elements as they are parsed and keeps the first solution, so that no tree is built."""
+    """Receives elements as they are parsed and keeps the first solution, so that no tree is built."""
 
     def __init__(self) -> None:
         self.header: dict[str, str] | None = None
@@ -100,7 +101,7 @@ class _FirstSolution:
         self.solutions = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """An element begins."""
+        """Process the start of an element."""
         if tag == "variable":
             if self.solutions == 1:
                 self._variable(attributes.get("name"), attributes.get("value", ""))
@@ -117,7 +118,7 @@ class _FirstSolution:
         self.values.append(value)
 
     def close(self) -> _FirstSolution:
-        """The first solution, at the end of the document."""
+        """Return the first solution, at the end of the document."""
         return self
 
 
@@ -135,7 +136,7 @@ def _parsed(data: bytes) -> _FirstSolution:
         raise SolutionError(
             "the XML has a DTD or entities, which CPLEX does not write; the file is refused"
         ) from error
-    except (ValueError, LookupError) as error:  # an encoding that is not there or does not fit
+    except (ValueError, LookupError) as error:  # an encoding that is unknown or does not fit
         raise SolutionError("the XML is not in its encoding; let CPLEX write the file again") from error
     except SolutionError as error:
         line = parser.parser.CurrentLineNumber

@@ -6,8 +6,8 @@
     objective, 5.565360828459345E-01
     alpha_00_00, 1.146018366025520E-01     every column in order
 
-EPS is a zero, +INF and -INF occur, NA and UNDF are no values. GAMS's numbers of the two states are in the
-manual under modelStat and solveStat. Where the model status promises no point, GAMS leaves the start in the
+EPS is a zero, +INF and -INF occur, NA and UNDF are not values. GAMS's numbers of the two states are in the
+manual under modelStat and solveStat. If the model status promises no point, GAMS keeps the start in the
 levels: values are then not read.
 """
 
@@ -26,7 +26,7 @@ _MODEL: Final = {
     2: (Status.OPTIMAL_LOCAL, "locally optimal"),
     3: (Status.UNBOUNDED, "unbounded"),
     4: (Status.INFEASIBLE, "infeasible"),
-    5: (Status.LIMIT_WITHOUT_POINT, "locally infeasible"),  # no proof of anything
+    5: (Status.LIMIT_WITHOUT_POINT, "locally infeasible"),  # proves nothing
     6: (Status.LIMIT_WITHOUT_POINT, "intermediate infeasible"),
     7: (Status.FEASIBLE, "feasible solution"),
     8: (Status.FEASIBLE, "integer solution"),
@@ -55,7 +55,7 @@ _LIMITS: Final = {2, 3, 4, 8}
 
 
 def status_of(model: int, solver: int) -> tuple[Status, str]:
-    """The claim that GAMS's model status and solver status make, and both in words."""
+    """The claim of GAMS's model status and solver status, and both in words."""
     status, words = _MODEL.get(model, (Status.ERROR, f"model status {model}"))
     if status is Status.FEASIBLE and solver in _LIMITS:
         status = Status.LIMIT_WITH_POINT
@@ -65,11 +65,11 @@ def status_of(model: int, solver: int) -> tuple[Status, str]:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for NA, UNDF, what is no number or is cut off."""
+    """Read a file. Raises SolutionError for NA, UNDF, other words that are not numbers, and a cut."""
     cursor = Cursor(data)
     status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))
     if data.startswith(b"problem,", cursor.position):
-        _field(cursor, b"problem")  # what reads every kind of file looks at it
+        _field(cursor, b"problem")  # the caller for every kind of file checks it
     text = _field(cursor, b"objective")
     objective = None if text in _NO_VALUE else cursor.number(b"0" if text == b"EPS" else text)
     if not status.promises_point:
@@ -83,7 +83,7 @@ def parse(data: bytes) -> RawSolution:
 
 
 def _field(cursor: Cursor, expected: bytes) -> bytes:
-    """What stands after the comma on the next line, whose label is known."""
+    """The value after the comma on the next line, whose label is known."""
     label, _, text = cursor.line(expected.decode()).partition(b",")
     if label != expected:
         raise cursor.fault(f"{shown(label)} stands where {expected.decode()} should")

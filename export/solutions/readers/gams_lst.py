@@ -1,11 +1,11 @@
-"""Listings of GAMS (.lst), for the status alone: values have four decimals, too few for a point.
+"""Listings of GAMS (.lst), for the status only: values have four decimals, too few for a point.
 
                    S O L V E      S U M M A R Y
     **** SOLVER STATUS     1 Normal Completion
     **** MODEL STATUS      2 Locally Optimal
 
-Several solves leave several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
-that does not compile leaves none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
+Several solves write several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
+that does not compile has none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
 """
 
 from __future__ import annotations

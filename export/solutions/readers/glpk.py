@@ -8,10 +8,10 @@
     e o f
 
 Status letters: o optimal, f feasible, i infeasible point, n no solution, u undefined; s bas has one for the
-primal and one for the dual side. The order of the columns is told by the problem's name: our LP files put ONE
+primal and one for the dual side. The problem's name determines the order of the columns. Our LP files put ONE
 first and have no name, our MPS files put it last; in a .mod the objective is named energy, which is the first
 row too. `glpsol -o` writes six digits and breaks lines: it is not read. HiGHS writes the same layout as its
-style 2 and counts the objective as one more row, which is found out when the sizes are compared. Layouts:
+style 2 and counts the objective as one more row, which the comparison of sizes detects. Layouts:
 GLPK 5.0.
 """
 
@@ -60,7 +60,7 @@ _STATUS: Final = {
 
 
 class _Summary(NamedTuple):
-    """The line that begins with s."""
+    """The line that begins with s: kind, rows, columns, status and objective."""
 
     words: int
     rows: int
@@ -70,7 +70,7 @@ class _Summary(NamedTuple):
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for counts that do not fit and for a cut file."""
+    """Read a file. Raises SolutionError for counts that do not fit and for a cut file."""
     cursor = Cursor(data)
     comments = _comments(cursor)
     order = _order(comments)
@@ -87,7 +87,7 @@ def parse(data: bytes) -> RawSolution:
 
 
 def _comments(cursor: Cursor) -> dict[bytes, bytes]:
-    """What the comments say; the cursor moves to the line after them."""
+    """The content of the comments; the cursor moves to the line after them."""
     found: dict[bytes, bytes] = {}
     while cursor.data.startswith(b"c", cursor.position):
         label, _, text = cursor.line("a comment")[1:].partition(b":")

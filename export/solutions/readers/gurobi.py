@@ -4,13 +4,13 @@
     # Objective value = -1.44e+01
     x 10                                   name and value of every column, zeros too
 
-A .sol says nothing of a status: the point is called feasible, and no more. A MIP start (.mst) looks like one
-and holds the integer columns only. The .json (GRBwrite, attribute names of the Gurobi manual) says more:
+A .sol has no status: the point counts as feasible. A MIP start (.mst) looks like one
+and holds only the integer columns. The .json (GRBwrite, attribute names of the Gurobi manual) has more facts:
 
     { "SolutionInfo": { "Status": 2, "ObjVal": ..., "ObjBound": ..., ... },
       "Vars": [ { "VarName": "x", "X": 10}, ... ]}
 
-Columns at 0 are omitted unless JSONSolDetail is 1; then each has a list PoolNX of its values in further
+Columns at 0 are omitted unless JSONSolDetail is 1. Then each has a list PoolNX of its values in further
 solutions too, which are not read: X is the incumbent. Without a solution there is no Vars, and bounds are
 1e+100. Layouts: Gurobi 13.0.3.
 """
@@ -58,14 +58,14 @@ _STATUS: Final = {
     16: (Status.LIMIT_WITH_POINT, "work limit"),
     17: (Status.LIMIT_WITH_POINT, "memory limit"),
     18: (Status.OPTIMAL_LOCAL, "locally optimal"),
-    19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # no proof of anything, and no point
+    19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # proves nothing, and has no point
 }
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
 _WITHOUT_POINT: Final = {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.FEASIBLE: Status.ERROR}
 
 
 def _recognises(head: bytes) -> bool:
-    """Whether a file that begins so is a .sol of Gurobi, or a list of names and values without comments."""
+    """Whether a file with this start is a .sol of Gurobi, or a list of names and values without comments."""
     if _MARK.match(head):
         return True
     lines = head[: head.rfind(b"\n") + 1].splitlines()
@@ -81,7 +81,7 @@ def _is_pair(line: bytes) -> bool:
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a .sol. Raises SolutionError for a MIP start, no values, and no number."""
+    """Read a .sol. Raises SolutionError for a MIP start, no values, and words that are not numbers."""
     cursor, objective = Cursor(data), None
     while data.startswith(b"#", cursor.position):
         line = cursor.line("the end of a comment")
@@ -96,7 +96,7 @@ def parse(data: bytes) -> RawSolution:
 
 
 def parse_json(data: bytes) -> RawSolution:
-    """The incumbent in a .json. Raises SolutionError for damaged JSON and for values that are none."""
+    """Read the incumbent in a .json. Raises SolutionError for damaged JSON and invalid values."""
     content = _document(data)
     information, variables = content.get("SolutionInfo"), content.get("Vars")
     if not isinstance(information, dict) or not isinstance(information.get("Status"), int):
@@ -106,7 +106,7 @@ def parse_json(data: bytes) -> RawSolution:
     )
     if variables is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
-            raise SolutionError("the file says optimal and holds no Vars; let Gurobi write it again")
+            raise SolutionError("the file states optimal but holds no Vars; let Gurobi write it again")
         return without_point(_WITHOUT_POINT.get(status, status), words)
     names, values = _columns(variables)
     objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
@@ -134,12 +134,12 @@ def _document(data: bytes) -> dict[str, Any]:
 
 
 def _integer(text: str) -> int | float:
-    """A whole number; a float where it is so long that converting it would take time."""
+    """A whole number; a float if it is so long that converting it would take time."""
     return int(text) if len(text) < 19 else float(text)
 
 
 def _object(pairs: list[tuple[str, Any]]) -> Any:
-    """A variable as the pair of its name and value, which saves memory; everything else as a dictionary."""
+    """A variable as the pair of its name and value, which saves memory; other objects as a dictionary."""
     content = dict(pairs)
     return (content["VarName"], content.get("X", 0)) if "VarName" in content else content
 

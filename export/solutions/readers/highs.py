@@ -11,11 +11,11 @@ Layout, as HiGHS 1.15.1 writes it (HighsModelUtils.cpp, writeModelSolution):
     # Columns 5                     style 4: minus the number of columns that are not zero
     x 10                            name and value; style 4: and the column's number
     ...
-    # Rows 2                        style 0 alone; rows, dual values and a basis follow, not needed here
+    # Rows 2                        only style 0; rows, dual values and a basis follow, not needed here
 
-Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused; style
-2 has GLPK's layout and goes to its reader. HiGHS says `Optimal` of local points of non-convex quadratic
-problems, which it does not take on paper: what class of problem it was given is checked where it is called.
+Values below 1e-13 in size are written as 0. Styles 1 and 3 round to some six digits: they are refused. Style
+2 has GLPK's layout and goes to its reader. HiGHS reports `Optimal` for local points of non-convex quadratic
+problems, which are outside its documented classes. The caller checks the class of the problem.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ _COLUMNS = re.compile(rb"# Columns (-?)(\d{1,12})")
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file of style 0 or 4.
+    """Read a file of style 0 or 4.
 
-    Raises SolutionError for other styles, what is cut off or no number, and counts that do not fit.
+    Raises SolutionError for other styles, a cut, words that are not numbers, and counts that do not fit.
     """
     if (style := _other_style(data)) is not None:
         raise SolutionError(
@@ -78,7 +78,7 @@ def _other_style(head: bytes) -> str | None:
 
 
 def _words(cursor: Cursor) -> bytes:
-    """The model status, with the heads before and after it read."""
+    """Read the model status, with the heads before and after it."""
     _expect(cursor, b"Model status")
     words = cursor.line("the model status")
     _expect(cursor, b"")
@@ -104,7 +104,7 @@ def _status(words: bytes, *, feasible: bool) -> Status:
 
 def _without_point(words: bytes) -> RawSolution:
     if words == b"Optimal":
-        raise SolutionError("line 5: the file says Optimal and holds no point; let the solver write it again")
+        raise SolutionError("line 5: the file is Optimal but holds no point; let the solver write it again")
     return RawSolution(
         _status(words, feasible=False), one_line(words), None, np.empty(0, dtype="S1"), np.empty(0)
     )
@@ -125,7 +125,7 @@ def _columns(cursor: Cursor) -> tuple[bool, Bytes, Floats]:
     if found is None:
         raise cursor.fault(f"{shown(line)} is not the number of columns")
     count = int(found[2])
-    sparse = bool(found[1]) or count == 0  # a sparse file of the point 0 says `# Columns 0`
+    sparse = bool(found[1]) or count == 0  # a sparse file of the point 0 has `# Columns 0`
     start, data = cursor.position, cursor.data
     rows = data.find(b"\n# Rows ", start - 1) + 1
     stop = len(data) if rows == 0 else rows
@@ -138,7 +138,7 @@ def _columns(cursor: Cursor) -> tuple[bool, Bytes, Floats]:
 
 
 def _rows(cursor: Cursor) -> int | None:
-    """The number of rows, if the file goes on with them."""
+    """The number of rows, if the file continues with rows."""
     if cursor.at_end:
         return None
     cursor.line("the number of rows")

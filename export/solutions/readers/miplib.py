@@ -1,7 +1,7 @@
-"""Solution files of MIPLIB: `=obj= value`, then a name and a value a line; columns at 0 may be omitted.
+"""Solution files of MIPLIB: `=obj= value`, then one name and value per line; columns at 0 may be omitted.
 
-`=infeas=` instead stands for an infeasible instance (MIPLIB's solution checker). There is no other status: a
-point is called feasible, and no more.
+`=infeas=` instead denotes an infeasible instance (MIPLIB's solution checker). There is no other status: a
+point counts as feasible.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, sh
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for what is not a number and for a file that is cut off."""
+    """Read a file. Raises SolutionError for words that are not numbers and for a file that is cut off."""
     cursor = Cursor(data)
     label, *rest = cursor.line("the objective").split()
     if label == b"=infeas=":

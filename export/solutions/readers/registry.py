@@ -1,4 +1,4 @@
-"""Readers of solution files: one table, and the choice among them by content."""
+"""The table of readers of solution files, and the choice among them by content."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _SMALLER: Final = "let the solver write it without columns at 0"
 
 _MODULES = (highs, gurobi, cplex, scip, xpress, cbc, glpk, gams_csv, gams_lst, baron, miplib, ampl)
 READERS: Final[tuple[Reader, ...]] = tuple(reader for module in _MODULES for reader in module.READERS)
-"""The table of readers: the first that recognises a file reads it; no real file is recognised by two."""
+"""The table of readers: the first that recognises a file reads it; no real file matches two."""
 
 
 def read_raw(path: str | Path) -> RawSolution:
-    """What a solution file says; its kind is told by its content, and gzip is unpacked.
+    """Read a solution file; its content determines its kind, and gzip is unpacked.
 
     Raises InputError when the file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when
-    it is empty, malformed or of no known kind.
+    it is empty, malformed or of an unknown kind.
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     with naming(path):
@@ -39,21 +39,21 @@ def read_raw(path: str | Path) -> RawSolution:
 
 
 def parse_raw(data: bytes) -> RawSolution:
-    """What the content of a solution file says; a byte order mark is passed over. Raises SolutionError."""
+    """Read the content of a solution file, ignoring a byte order mark. Raises SolutionError."""
     data = _without_mark(data)
     if not data or data.isspace():
-        raise SolutionError("the file is empty; the solver's log should say why it wrote no solution")
+        raise SolutionError("the file is empty; the solver's log should give the reason")
     head = with_unix_ends(data[:HEAD])
     for reader in READERS:
         if reader.recognises(head):
             raw = reader.parse(with_unix_ends(data) if reader.text else data)
             return replace(raw, reader=reader.name, stamp=_stamp(head))
     known = "; ".join(reader.description for reader in READERS)
-    raise SolutionError(f"this is no solution file of a known kind; give one of these: {known}")
+    raise SolutionError(f"this is not a solution file of a known kind; give one of these: {known}")
 
 
 def _without_mark(data: bytes) -> bytes:
-    """The text behind a byte order mark, in UTF-8: Windows writes marks, and UTF-16 at times."""
+    """The text after a byte order mark, in UTF-8: Windows writes marks, and sometimes UTF-16."""
     if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.removeprefix(codecs.BOM_UTF8)
     try:
@@ -63,7 +63,7 @@ def _without_mark(data: bytes) -> bytes:
 
 
 def _stamp(head: bytes) -> str:
-    """The stamp (`Problem.stamp`) wherever a solver repeats it, in a name or message; else empty."""
+    """The stamp (`Problem.stamp`) that a solver repeats in a name or message; empty without one."""
     found = _STAMP.search(head)
     return found[0].decode() if found else ""
 

@@ -7,7 +7,7 @@ r"""Solution files of SCIP.
 The columns are in no particular order and those at 0 are omitted, unless write/printzeros is set. Values may
 be +infinity or -infinity; a partial solution has the value `unknown`, which no point can have. Without a
 point the last line is `no solution available`. SCIP adds columns of its own (nlobjvar, quadobjvar,
-qmatrixvar, objconstvar). Without a status a point is called feasible, and no more. Layouts: SCIP 10.0; words
+qmatrixvar, objconstvar). Without a status a point counts as feasible. Layouts: SCIP 10.0; words
 of the status: SCIPprintStatus.
 """
 
@@ -51,7 +51,7 @@ _WITHOUT_POINT: Final = {
 
 
 def parse(data: bytes) -> RawSolution:
-    """The content of a file. Raises SolutionError for `unknown` and what is no number or cut off."""
+    """Read a file. Raises SolutionError for `unknown`, other words that are not numbers, and a cut."""
     cursor = Cursor(data)
     words, status = b"", Status.FEASIBLE
     line = cursor.line("the status or the objective")
@@ -67,7 +67,7 @@ def parse(data: bytes) -> RawSolution:
     if text == _UNKNOWN:
         raise cursor.fault("this is a partial solution, with columns of unknown value")
     objective = cursor.number(text)
-    per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost comes third
+    per_line = 3 if len(words_of_line(data, cursor.position)) == 3 else 2  # the cost is the third word
     names, values = labelled_numbers(data, cursor.position, len(data), per_line, label=0, numeric=(1,))
     return RawSolution(status, one_line(words), objective, names, values[:, 0], omits_zeros=True)
 

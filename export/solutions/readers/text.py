@@ -1,7 +1,7 @@
-"""What a solution file says, before it is mapped onto a problem; and fast parsing of its columns of text.
+"""The content of a solution file, before it is mapped to a problem, and fast parsing of its columns of text.
 
-The fast path hands megabytes of text to numpy at a time. It knows nothing of line numbers; only when
-something is wrong is the place looked for.
+The fast path passes megabytes of text to numpy at a time, without line numbers; the place of an error is
+determined only when one occurs.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ TOKEN_LIMIT: Final = 63
 """Longest name or number, in bytes. Names of this package have at most 15, numbers at most 24."""
 
 HEAD: Final = 1 << 16
-"""How many bytes of a file are looked at to tell its format."""
+"""Number of bytes at the start of a file that determine its format."""
 
-_PIECE: Final = 1 << 22  # bytes handled at once: temporary arrays stay below some 100 MB
+_PIECE: Final = 1 << 22  # bytes processed at once: temporary arrays stay below some 100 MB
 _NUMBER = re.compile(
     rb"([-+]?)(?:((?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?)|inf(?:inity)?|1\.#inf0*)", re.IGNORECASE
 )
@@ -47,10 +47,10 @@ _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
 def added_columns() -> dict[str, str]:
     """Patterns of the columns that programs add when they read or write a model, by title of the program.
 
-    For a constant of the objective, for its part that is not linear, for the range of a row. A solution may
-    hold them beside the columns of the problem.
+    They represent a constant of the objective, its nonlinear part, or the range of a row. A solution may
+    hold them besides the columns of the problem.
     """
-    # Not above: a solver's child process, which writes such files, would load formulations with the table.
+    # Not at the top: a solver's child process, which writes such files, would load formulations too.
     from ...solvers_table import PROGRAMS
 
     ours = {"crossfield": r"ONE", "Pyomo": r"ONE_VAR_CONSTANT|GAMS_OBJECTIVE"}
@@ -58,9 +58,9 @@ def added_columns() -> dict[str, str]:
 
 
 class Status(StrEnum):
-    """What a solver claims of its answer, and what remains of the claim once the point is checked.
+    """A solver's claim about its answer, and the remaining status once the point is checked.
 
-    no-point: there is none, and no word why. unknown: the point contradicts the claim.
+    no-point: there is none, without a reason. unknown: the point contradicts the claim.
     """
 
     OPTIMAL_GLOBAL = "optimal-global"
@@ -76,7 +76,7 @@ class Status(StrEnum):
 
     @property
     def promises_point(self) -> bool:
-        """Whether there is a point behind it that is feasible."""
+        """Whether the status implies a feasible point."""
         return self in _PROMISING
 
 
@@ -92,11 +92,11 @@ class RawSolution:
     status: the solver's claim. message: its own words on one line. objective: its objective value, or None.
     names: byte strings (k,), or None when the format is positional. values: float (k,), in the order of the
     file; infinities may occur, NaN may not. omits_zeros: whether a column that is not listed is 0. rows:
-    number of constraints the file speaks of, or None: then a positional file has a dual value for each row
-    before the values. order: the order of the values where there are no names. bound: the solver's dual
-    bound, or None. of_rows: names (k,) that the file lists as those of rows, whose values are left out.
-    stamp: of the problem, where the solver repeated it, or empty. reader: name of the reader that understood
-    the file. nodes: of the search tree, where the solver tells.
+    number of constraints in the file, or None: then a positional file has a dual value for each row
+    before the values. order: the order of the values without names. bound: the solver's dual
+    bound, or None. of_rows: names (k,) that the file lists as names of rows, whose values are left out.
+    stamp: of the problem, if the solver repeated it, or empty. reader: name of the reader of
+    the file. nodes: of the search tree, if the solver reports them.
     """
 
     status: Status
@@ -115,12 +115,12 @@ class RawSolution:
 
     @property
     def has_point(self) -> bool:
-        """Whether the file holds a point; one without values is the point 0 where zeros are omitted."""
+        """Whether the file holds a point; a file without values is the point 0 if zeros are omitted."""
         return self.values.size > 0 or self.omits_zeros
 
 
 def without_point(status: Status, message: bytes | str, *, rows: int | None = None) -> RawSolution:
-    """What a file without a point says; the message is put on one line."""
+    """The content of a file without a point; the message is put on one line."""
     words = one_line(message if isinstance(message, bytes) else message.encode())
     return RawSolution(status, words, None, np.empty(0, dtype="S1"), np.empty(0), rows=rows)
 
@@ -129,8 +129,8 @@ def without_point(status: Status, message: bytes | str, *, rows: int | None = No
 class Reader:
     """A reader of one kind of file.
 
-    recognises: whether a file with these first bytes is of this kind. parse: the content of a whole file, or
-    SolutionError. text: both are given lines that end as on Unix.
+    recognises: whether a file with these first bytes is of this kind. parse: reads a whole file. Raises
+    SolutionError. text: both receive lines that end as on Unix.
     """
 
     name: str
@@ -141,13 +141,13 @@ class Reader:
 
 
 def begins(pattern: bytes) -> Callable[[bytes], bool]:
-    """For a Reader: whether a file's first bytes match a regular expression."""
+    """Return a test for a Reader: whether a file's first bytes match a regular expression."""
     compiled = re.compile(pattern)
     return lambda head: compiled.match(head) is not None
 
 
 class NamedValues(NamedTuple):
-    """Values by name: values (n,) with NaN where missing, and how many names are missing and unknown."""
+    """Values by name: values (n,) with NaN for missing ones, and the numbers of missing and unknown names."""
 
     values: Floats
     missing: int
@@ -158,10 +158,10 @@ def values_for(names: Bytes, raw: RawSolution) -> NamedValues:
     """The values of `names` (n,), unique byte strings, in their order.
 
     A name that is not in the file is 0 if its format omits zeros, else NaN and counted as missing. Names in
-    the file that are not among `names` are counted as unknown, but for the columns that programs add.
+    the file that are not among `names` are counted as unknown, except for the columns that programs add.
 
     Raises SolutionError when the file has no point or no names, gives one name two values, or lists one of
-    `names` as that of a row.
+    `names` as the name of a row.
     """
     listed = _listed(raw)
     _check_rows(names, raw)
@@ -204,7 +204,7 @@ def _check_rows(names: Bytes, raw: RawSolution) -> None:
         name = misplaced[0].decode(errors="replace")
         raise SolutionError(
             f"the column {name} stands before the numbers start again, where rows should; "
-            "a line is there twice or out of order; let the solver write the file again"
+            "a line is repeated or out of order; let the solver write the file again"
         )
 
 
@@ -234,7 +234,7 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
         size = f"{found} values" if raw.rows is None else f"{found} columns and {raw.rows} rows"
         raise SolutionError(
             f"the file is of {size}, the problem has {columns} columns and {rows} rows; "
-            "give the solution of this very problem"
+            "give the solution of this problem"
         )
     return raw.values[found - columns :].copy()
 
@@ -245,25 +245,25 @@ def one_line(text: bytes) -> str:
 
 
 def with_unix_ends(data: bytes) -> bytes:
-    r"""The text with \n as the end of its lines."""
+    r"""The text with \n at the end of its lines."""
     return data.replace(b"\r\n", b"\n") if b"\r" in data else data
 
 
 def fault(data: bytes, position: int, text: str) -> SolutionError:
-    """An error that names the line of a byte position in a text, and the remedy."""
+    """An error with the line of a byte position in a text, and the remedy."""
     line = data.count(b"\n", 0, position) + 1
     return SolutionError(f"line {line}: {text}; let the solver write the file again")
 
 
 def line_after(data: bytes, position: int, count: int) -> int:
-    """Where the line begins that comes `count` whole lines after a byte position."""
+    """Start of the line that comes `count` whole lines after a byte position."""
     ends = np.flatnonzero(np.frombuffer(data, np.uint8, offset=position) == ord("\n"))
     return position + (int(ends[count - 1]) + 1 if count else 0)
 
 
 @dataclass
 class Cursor:
-    """A place in a text that moves on line by line; for the few lines that are not a column of numbers."""
+    """A position in a text that moves on line by line; for the few lines that are not a column of numbers."""
 
     data: bytes
     position: int = 0
@@ -311,12 +311,12 @@ def shown(text: bytes) -> str:
 
 
 def is_number(text: bytes) -> bool:
-    """Whether a word is a number as solvers write them."""
+    """Whether a word is a number in the notation of solvers."""
     return len(text) <= TOKEN_LIMIT and _NUMBER.fullmatch(text) is not None
 
 
 def number_of(text: bytes) -> float | None:
-    """The number that a word spells as solvers do, or None."""
+    """The number in a word in the notation of solvers, or None."""
     found = _NUMBER.fullmatch(text)
     if found is None or len(text) > TOKEN_LIMIT:
         return None
@@ -327,7 +327,7 @@ def number_of(text: bytes) -> float | None:
 def numbers(data: bytes, start: int, stop: int) -> Floats:
     """The numbers in a text that has one on each line from byte `start` to `stop`.
 
-    Raises SolutionError with the line of what is not a number, or is not ended by a new line.
+    Raises SolutionError with the line of a word that is not a number, or of a missing new line.
     """
     pieces = [_floats(piece, _tokens(piece, 1)) for piece in _pieces(data, start, stop)]
     return np.concatenate([np.empty(0), *pieces])
@@ -336,7 +336,7 @@ def numbers(data: bytes, start: int, stop: int) -> Floats:
 def named_numbers(data: bytes, start: int, stop: int, per_line: int) -> tuple[Bytes, Floats]:
     """Names (k,) and values (k,) of a text whose lines are `name value ...` with `per_line` words each.
 
-    What follows the value must be numbers too, and is left out. Raises SolutionError with the line at fault.
+    Words after the value must be numbers too, and are left out. Raises SolutionError with the line at fault.
     """
     names, values = labelled_numbers(data, start, stop, per_line, label=0, numeric=tuple(range(1, per_line)))
     return names, values[:, 0].copy()
@@ -397,7 +397,7 @@ class _Piece(NamedTuple):
 
 
 class _Tokens(NamedTuple):
-    """Where words begin and end in a piece."""
+    """Starts and ends of the words in a piece."""
 
     starts: Positions
     ends: Positions
@@ -420,7 +420,7 @@ def _tokens(piece: _Piece, per_line: int) -> _Tokens:
     blank = text <= ord(" ")
     control = blank & (text != ord(" ")) & (text != ord("\n")) & (text != ord("\t"))
     if control.any():
-        raise piece.fault(int(np.argmax(control)), "there is a byte that no text has; the file is damaged")
+        raise piece.fault(int(np.argmax(control)), "there is a byte that is not text; the file is damaged")
     edges = np.flatnonzero(np.diff(blank, prepend=True))
     tokens = _Tokens(edges[0::2], edges[1::2])
     _check_words(piece, tokens, per_line)
@@ -460,19 +460,19 @@ def _floats(piece: _Piece, tokens: _Tokens) -> Floats:
 
 
 def _inside(tokens: _Tokens, size: int) -> Bools:
-    change = np.zeros(size + 1, dtype=np.int8)  # the last word may end where the piece does
+    change = np.zeros(size + 1, dtype=np.int8)  # the last word may end with the piece
     change[tokens.starts] = 1
     change[tokens.ends] = -1
     return np.cumsum(change[:size], dtype=np.int8).view(bool)
 
 
 def _fast_floats(text: bytes) -> Floats | None:
-    """Numbers between blanks, or None if something else is there. Python's own rounding: exact."""
+    """Numbers between blanks, or None for other content. Python's own rounding: exact."""
     text = text.translate(_FORTRAN)
     if b"#" in text:
         text = _WINDOWS_INFINITY.sub(b"inf", text)
     with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # numpy before 2.3 warns where later ones raise
+        warnings.simplefilter("error", DeprecationWarning)  # before numpy 2.3, later ones raise
         try:
             return np.fromstring(text, dtype=np.float64, sep=" ")
         except (ValueError, DeprecationWarning):

@@ -2,13 +2,13 @@
 
     NAME          mip                          .slx: NAME .. ENDATA for each solution, the first is taken
       C x                       10
-    ENDATA                                     ENDATA alone: there was no solution
+    ENDATA                                     only ENDATA: there was no solution
 
     1,"c1      ","G","BS",11,0.3,0,11.3,0      .asc: number, name and blanks, kind, state, value, ...
     3,"x       ","C","SB",10,0.1,0,10,0        columns have the kind C and come after the rows
 
-Neither says anything of a status: the point is called feasible, and no more. Without an integer solution
-Xpress writes the relaxation, which shows in the violation that is computed again. .prt has six decimals and
+Neither has a status: the point counts as feasible. Without an integer solution
+Xpress writes the relaxation, which the recomputed violation reveals. .prt has six decimals and
 .hdr no columns: they are not read. Layouts: Xpress 9.9.1.
 """
 
@@ -38,9 +38,9 @@ _FIRST_COLUMN = re.compile(rb'^ *\d+,"[^"\n]*","C",', re.MULTILINE)
 
 
 def parse_slx(data: bytes) -> RawSolution:
-    """The content of an .slx, of several solutions the first, which the message then says.
+    """Read an .slx; of several solutions, the first, which the message then states.
 
-    Raises SolutionError for what is not a number and for a file that is cut off.
+    Raises SolutionError for words that are not numbers and for a file that is cut off.
     """
     if not data.rstrip().endswith(_END):
         raise SolutionError("the file is cut off: it has no line ENDATA; let Xpress write it again")
@@ -58,7 +58,7 @@ def parse_slx(data: bytes) -> RawSolution:
 
 
 def _check_kinds(data: bytes, start: int, stop: int) -> None:
-    """Refuse a block without lines, or with lines that are of no column."""
+    """Refuse a block without lines, or with lines that are not of a column."""
     lines = data.count(b"\n", start, stop)
     if not lines:
         raise SolutionError("the file holds no columns; let Xpress write it again")
@@ -69,7 +69,7 @@ def _check_kinds(data: bytes, start: int, stop: int) -> None:
 
 
 def parse_asc(data: bytes) -> RawSolution:
-    """The content of an .asc. Raises SolutionError for what is no number and for a cut file."""
+    """Read an .asc. Raises SolutionError for words that are not numbers and for a cut file."""
     found = _FIRST_COLUMN.search(data)
     if found is None:
         raise SolutionError("the file holds no line of a column (kind C); let Xpress write it again")

@@ -195,7 +195,7 @@ def test_the_whole_set_is_the_same_under_another_hash_seed(tmp_path):
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """A manifest of qp-fixed with its instance beside it."""
+    """A manifest of qp-fixed and its instance."""
     return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, ["nl"]).path
 
 
@@ -334,7 +334,7 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
         write(problem, tmp_path / "absent" / "model.lp")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be made"):
+    with pytest.raises(OutputError, match="cannot be created"):
         write_problem(problem, tmp_path / "file", ["lp"])
     assert format_of("a.b.mps.gz").name == "mps"
     with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):

@@ -24,8 +24,8 @@ THREADS = 4
 
 
 @pytest.fixture
-def hasty():
-    """The interpreter changes threads as often as it can."""
+def frequent_switches():
+    """Make the interpreter switch threads as often as possible."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     yield
@@ -43,7 +43,7 @@ def costs_of(problem: Problem) -> tuple[list[list[int]], list[float]]:
 
 
 def spoiled(problems: int) -> int:
-    """How many problems lose costs when several threads ask for these at once."""
+    """Number of problems that lose costs when several threads request them at once."""
     instance = make_instance()
     whole = costs_of(make_problem("milp-mccormick", instance))
     barrier = threading.Barrier(THREADS)
@@ -57,17 +57,17 @@ def spoiled(problems: int) -> int:
         return sum(not all(pool.map(ask, [problem] * THREADS)) for problem in shared)
 
 
-def test_no_cost_is_lost_when_threads_share_a_problem(hasty):
+def test_no_cost_is_lost_when_threads_share_a_problem(frequent_switches):
     assert spoiled(150) == 0
 
 
 @pytest.mark.slow
-def test_no_cost_is_lost_in_thousands_of_problems(hasty):
+def test_no_cost_is_lost_in_thousands_of_problems(frequent_switches):
     assert spoiled(10_000) == 0
 
 
 def anew(self: cached_property, owner: object, kind: type | None = None):
-    """What `cached_property` gives when what threads share is computed again at every access."""
+    """A `cached_property` that computes the arrays that threads share again at every access."""
     if isinstance(owner, Problem | PlacedFamily | Instance | Grid):
         return self.func(owner)
     return kept(self, owner, kind)
@@ -77,7 +77,7 @@ kept = cached_property.__get__
 
 
 def unchanged(name: str, suffix: str, dialect: str, monkeypatch) -> None:
-    """The worst that threads can do to cached values: every reader gets one of its own."""
+    """The worst that threads can do to cached values: every reader gets its own array."""
     shape = "pixel" if name == "milp-mccormick" else "row"
     usual = bytes_of(make_problem(name, make_instance(shape)), suffix, dialect)
     with monkeypatch.context() as patch:

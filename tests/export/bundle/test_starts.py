@@ -26,7 +26,7 @@ BOTH = ("lp", "mps")
 
 
 def given(name: str, solver: str, folder: Path, suffix: str) -> tuple[Problem, Path, Path, float]:
-    """A problem, its model file, the start of a random field, and the objective of that."""
+    """A problem, its model file, the start of a random field, and the start's objective."""
     instance = make_instance("row")
     problem = formulate(instance, name)
     field, path = make_field(instance, 7), folder / f"start{STARTS[solver].suffix}"

@@ -1,4 +1,4 @@
-"""The way back by the manifest: what was lifted and how columns are ordered is taken from it."""
+"""Reading back by the manifest: lifting and the order of columns come from it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from crossfield.models.formulations.problem import lifted
 
 
 def raw_of_glpk(path, form, file, point):
-    """What `glpsol -w` writes of an LP or MPS file: values in the order of its columns, no names."""
+    """A file as from `glpsol -w` for an LP or MPS file: values in the order of its columns, no names."""
     values = np.append(point, 1.0)[form.order(file)]
     rows = [f"i {place + 1} 0" for place in range(form.row_count(file))]
     columns = [f"j {place + 1} {value!r}" for place, value in enumerate(values.tolist())]

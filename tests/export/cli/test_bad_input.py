@@ -569,10 +569,10 @@ def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, wh
     folder = tmp_path / "regular" if where == "file" else Path("/proc/sys")
     for command in ("run", "export"):
         assert refused(command, tmp_path / "tiny.json", "-o", folder / "out").startswith(
-            f"{folder / 'out'}: cannot be made"
+            f"{folder / 'out'}: cannot be created"
         )
     line = refused("solve", tmp_path / "tiny.json", "-f", "milp-mccormick", "-o", folder / "out")
-    assert line.startswith(f"{folder / 'out'}: cannot be made")
+    assert line.startswith(f"{folder / 'out'}: cannot be created")
     for arguments in (
         ("instance", "skew", "-o", folder / "o.json"),
         ("draw", tmp_path / "field.npz", "-o", folder / "o.png"),

@@ -1,4 +1,4 @@
-"""A writer that loses something writes no file: each format counts what it writes and compares."""
+"""A writer that loses a record writes no file: each format counts its records and compares."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def damaged(kind: type[Problem], name: str = "milp-mccormick") -> Problem:
 
 
 def refused(problem: Problem, suffix: str, dialect: str, folder, what: str, *, kept: Problem) -> None:
-    """No file appears, and what was written before stays."""
+    """Check that no file appears, and that an earlier file stays."""
     path = folder / f"model.{suffix}"
     for name in (path, path.with_name(f"{path.name}.gz")):
         with pytest.raises(ConsistencyError, match=what) as raised:

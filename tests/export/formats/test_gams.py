@@ -130,7 +130,7 @@ def run_gams(executable: str, folder: Path, text: bytes, *options: str) -> dict[
 
 @dataclass(frozen=True)
 class Reading:
-    """What CONVERT made of a file: names, and CasADi's values of it at 20 random points (20, columns)."""
+    """Result of CONVERT for a file: names, and CasADi's values at 20 random points (20, columns)."""
 
     problem: Problem
     points: np.ndarray
@@ -243,7 +243,7 @@ def test_read_columns(readings: dict[tuple[str, str], Reading], case: str, layou
 def test_read_start_comes_back_under_our_names(
     readings: dict[tuple[str, str], Reading], case: str, layout: str
 ):
-    """CONVERT solves nothing, so that the results are the start."""
+    """CONVERT solves nothing, so the results are the start."""
     read = readings[case, layout]
     start = read.problem.point(make_field(read.problem.instance))
     head, names = list(read.results)[:3], list(read.results)[3:]
@@ -292,7 +292,7 @@ def test_optimum_is_that_of_another_solver(
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_exact_convex_model_has_the_energy_of_its_field(gams_executable: str, tmp_path: Path, layout: str):
-    """The point of `miqp-exact` by CPLEX costs the same in (8), and no more than any field we try."""
+    """The point of `miqp-exact` by CPLEX costs the same in (8), and at most as much as any tried field."""
     problem = make_problem("miqp-exact", make_instance((2, 3)))
     value, point = solved(gams_executable, tmp_path, problem, layout, "miqcp=cplex")
     field = problem.field(point)
@@ -369,7 +369,7 @@ def test_no_lists_of_names_end_open(gams_executable: str, tmp_path: Path):
 
 
 def test_text_of_the_indexed_layout_grows_with_the_data_alone():
-    """A rectangle is one line a row, whatever its width; each stroke pixel is two lines."""
+    """A rectangle is one line per row for any width; each stroke pixel is two lines."""
     sizes = []
     for width in (20, 40):
         mask = np.ones((10, width), dtype=bool)
@@ -399,7 +399,7 @@ def test_stream_reads_a_block_when_its_place_comes(monkeypatch: pytest.MonkeyPat
 
 
 def test_golden_file():
-    """A small model that people can read; the other tests say that it means the right thing."""
+    """A small model that people can read; the other tests check its meaning."""
     instance = Instance("golden", [[True, True], [True, False]], [[0, 1]], [2.5], [0.5])
     text = b"".join(
         gams_indexed.generate(

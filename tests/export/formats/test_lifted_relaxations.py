@@ -1,4 +1,4 @@
-"""Without integrality a lifted product is a relaxation: files, manifests, tables and `verify` say so."""
+"""Without integrality a lifted product is a relaxation, as files, manifests, tables and `verify` state."""
 
 import json
 from dataclasses import replace
@@ -80,7 +80,7 @@ def starts(instance):
 
 
 def test_a_solver_is_chosen_that_reads_the_products(two):
-    """HiGHS would solve the weaker problem of the .mps; it does when it is asked for, and the facts tell."""
+    """HiGHS would solve the weaker problem of the .mps; it does so on request, and the facts state it."""
     problem = cf.formulate(two, "minlp-quartic", relax=True)
     assert solver_for(problem).formats[0] == "nl"
     assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
@@ -112,4 +112,4 @@ def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
     document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
     manifest.path.write_text(json.dumps(document))
     (bad,) = verify(tmp_path, programs=["highs"]).bad
-    assert "the manifest says" in bad.reason
+    assert "the manifest states" in bad.reason

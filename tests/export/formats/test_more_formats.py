@@ -81,7 +81,7 @@ def feasible_points(problem: Problem) -> Points:
 
 
 def tiny() -> Instance:
-    """Two pixels with strokes that no field follows without loss: the window is that of the box."""
+    """Two pixels with strokes that no field follows without loss: the window is the box's."""
     pixels = [[0, 0], [0, 1]]
     return Instance(
         "small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], skew_coefficient=1e-2, gauge="box"
@@ -173,7 +173,7 @@ def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.oracles
 def test_verify_hands_them_to_their_readers(tmp_path: Path):
-    """SCIP reads every .osil, GLPK the linear .mod, as the table states; nobody is handed .qplib or .bar."""
+    """SCIP reads every .osil, GLPK the linear .mod, as the table states; no program gets .qplib or .bar."""
     write_all(tiny(), tmp_path, formats=MORE)
     found = verify(tmp_path, programs=["scip", "glpk"], seconds=0.3)
     assert found.bad == []
@@ -272,10 +272,10 @@ def test_glpk_evaluates_the_ampl_model_like_the_problem(label: str, tmp_path: Pa
         assert_values(found.pop(f"{family.family.tag} {sense}"), family.values(point))
     for block in problem.blocks.values():
         for sign, ends in ((">=", block.lower), ("<=", block.upper)):
-            told = found.pop(
+            stated = found.pop(
                 f"{sign} {block.name}", np.full(block.count, -np.inf if sign == ">=" else np.inf)
             )
-            np.testing.assert_array_equal(told, ends)
+            np.testing.assert_array_equal(stated, ends)
     assert found == {}
 
 
@@ -359,7 +359,7 @@ def bound(text: str) -> float:
 
 
 def osil_model(path: Path) -> tuple[Meaning, Any, float]:
-    """What the XML says: coefficients, the nonlinear node or None, and the constant."""
+    """The content of the XML: coefficients, the nonlinear node or None, and the constant."""
     root = Xml.parse(path).getroot()
     data = root.find("instanceData", SPACE)
 
@@ -409,7 +409,7 @@ def osil_model(path: Path) -> tuple[Meaning, Any, float]:
 
 
 def assert_means(model: Meaning, problem: Problem) -> None:
-    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are not there."""
+    """Names, bounds, types and rows are the problem's to the bit; ONE and its row are missing."""
     expected = of_problem(problem)
     n, m = problem.columns, problem.row_count
     assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
@@ -665,8 +665,8 @@ def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
     kinds = np.where(binary, "BINARY_VARIABLES", np.where(problem.integer, "INTEGER_VARIABLES", "VARIABLES"))
     assert model["kind"] == dict(zip(columns, kinds.tolist(), strict=True))
     for end, bounds in (("lower", problem.lower), ("upper", problem.upper)):
-        told = np.isfinite(bounds) & ~binary
-        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(told)[0].tolist()}
+        stated = np.isfinite(bounds) & ~binary
+        assert model[end] == {columns[at]: bounds[at] for at in np.nonzero(stated)[0].tolist()}
     assert list(model["rows"]) == rows
     low, high = limits(problem)
     senses = np.where(low == high, "==", np.where(np.isfinite(low), ">=", "<="))
@@ -708,11 +708,11 @@ def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
 
 BARON = importlib.util.find_spec("gamspy_baron")
 FITS = ["minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqp-mccormick", "miqp-exact", "qp-fixed"]
-"""What two pixels keep within BARON's free size: 10 columns, 10 rows, 50 nonlinear operations."""
+"""Formulations that fit BARON's free size on two pixels: 10 columns, 10 rows, 50 nonlinear operations."""
 
 
 def by_baron(path: Path, problem: Problem) -> Any:
-    """What BARON, in its free edition of 10 columns and 10 rows, answers to the file."""
+    """The answer of BARON, in its free edition of 10 columns and 10 rows, to the file."""
     program = Path(BARON.submodule_search_locations[0]) / "baron"
     done = subprocess.run([program, path.name], cwd=path.parent, capture_output=True, text=True, check=False)
     assert "Normal completion" in done.stdout, done.stdout

@@ -1,4 +1,4 @@
-"""Messages tell numbers as people write them, and advice that helps."""
+"""Numbers in messages are plain, and the advice of messages helps."""
 
 import re
 
@@ -11,7 +11,7 @@ from crossfield.models.errors import CrossfieldError, UnsupportedByFormatError
 
 ALL = ["nl", "gms", "lp", "mps", "mod", "osil", "qplib", "bar"]
 SCALAR = re.compile(r"np\.|\barray\(|dtype")
-"""What the representation of a NumPy number or array has and a plain number has not."""
+"""Marks of the representation of NumPy numbers and arrays, which plain numbers do not have."""
 
 
 def one_stroke(theta=1.0, w=1.0, **given):
@@ -19,7 +19,7 @@ def one_stroke(theta=1.0, w=1.0, **given):
 
 
 def refusals(instance, folder):
-    """Why writers refuse what they refuse of an instance, but for what is beyond a format's degree."""
+    """Reasons of writers to refuse an instance, except polynomials beyond a format's degree."""
     manifests = write_all(instance, folder, formats=ALL)
     reasons = [reason for each in manifests for reason in each.document["refused"].values()]
     return [reason for reason in reasons if "nothing beyond" not in reason]
@@ -36,12 +36,12 @@ def refusals(instance, folder):
 )
 def test_the_advice_of_a_writer_helps(given, better, tmp_path):
     """A stroke that is nearly horizontal has a tiny cost at all weights; its direction can be changed."""
-    told = refusals(one_stroke(**given), tmp_path / "refused")
-    assert told
+    reasons = refusals(one_stroke(**given), tmp_path / "refused")
+    assert reasons
     assert all(
-        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in told
+        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in reasons
     )
-    assert not any(map(SCALAR.search, told))
+    assert not any(map(SCALAR.search, reasons))
     assert refusals(one_stroke(**better), tmp_path / "written") == []
 
 
@@ -53,7 +53,7 @@ def test_a_coefficient_is_told_as_a_plain_number():
 
 
 def test_messages_about_numbers_of_numpy_are_plain():
-    """Values that come out of arrays, handed to everything that tells them."""
+    """Values from arrays, passed to every function that prints them."""
     mask, one = np.ones((1, 2), bool), np.float64(1.0)
     instance = one_stroke()
     field = cf.greedy(instance)
@@ -72,6 +72,6 @@ def test_messages_about_numbers_of_numpy_are_plain():
         lambda: cf.Limits(np.float64(-1.0), np.float64(0.0)),
     ]
     for act in wrong:
-        with pytest.raises(CrossfieldError) as told:
+        with pytest.raises(CrossfieldError) as reasons:
             act()
-        assert not SCALAR.search(str(told.value)), str(told.value)
+        assert not SCALAR.search(str(reasons.value)), str(reasons.value)

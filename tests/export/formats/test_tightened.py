@@ -1,4 +1,4 @@
-"""Problems with windows narrowed by a certificate: the same optimum, in every format, and said so."""
+"""Problems with windows narrowed by a certificate: the same optimum, in every format, and marked."""
 
 import json
 from dataclasses import replace
@@ -36,7 +36,7 @@ def proof(tmp_path_factory):
 
 
 def problems(proof, name):
-    """A formulation with the windows of the gauge, and with those that are left."""
+    """A formulation with the windows of the gauge, and with the narrowed ones."""
     recipe, field = FORMULATIONS[name], proof.field
     plain = formulate(field.instance, name, p=field.p if recipe.fixed else None)
     return plain, tightened(plain, windows_left(proof))
@@ -72,7 +72,7 @@ def test_the_optimum_is_that_of_the_whole_problem(proof):
 
 @pytest.mark.parametrize("gauge, least", [("strokes", 4), ("box", 1)])
 def test_no_better_field_is_cut_off(gauge, least, tmp_path):
-    """A certificate of a field that is not the best leaves the best one, whatever its labels and gauge."""
+    """A certificate of a field that is not the best keeps the best one, under any labels and gauge."""
     checked = 0
     for seed in (*range(103, 123), 151):
         instance = random_instance(seed, (2, 2), 9, gauge)

@@ -528,7 +528,7 @@ SEALED = {
     "a damaged point": (
         lambda lib: rewrite(lib / f"{STEM}_milp.nl.sol", b"Options", b"Option"),
         f"{STEM}_milp.nl.sol",
-        "no solution file of a known kind",
+        "not a solution file of a known kind",
     ),
     "a bound above a point": (lambda lib: change(lib / MIQP, **bound_of(1e3)), MIQP, "above the objective"),
     "a status that does not follow": (

@@ -1,4 +1,4 @@
-"""Layers of a field: their names, and that they fit on the drawing they are from."""
+"""Layers of a field: their names, and their fit to the drawing of the field."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Fields over their drawings: SVG, bitmap, .scap and samples, and nothing but strokes of any of them."""
+"""Fields over their drawings: SVG, bitmap, .scap and samples, with only the strokes of each."""
 
 import base64
 import io

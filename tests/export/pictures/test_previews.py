@@ -1,4 +1,4 @@
-"""What notebooks show: pictures, tables that load nothing, and one line of each."""
+"""Representations in notebooks: pictures, tables that load nothing, and one line of each."""
 
 import base64
 import io
@@ -34,16 +34,16 @@ def solution(instance, field):
 
 
 def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, solution):
-    told = [repr(each) for each in (instance, field, problem, solution)]
-    for line, name in zip(told, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
+    lines = [repr(each) for each in (instance, field, problem, solution)]
+    for line, name in zip(lines, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
         assert re.fullmatch(rf"<{name} .*>", line)
         assert len(line) < 130
-    assert instance.summary in told[0]
-    assert f"{field.energy().total:.6g}" in told[1]
-    assert f"{problem.columns} columns" in told[2]
-    assert f"{problem.row_count} rows" in told[2]
-    assert f"objective {solution.objective:.6g}" in told[3]
-    assert "optimal" in told[3]
+    assert instance.summary in lines[0]
+    assert f"{field.energy().total:.6g}" in lines[1]
+    assert f"{problem.columns} columns" in lines[2]
+    assert f"{problem.row_count} rows" in lines[2]
+    assert f"objective {solution.objective:.6g}" in lines[3]
+    assert "optimal" in lines[3]
 
 
 def test_instances_and_fields_are_pictures(instance, field):
@@ -85,7 +85,7 @@ def test_a_solution_without_a_point_is_told(problem):
 
 @pytest.mark.slow
 def test_a_module_alone_shows_pictures_too():
-    """The face of the package says who draws before any of its modules is there."""
+    """The top-level package registers the drawing function before any of its modules is loaded."""
     code = (
         "from crossfield.models.sketch.samples import sample; import sys; i = sample('skew', 4); "
         "assert 'matplotlib' not in sys.modules; sys.exit(not i._repr_png_().startswith(b'\\x89PNG'))"

@@ -1,4 +1,4 @@
-"""What Ipopt leaves when it is stopped: the best feasible point that it came by."""
+"""Result of Ipopt when it is stopped: the best feasible point that it has found."""
 
 import signal
 from dataclasses import replace
@@ -24,7 +24,7 @@ def relaxed(tmp_path):
 
 @pytest.fixture
 def own_interrupt():
-    """The driver takes over SIGINT; give it back."""
+    """The driver takes over SIGINT; restore it."""
     before = signal.getsignal(signal.SIGINT)
     yield
     signal.signal(signal.SIGINT, before)
@@ -37,9 +37,9 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
 
     def seen(point):
         value, rows = model.evaluate(point)
-        told = {"x": point, "f": value, "g": rows}
+        outputs = {"x": point, "f": value, "g": rows}
         multipliers = [np.zeros(watch.sizes[name]) for name in list(watch.sizes)[3:]]
-        assert watch.eval([ca.DM(each) for each in (*told.values(), *multipliers)]) == [0]
+        assert watch.eval([ca.DM(each) for each in (*outputs.values(), *multipliers)]) == [0]
         return watch.value
 
     lower = problem.point(cf.power_field(problem.instance))

@@ -92,7 +92,7 @@ def test_strokes_at_the_border_are_the_border():
 
 
 def encoded(energy):
-    """What a screen is told of clay in light of that energy."""
+    """The encoded value of clay on a screen in light of that energy."""
     light = np.minimum(energy * np.array(CLAY), 1.0)
     return 1.055 * light ** (1 / 2.4) - 0.055
 

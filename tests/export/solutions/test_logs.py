@@ -1,4 +1,4 @@
-"""Logs of solvers: what each says, how far a rounded bound is trusted, and what is no log."""
+"""Logs of solvers: content, trust in rounded bounds, and files that are not logs."""
 
 import math
 from contextlib import suppress
@@ -11,7 +11,7 @@ from crossfield.models.errors import CrossfieldError, SolutionError
 
 LOGS = places.DATA / "logs"
 OPTIMUM = 0.26710785
-"""Of the problem of five of the logs, as Gurobi, HiGHS and SCIP find it."""
+"""Optimum of the problem of five of the logs, as found by Gurobi, HiGHS and SCIP."""
 
 KNOWN = {
     "highs": ("highs", "1.15.1", "optimal", 0.267104325999, 0.267107849905, 6.06, 1, None, 280, 421),
@@ -107,9 +107,9 @@ def test_a_log_that_is_cut_off_is_read_or_refused(name):
 def test_what_is_no_log_is_refused_in_one_line(tmp_path):
     solution = places.DATA / "solutions" / "scip-10.0_optimal.sol"
     for data, words in (
-        (b"", "no log of a known solver"),
-        (solution.read_bytes(), "no log of a known solver"),
-        (bytes(range(256)) * 50, "no log of a known solver"),
+        (b"", "not a log of a known solver"),
+        (solution.read_bytes(), "not a log of a known solver"),
+        (bytes(range(256)) * 50, "not a log of a known solver"),
         (b"Running HiGHS 1.15.1 (git hash: 04024d7)\n", "neither a bound nor an objective"),
         (b"Gurobi Optimizer version 13\n" + b" " * 100_000 + b"\n" + b"a 0s " * 50_000, "neither a bound"),
     ):

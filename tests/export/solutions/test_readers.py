@@ -541,7 +541,7 @@ FAULTS = {
     "ampl_count_too_large": r"line 11: 4000000000 numbers are announced, 6 whole lines follow",
     "ampl_count_too_small": r"line 16: there are more numbers than announced",
     "ampl_cut_in_the_values": r"line 11: 5 numbers are announced, 2 whole lines follow",
-    "ampl_solved_without_values": r"says solved and holds no values",
+    "ampl_solved_without_values": r"states solved but holds no values",
     "ampl_some_values_only": r"line 11: .*3 values for 5 variables, where all or none",
     "ampl_value_is_a_word": r"line 14: 'one' is not a number",
     "empty": r"the file is empty",
@@ -551,13 +551,13 @@ FAULTS = {
     "highs_count_too_large": r"line 7: 999999999999 columns are announced, 5 whole lines follow",
     "highs_count_too_small": r"line 7: 4 columns are announced, 5 whole lines follow",
     "highs_cut_in_a_number": r"line 7: 4 columns are announced, 3 whole lines follow",
-    "highs_nul_byte": r"line 9: there is a byte that no text has",
-    "highs_optimal_without_point": r"line 5: the file says Optimal and holds no point",
+    "highs_nul_byte": r"line 9: there is a byte that is not text",
+    "highs_optimal_without_point": r"line 5: the file is Optimal but holds no point",
     "highs_sparse_without_index": r"line 10: 2 words stand where 3 should",
     "highs_value_is_a_word": r"line 9: 'minus' is not a number",
     "highs_value_is_nan": r"line 9: 'nan' is not a number",
     "highs_value_missing": r"line 11: 1 words stand where 2 should",
-    "junk": r"no solution file of a known kind; give one of these: HiGHS",
+    "junk": r"not a solution file of a known kind; give one of these: HiGHS",
 }
 
 
@@ -741,8 +741,8 @@ def test_a_solution_beyond_the_limit_is_refused_before_it_is_read(tmp_path, monk
     path = tmp_path / "large.sol"
     with path.open("wb") as stream:
         stream.truncate(MAX_SOLUTION + 1)
-    told = r"large.sol: has 2147483649 bytes; at most 2147483648 are read, .* without columns at 0"
-    with pytest.raises(InputError, match=told):
+    limit = r"large.sol: has 2147483649 bytes; at most 2147483648 are read, .* without columns at 0"
+    with pytest.raises(InputError, match=limit):
         read_raw(path)
     monkeypatch.setattr(registry, "MAX_SOLUTION", 1000)
     path.write_bytes(gzip.compress(bytes(1001)))

@@ -23,7 +23,7 @@ def ring():
 
 @pytest.fixture(scope="module")
 def solved(ring, tmp_path_factory):
-    """Folders of what `export` wrote and of what `solve` left, of the same instance by the same words."""
+    """Folders written by `export` and by `solve`, for the same instance and arguments."""
     folder = tmp_path_factory.mktemp("ring")
     path = str(cf.write_instance(ring, folder / "ring.json"))
     assert invoke(["export", path, "-f", "qp-fixed", "-o", str(folder / "files"), "-q"]) == 0
@@ -57,7 +57,7 @@ def test_solve_leaves_the_manifest_that_reads_its_solution(solved, tmp_path):
 
 
 def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
-    """A manifest goes on listing other files of the same problem; those of another go from it."""
+    """A manifest keeps the other files of the same problem, and drops those of another."""
     shutil.copytree(solved / "files", tmp_path / "both")
     instance = only(tmp_path / "both", "*.instance.json")
 
@@ -74,7 +74,7 @@ def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
 
 
 def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
-    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
+    """A field of energy 15.5 came from an optimum of 1e-6: columns alike, fixed jumps different."""
     other = cf.write_problem(cf.formulate(ring, "qp-fixed", p=cf.greedy(ring).p), tmp_path / "files", ["nl"])
     assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
     assert "solution of another problem" in capsys.readouterr().err
@@ -118,7 +118,7 @@ def by_glpk(model: Path, solution: Path) -> None:
 )
 @pytest.mark.filterwarnings("ignore")
 def test_solvers_repeat_the_stamp(solver, formats, suffix, tmp_path):
-    """Where a solver has a place for a problem's name, its solution says of which problem it is."""
+    """If a solver has a place for a problem's name, its solution states its problem."""
     mask = [[True, True]]
     one, other = (
         cf.formulate(cf.Instance("two", mask, [[0, 0]], [theta], [1.0]), "milp-mccormick")
@@ -135,7 +135,7 @@ def test_solvers_repeat_the_stamp(solver, formats, suffix, tmp_path):
 
 
 def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):
-    """Both layouts write it; a file that an older model wrote has no such line and is read all the same."""
+    """Both layouts write it; a file of an older model has no such line and is read all the same."""
     problem = cf.formulate(ring, "milp-mccormick")
     for dialect in ("indexed", "scalar"):
         model = tmp_path / f"{dialect}.gms"
@@ -159,7 +159,7 @@ def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
 
 
 def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):
-    """The second stage's jumps are the MILP's: only a manifest of its own can read its solution."""
+    """The second stage's jumps are the MILP's: only its own manifest can read its solution."""
     cf.two_stage(ring, tmp_path, limits=cf.Limits(5.0))
     manifest = cf.read_manifest(only(tmp_path, "*.qp-fixed.manifest.json"))
     solution = cf.read_solution(only(tmp_path, "*.qp-fixed.ipopt.sol"), manifest.problem())

@@ -58,7 +58,7 @@ def text(file):
 
 
 def swapped(file, old, new):
-    """A file with one place changed, which must be there."""
+    """A file with one replacement, whose old text must exist."""
     data = text(file)
     assert old in data
     return data.replace(old, new, 1)
@@ -439,7 +439,7 @@ def test_miplib_omits_zeros():
 
 FAULTS = {
     "baron-26.5.27_qp_sum": "summary of BARON, which holds no values; give its results",
-    "baron_res_cut": "does not say how the search ended",
+    "baron_res_cut": "the end of the search is missing",
     "baron_res_cut_after_the_table": "line 183: the file is cut off where the objective should be",
     "baron_res_cut_in_the_table": "line 173: the table is cut off",
     "baron_res_value_missing": "line 180: 3 words stand where 4 should",
@@ -470,7 +470,7 @@ FAULTS = {
     "gurobi_cut_in_a_number": "line 8: the file is cut off in the middle",
     "gurobi_json_cut": "line 1: the JSON is damaged or cut off at column 900",
     "gurobi_json_no_status": "the SolutionInfo has no Status",
-    "gurobi_json_optimal_without_vars": "says optimal and holds no Vars",
+    "gurobi_json_optimal_without_vars": "states optimal but holds no Vars",
     "gurobi_json_value_is_nan": "x has no value",
     "gurobi_json_value_is_text": "not a list of names and values",
     "gurobi_no_values": "the file holds no values",
@@ -507,7 +507,7 @@ def test_bad_files_are_refused_with_file_place_and_remedy(path):
 
 
 def listed(raw):
-    """What a file lists: pairs of name and value, or of place and value."""
+    """Entries of a file: pairs of name and value, or of place and value."""
     names = range(len(raw.values)) if raw.names is None else raw.names.tolist()
     return dict(zip(names, raw.values.tolist(), strict=True))
 
@@ -546,7 +546,7 @@ def attempt(data):
 
 
 LONG = 600_000
-"""Bytes of a hostile file: ten minutes, if each of them were compared with each."""
+"""Bytes of a hostile file: comparing each with each would take ten minutes."""
 
 HEADS = [
     b"# Solution for model obj\n", b"x 1\ny 2\n",
@@ -617,7 +617,7 @@ def test_damaged_files_are_refused_or_read(path, damages):
 @for_each("head", HEADS)
 @pytest.mark.slow
 def test_long_repetitions_take_linear_time(head, part):
-    """Milliseconds; looking back from every character would not end within the time of a test."""
+    """Milliseconds; looking back from every character would exceed the time of a test."""
     attempt(head + part * (LONG // len(part)))
 
 
@@ -666,7 +666,7 @@ def lines_of(form, count):
     ids=["gurobi", "scip"],
 )
 def test_lines_are_read_by_the_thousand_and_not_one_by_one(head, form):
-    """Some hundred calls for a hundred thousand lines; looking at each line takes more than one each."""
+    """Some hundred calls for a hundred thousand lines; a check of each line takes more than one per line."""
     data = head.encode() + lines_of(form, 100_000)
     calls = itertools.count()
     before = sys.getprofile()

@@ -1,4 +1,4 @@
-"""A claim is what its point bears out: relaxations, damaged files, codes of failure, foreign values."""
+"""Claims are checked against their points: relaxations, damaged files, codes of failure, foreign values."""
 
 import codecs
 import gzip
@@ -42,7 +42,7 @@ def skew(tmp_path_factory):
 
 @pytest.fixture
 def reading(skew, tmp_path, capsys):
-    """Runs `read` on a file: exit code, facts, complaint, and whether a field was written."""
+    """Run `read` on a file: exit code, facts, complaint, and whether a field was written."""
 
     def run(solution, *options):
         output = tmp_path / "field.npz"
@@ -96,7 +96,7 @@ def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
     assert (facts["status"], facts["claimed"]) == ("unknown", "optimal-global")
     assert facts["worst_violation"] > 0.3
     assert re.search(
-        r"relaxed\.sol: says optimal-global, but its point breaks integrality by 0\.3", complaint
+        r"relaxed\.sol: claims optimal-global, but its point breaks integrality by 0\.3", complaint
     )
     assert "--tolerance" in complaint
     code, facts, complaint, written = reading(path, "--tolerance", "0.5")
@@ -123,7 +123,7 @@ def test_glpk_answers_relaxations_and_models_in_its_own_order(skew, reading, tmp
 
 @pytest.mark.needs("glpk")
 def test_the_columns_of_a_model_have_glpks_order_also_with_pixels_apart(tmp_path):
-    """`parts` has a pixel without neighbours: its alpha, if it has no stroke, is no column of GLPK's."""
+    """`parts` has a pixel without neighbours: without a stroke, its alpha is not a column of GLPK's."""
     for number, shape in enumerate(("parts", "hole", "pixel")):
         problem = formulate(make_instance(shape), MILP)
         write(problem, tmp_path / f"{number}.mod")
@@ -143,7 +143,7 @@ def test_claims_fall_to_objective_bound_and_violation(milp):
     assert of(reported=objective, bound=objective).status == "optimal-global"
     assert of(reported=objective * (1 + 0.5 * TOLERANCE), bound=objective - 1).status == "optimal-global"
     (why,) = of(reported=objective + 0.01).contradictions
-    assert why.startswith("it tells the objective")
+    assert why.startswith("it states the objective")
     (why,) = of(bound=objective + 0.01).contradictions
     assert why.startswith("the dual bound")
     assert of(reported=np.inf).status == of(reported=np.nan).status == "unknown"
@@ -184,7 +184,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
         assert facts["claimed"] == status
         wrong = code == 200 and values is point
         assert facts["status"] == ("unknown" if wrong else status)
-        assert ("its point is feasible" if wrong else "no answer") in complaint
+        assert ("its point is feasible" if wrong else "not a solution") in complaint
 
 
 # values
@@ -252,7 +252,7 @@ def answers(tmp_path_factory):
 
 
 def bears_out(solution):
-    """Whether a point shows its promised status, by numbers that are not the package's judgement."""
+    """Whether a point agrees with its status, by independent numbers."""
     if not solution.status.promises_point or solution.point is None:
         return True
     off = solution.violation
@@ -303,12 +303,14 @@ def test_files_of_a_status_alone_are_told_to_be_cut():
         data = path.read_bytes()
         end = len(data) - 1 if path.name.endswith("_tim.lst") else data.index(b"\n**** FILE SUMMARY")
         for length in (end, end - 1, end - 10):
-            with pytest.raises(SolutionError, match=r"cut off|no solution file|not the number of a status"):
+            with pytest.raises(
+                SolutionError, match=r"cut off|not a solution file|not the number of a status"
+            ):
                 parse_raw(data[:length])
 
 
 def damages(data):
-    """Ways in which a file comes to harm: lines repeated, moved or longer, values replaced, marks."""
+    """Kinds of damage to a file: lines repeated, moved or longer, values replaced, marks."""
     lines = data.splitlines(keepends=True)
     for at in range(0, len(lines), max(1, len(lines) // 5)):
         yield b"".join([*lines[: at + 1], *lines[at:]])

@@ -1,4 +1,4 @@
-"""The command `evaluate` and its function: exact fields, reports, what Ctrl-C leaves."""
+"""The command `evaluate` and its function: exact fields, reports, and the effect of Ctrl-C."""
 
 import json
 
@@ -94,11 +94,11 @@ import crossfield as cf
 ours, theirs = socket.socketpair()
 theirs.setblocking(False)
 signal.set_wakeup_fd(theirs.fileno())
-def tell(line):
+def show(line):
     if line.startswith("curve 2"):
         print(2, flush=True)
         ours.recv(1)  # until the signal is there
-found = cf.evaluate(cf.sample("mouse", 12), sketch="mouse", methods=["greedy"], progress=tell)
+found = cf.evaluate(cf.sample("mouse", 12), sketch="mouse", methods=["greedy"], progress=show)
 print(found.interrupted, len(found.curves), found.summary("greedy").count)
 """
 

@@ -89,9 +89,9 @@ def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsy
     stale.write_bytes(b"of an earlier call")
     given = ["prove", "mouse", "--size", "24", "--norm", norm, "--time-limit", "0.1", "--json"]
     assert invoke([*given, "-o", str(tmp_path)]) == 1
-    said = capsys.readouterr()
-    assert NOTHING in said.err
-    document = json.loads(said.out)
+    output = capsys.readouterr()
+    assert NOTHING in output.err
+    document = json.loads(output.out)
     assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
     assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
     assert {path.name for path in tmp_path.iterdir()} == {"mouse.proof.field.npz", "mouse.proof.json"}

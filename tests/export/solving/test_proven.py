@@ -1,4 +1,4 @@
-"""A run tells of every field how far from the least 2-norm energy it is at most, with a certificate of it."""
+"""A run reports for every field its greatest gap to the least 2-norm energy, with a certificate."""
 
 import json
 import os

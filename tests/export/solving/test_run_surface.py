@@ -1,4 +1,4 @@
-"""A run shades the surface over its field where that can be trusted, says why not, and stops for Ctrl-C."""
+"""A run shades the surface over its field if it can be trusted, states doubts, and stops for Ctrl-C."""
 
 import json
 from dataclasses import replace
@@ -25,14 +25,14 @@ def test_a_surface_without_doubts_is_drawn_and_one_with_is_not(report, tmp_path,
     trusted = not found.surface.doubts
     assert found.shaded == trusted == (tmp_path / "shaded.png").exists()
     for surface, doubt in ((ball(8), ""), (replace(ball(8), doubts=("it is flat",)), "it is flat")):
-        told = replace(report, surface=surface)
-        document = json.loads(json.dumps(told.document()))["surface"]
+        with_surface = replace(report, surface=surface)
+        document = json.loads(json.dumps(with_surface.document()))["surface"]
         assert document["doubts"] == ([doubt] if doubt else [])
         assert document["picture"] == (None if doubt else "shaded.png")
-        show_report(told, tmp_path)
-        said = " ".join(capsys.readouterr().out.split())
-        assert ("no shaded surface: it is flat" if doubt else "shaded surface: ") in said
-        assert ("no shaded surface" in said) == bool(doubt)
+        show_report(with_surface, tmp_path)
+        text = " ".join(capsys.readouterr().out.split())
+        assert ("no shaded surface: it is flat" if doubt else "shaded surface: ") in text
+        assert ("no shaded surface" in text) == bool(doubt)
 
 
 def test_ctrl_c_before_the_surface_leaves_the_rest(report, tmp_path):

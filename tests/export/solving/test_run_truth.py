@@ -1,4 +1,4 @@
-"""A run tells where it began, which solver gave back its start, and where the time went."""
+"""A run reports its start, the solver that returned its start, and the seconds of each stage."""
 
 import json
 from dataclasses import replace
@@ -46,17 +46,17 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
         "-q",
     ]
     assert invoke([*given, "-o", str(tmp_path)]) == 0
-    told = json.loads((tmp_path / "report.json").read_text())
-    assert {key: told["instance"][key] for key in ("sha256", "w_strokes", "w_beta", "stroke_weight")} == {
+    document = json.loads((tmp_path / "report.json").read_text())
+    assert {key: document["instance"][key] for key in ("sha256", "w_strokes", "w_beta", "stroke_weight")} == {
         "sha256": instance.sha256,
         "w_strokes": 30.0,
         "stroke_weight": 10.0,
         "w_beta": instance.skew_coefficient,
     }
-    rows = {row["method"]: row for row in told["methods"]}
+    rows = {row["method"]: row for row in document["methods"]}
     assert rows["start"]["energy_2_norm"] == first_field(instance).energy(2).total
-    assert rows["start"]["seconds"] == told["stages"]["start"]
-    assert list(told["stages"]) == [
+    assert rows["start"]["seconds"] == document["stages"]["start"]
+    assert list(document["stages"]) == [
         "start",
         "models",
         *METHODS,
@@ -65,9 +65,9 @@ def test_a_run_has_a_row_for_its_start_and_its_seconds_add_up(tmp_path):
         "pictures",
         "surface",
     ]
-    assert told["seconds"] == round(sum(told["stages"].values()), 3)
+    assert document["seconds"] == round(sum(document["stages"].values()), 3)
     shape = cf.read_field(tmp_path / "field.npz").shape
-    kept = rows[told["kept"]]
+    kept = rows[document["kept"]]
     assert kept["strokes_beyond_10_degrees"] == shape.far_strokes
     assert kept["lines_under_45_degrees"] == shape.narrow_pixels
     assert kept["stroke_deviation_mean_degrees"] == pytest.approx(np.degrees(shape.mean_deviation))
@@ -84,11 +84,11 @@ def test_a_solver_without_time_gives_back_its_start_and_it_is_said(capsys, tmp_p
     assert late.gap == pytest.approx(0.75)
     milp = Candidate("MILP", late.field, 1.0, late)
     show_report(Report(instance, (Candidate("start", start, 0.1), milp), (), stages={"start": 0.1}), tmp_path)
-    said = capsys.readouterr().out
-    assert "start returned" in said
-    assert f"MILP returned its start: objective {late.objective:.4g}, bound" in said
-    assert "gap 75%" in said
-    assert "0.1 s: start 0.1" in said
+    text = capsys.readouterr().out
+    assert "start returned" in text
+    assert f"MILP returned its start: objective {late.objective:.4g}, bound" in text
+    assert "gap 75%" in text
+    assert "0.1 s: start 0.1" in text
 
 
 def test_another_point_than_the_start_is_none_and_a_proven_one_has_no_gap():

@@ -1,4 +1,4 @@
-"""What a solve returns without time, shares of limits, and what the child process of a solver loads."""
+"""Solves without time, shares of limits, and the modules that a solver's child process loads."""
 
 import subprocess
 import sys

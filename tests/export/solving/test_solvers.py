@@ -333,7 +333,7 @@ def hard():
     "name,solver", [("milp-mccormick", "highs"), ("miqp-exact", "bonmin"), ("milp-mccormick", "bonmin")]
 )
 def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
-    """No solver proves it in hours, and all take the start at once: three seconds are as good as thirty."""
+    """No solver proves it in hours, and all take the start at once: three seconds are enough."""
     problem, start = cf.formulate(hard, name), cf.greedy(hard)
     solution = cf.solve(problem, solver, start=start, limits=cf.Limits(3))
     assert solution.status == Status.LIMIT_WITH_POINT
@@ -348,20 +348,20 @@ def test_without_a_start_and_time_there_is_no_point(tmp_path):
     problem = cf.formulate(instance, "milp-mccormick")
     found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(1e-6))
     assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
-    with pytest.raises(SolutionError, match="left no answer within its time; give it more, or a start"):
+    with pytest.raises(SolutionError, match="returned no answer within its time; give it more, or a start"):
         _ = found.field
     assert not (tmp_path / "mouse.milp-mccormick.highs.sol").exists()
 
 
-def told_to_highs(program, folder, monkeypatch):
-    """Let children of this process run the program when they start, highspy at hand."""
+def run_in_children(program, folder, monkeypatch):
+    """Let children of this process run the program when they start, with highspy available."""
     (folder / "sitecustomize.py").write_text("import highspy\n" + textwrap.dedent(program))
     monkeypatch.setenv("PYTHONPATH", str(folder))
 
 
 def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, capsys):
-    """HiGHS says optimal of a point that is not feasible."""
-    told_to_highs(
+    """HiGHS reports an optimum for a point that is not feasible."""
+    run_in_children(
         """
         import pathlib, re
         write = highspy.Highs.writeSolution
@@ -376,15 +376,15 @@ def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, 
     )
     files = tmp_path / "files"
     assert invoke(["solve", "skew", "--size", "4", "-f", "milp-mccormick", "-o", str(files), "--quiet"]) == 1
-    assert "says optimal-global, but" in capsys.readouterr().err
+    assert "claims optimal-global, but" in capsys.readouterr().err
     assert not list(files.glob("*.field.npz"))
 
 
 def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch):
-    """A HiGHS that never looks at the clock: the parent ends it, and the start is the answer."""
+    """A HiGHS that ignores the clock: the parent ends it, and the start is the answer."""
     instance = cf.sample("mouse", 8)
     start = cf.greedy(instance)
-    told_to_highs(
+    run_in_children(
         """
         import signal, time
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -403,8 +403,8 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
 
 @pytest.mark.slow
 def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_path, monkeypatch):
-    """Where Ctrl-C is ignored, as in a shell's background; this HiGHS goes on until it is asked to end."""
-    told_to_highs(
+    """Ctrl-C is ignored, as in a shell's background; this HiGHS continues until a request to end."""
+    run_in_children(
         """
         import os, time
         highspy.Highs.startSolve = lambda self: None
@@ -534,7 +534,7 @@ def test_files_where_the_user_happens_to_be_are_not_run(tmp_path, small, monkeyp
 
 
 def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
-    """Exit code, output and complaints of a command line that is interrupted once its log has the words."""
+    """Exit code, output and complaints of a command that is interrupted once its log has the words."""
     command = [sys.executable, "-m", "crossfield", *map(str, arguments), "-o", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while not any(re.search(words, path.read_text(), re.MULTILINE) for path in folder.rglob(log)):
@@ -551,7 +551,7 @@ CTRL_C = {
     "bonmin": ["solve", "mouse", "-f", "miqp-exact", "--size", "12"],
 }
 AT_WORK = {"highs": "MIP start solution is feasible", "ipopt": "^iter +objective", "bonmin": "NLP0014I"}
-"""What stands in the log of each once it solves."""
+"""Text in the log of each solver once it is solving."""
 
 
 @pytest.mark.slow

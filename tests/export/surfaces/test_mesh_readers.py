@@ -1,4 +1,4 @@
-"""Programs that nobody here wrote read a surface: its places, quads and texture, and the way it faces."""
+"""External programs read a surface: its places, quads and texture, and its orientation."""
 
 import json
 import subprocess
@@ -18,12 +18,12 @@ mesh = thing.data
 picture = next(node.image for node in mesh.materials[0].node_tree.nodes if node.type == "TEX_IMAGE")
 points = [thing.matrix_world @ vertex.co for vertex in mesh.vertices]
 texture = [list(each.uv) for each in mesh.uv_layers[0].data]
-told = {
+facts = {
     "points": [list(each) for each in points], "faces": [list(each.vertices) for each in mesh.polygons],
     "texture": texture, "mended": mesh.validate(), "picture": list(picture.size),
     "outward": [list(thing.matrix_world.to_3x3() @ each.normal) for each in mesh.polygons],
 }
-print("told " + json.dumps(told))
+print("facts " + json.dumps(facts))
 """
 
 
@@ -54,16 +54,16 @@ def test_trimesh_reads_the_surface(written):
 def test_blender_reads_the_surface(written):
     surface, folder = written
     command = [sys.executable, "-c", IN_BLENDER, folder / "surface.obj"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True, timeout=200).stdout
-    told = json.loads(next(line for line in said.splitlines() if line.startswith("told "))[5:])
+    output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=200).stdout
+    facts = json.loads(next(line for line in output.splitlines() if line.startswith("facts "))[5:])
     height, width = surface.instance.mask.shape
-    assert not told["mended"]
-    assert told["picture"] == [4 * width, 4 * height]
-    faces = np.array(told["faces"])
+    assert not facts["mended"]
+    assert facts["picture"] == [4 * width, 4 * height]
+    faces = np.array(facts["faces"])
     assert faces.shape == (surface.instance.grid.size, 4)
-    x, depth, up = np.array(told["points"]).T  # Blender's front view: x to the right, z up, y away
+    x, depth, up = np.array(facts["points"]).T  # Blender's front view: x to the right, z up, y away
     row, column = np.rint(height - up).astype(int), np.rint(x).astype(int)
     assert np.abs(surface.heights[row, column] + depth).max() < 1e-4
-    assert (np.array(told["outward"])[:, 1] < 0).all()
-    texture = np.array(told["texture"]) * (width, height)
+    assert (np.array(facts["outward"])[:, 1] < 0).all()
+    texture = np.array(facts["texture"]) * (width, height)
     assert np.abs(texture - np.column_stack([x, up])[faces.ravel()]).max() < 1e-4

@@ -1,4 +1,4 @@
-"""Files of a surface: the mesh is the surface, each is the same twice, and nothing is left half done."""
+"""Files of a surface: the mesh equals the surface, writes are repeatable and complete."""
 
 import json
 from collections import Counter
@@ -98,10 +98,10 @@ def test_the_folder_has_every_file_the_same_twice_whatever_the_users_settings(tm
     assert sizes.pop("drawing.png") == (996, 996, "RGB")
     assert set(sizes.values()) == {(996, 996, "RGBA")}
     assert (first / "surface.mtl").read_text().split()[-2:] == ["map_Kd", "drawing.png"]
-    told = json.loads((first / "surface.json").read_text())
-    assert told["trusted"] is True
-    assert told["instance"]["sha256"] == surface.instance.sha256
-    assert not any("second" in key for key in told)
+    facts = json.loads((first / "surface.json").read_text())
+    assert facts["trusted"] is True
+    assert facts["instance"]["sha256"] == surface.instance.sha256
+    assert not any("second" in key for key in facts)
 
 
 def test_a_scale_is_that_of_all_pictures_and_light_and_facts_are_used(tmp_path):
@@ -158,11 +158,11 @@ def test_facts_are_those_of_a_plane():
     assert u[0] * v[0] + (u[0] * slope[0]) * np.dot(v, slope) == pytest.approx(0)
     exact = surface_facts(plane(6, *slope, u=0.0, v=np.arctan2(v[1], v[0])))
     assert exact["right_angle_error_90_percent_degrees"] == pytest.approx(0, abs=1e-4)
-    told = surface_facts(plane(6, *slope))
+    facts = surface_facts(plane(6, *slope))
     error = np.degrees(np.arcsin(0.48 / np.sqrt(1.36 * 1.64)))
-    assert told["right_angle_error_mean_degrees"] == pytest.approx(error, abs=1e-3)
-    assert told["slant_mean_degrees"] == pytest.approx(45.0)
-    assert told["height_range_pixels"] == pytest.approx(0.6 * 8 + 0.8 * 6)
+    assert facts["right_angle_error_mean_degrees"] == pytest.approx(error, abs=1e-3)
+    assert facts["slant_mean_degrees"] == pytest.approx(45.0)
+    assert facts["height_range_pixels"] == pytest.approx(0.6 * 8 + 0.8 * 6)
 
 
 def test_surfaces_are_drawn_in_their_own_kinds(tmp_path):

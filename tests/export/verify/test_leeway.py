@@ -1,4 +1,4 @@
-"""What a point can have saved by broken rows: never too little, nothing where none is broken, and tight."""
+"""The bound of the objective saved by broken rows: valid, zero without a broken row, and tight."""
 
 import numpy as np
 import pytest

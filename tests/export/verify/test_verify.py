@@ -1,4 +1,4 @@
-"""Every program that is here reads and solves what we write; wrong files, crashes and hangs are noticed."""
+"""Every installed program reads and solves our files; wrong files, crashes and hangs are noticed."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ INSTANCES: dict[str, Callable[[], Instance]] = {
 RELAXED = "1 x 3, relaxed"
 LARGER = [name if name == "1 x 3" else pytest.param(name, marks=pytest.mark.slow) for name in INSTANCES]
 PROVEN = ("miqcp-bilinear-l1", "miqp-mccormick", "milp-mccormick", "qp-fixed", "miqp-exact")
-"""What every solver that takes it proves at once."""
+"""Formulations that every solver that takes them proves at once."""
 
 
 @pytest.fixture(scope="session")
@@ -136,7 +136,7 @@ def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
 
 
 def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path):
-    """Slacks of weighted deviations, each less by what a solver may break its row: the same field."""
+    """Slacks of weighted deviations, each reduced by a solver's tolerance for its row: the same field."""
     problem = formulate(sample("skew", 4), "milp-mccormick")
     write_all(problem.instance, tmp_path, ["milp-mccormick"])
     subjects, _ = _subjects([read_manifest(next(tmp_path.glob("*.manifest.json")))], tmp_path)
@@ -204,7 +204,7 @@ WRONG = {
     "square": ("minlp-cubic", "gms", r"\+ 2\*", "+ 2.001*"),
     "greater": ("miqp-exact", "gms", r"=l=", "=g="),
 }  # fmt: skip
-"""What is done to a file: formulation, format, what is replaced by what (once, or everywhere for a name)."""
+"""Changes of a file: formulation, format, old and new text (once, or everywhere for a name)."""
 
 
 @pytest.fixture(scope="session")
@@ -225,7 +225,7 @@ def spoiled(tmp_path_factory: pytest.TempPathFactory) -> Verification:
 
 
 def forge(manifest: Path, path: Path, data: bytes) -> None:
-    """Change a file and what its manifest says of it."""
+    """Change a file and its entry in the manifest."""
     import hashlib
 
     old = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -253,7 +253,7 @@ def test_a_wrong_file_is_noticed_by_every_program(spoiled: Verification, name: s
 
 
 def blind_to(name: str) -> set[str]:
-    """Programs that tell too few digits to notice: CBC exports some ten."""
+    """Programs that report too few digits to notice: CBC exports some ten."""
     return {"cost": {"cbc"}}.get(name, set())
 
 
@@ -270,7 +270,7 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
 
 @needing("scip")
 def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
-    """An understated count of nonlinear variables takes SCIP's process down; the next file is still read."""
+    """An understated count of nonlinear variables crashes SCIP's process; the next file is still read."""
     for name in ("crash", "well"):
         write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
     path = tmp_path / "crash.miqcp-bilinear.nl"
@@ -311,7 +311,7 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
 
 
 def test_a_start_on_export(tmp_path: Path):
-    """`export --start` leaves the files of starting points beside the models."""
+    """`export --start` writes the files of starting points next to the models."""
     field = make_field(on_grid(2, 3))
     write_instance(field.instance, tmp_path / "a.json")
     write_field(field, tmp_path / "field.npz")
@@ -331,7 +331,7 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
 @pytest.mark.slow
 @each_of(["gurobi", "cplex", "xpress", "gams"])
 def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, program: str):
-    """A size that no free edition takes; whoever has a licence sees it solved, or the time limit."""
+    """A size that no free edition takes; with a licence it is solved or meets the time limit."""
     MASKS.setdefault("wide", ["#" * 16] * 16)
     write_all(make_instance("wide"), tmp_path, ["miqp-mccormick"], ["lp", "gms"])
     found = verify(tmp_path, seconds=0.1, programs=[program])
@@ -356,7 +356,7 @@ def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
 
 @pytest.fixture(scope="session")
 def solvers() -> Iterator[Solvers]:
-    """Solvers, with a child process for each program that is asked."""
+    """Solvers, with a child process for each program in use."""
     with Solvers() as found:
         yield found
 
@@ -380,7 +380,7 @@ def test_claims_are_true(
     kind: str,
     name: str,
 ):
-    """Who takes a problem is not contradicted; who does not, refuses the file or proves no optimum."""
+    """A solver that takes a problem is not contradicted; others refuse the file or prove no optimum."""
     verification = verified("1 x 3" if kind == "whole" else RELAXED)
     problem = read_manifest(verification.folder / f"small.{name}.manifest.json").problem()
     taking = takes(problem, solver)
@@ -397,7 +397,7 @@ def test_claims_are_true(
 
 
 def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: float) -> bool:
-    """Whether the solver, asked all the same, gives the optimum and calls it one."""
+    """Whether the solver, run all the same, returns the optimum with that status."""
     files, limits = Files.beside(path, solver), Limits(1.0, 0.0, 1)
     try:
         found = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)

@@ -1,4 +1,4 @@
-"""The canonical form says what the files have: its columns, kinds, limits and orders are theirs."""
+"""The canonical form describes the files: columns, kinds, limits and orders agree."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def lines_of(form: Canonical, name: str) -> list[str]:
 
 
 def named(form: Canonical, file: str) -> list[str]:
-    """Names of columns in the order that the form gives a file."""
+    """Names of columns in the form's order for a file."""
     names = [name.decode() for name in form.column_names] + ["ONE"]
     return [names[column] for column in form.order(file)]
 
@@ -37,7 +37,7 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
 
 
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
-    """All formats go by this rule but .nl, whose header counts integers within [0, 1], fixed ones too."""
+    """All formats follow this rule except .nl, whose header counts all integers within [0, 1]."""
     problem = make_problem("milp-mccormick", make_instance())
     form = Canonical(problem)
     p1 = problem.blocks["p1"]
@@ -49,7 +49,7 @@ def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():
 
 
 def test_no_rule_of_the_form_stands_anywhere_else():
-    """Who is binary, whether there is ONE, and the order of columns are decided in one place."""
+    """Binary columns, the need for ONE, and the order of columns are decided in one place."""
     rules = re.compile(
         r"(lower >= 0|lower == 0).*(upper <= 1|upper == 1)|merged_objective\(0\)|glpk_order\(|Layout\(self"
     )

@@ -168,7 +168,7 @@ def test_a_tag_stands_before_every_word():
 
 @pytest.mark.parametrize("block", [1, 2, 3, 7, 100])
 def test_pieces_that_some_records_have(block, monkeypatch):
-    """Also in the block after one that lacked them: what was blanked comes back."""
+    """Also in the block after one without them: blanked pieces return."""
     monkeypatch.setattr(records, "BLOCK", block)
     present = np.array([True, False, False, True, True, False, True])
     key = Words(table([b"%d" % value for value in range(7)]), None)
@@ -295,7 +295,7 @@ def test_a_small_weight_that_is_added_to_others_is_no_coefficient(tmp_path):
 
 
 def test_points_of_any_size_are_starting_points():
-    """Starting values are no coefficients: none is refused, each survives."""
+    """Starting values are not coefficients: none is refused, each survives."""
     problem = make_problem("qp-fixed", make_instance("row"))
     point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
     lines = b"".join(nl.generate(Canonical(problem), start=point)).decode().splitlines()

@@ -1,4 +1,4 @@
-"""Hidden curves: what goes and what stays, and what the angle to a field is worth."""
+"""Hidden curves: the strokes that are removed and kept, and the angle to a field."""
 
 import crossfield as cf
 import numpy as np

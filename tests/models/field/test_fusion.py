@@ -1,4 +1,4 @@
-"""Two fields made one: never above the first, the better half of each, the best of all choices."""
+"""Fusion of two fields: never above the first, the better half of each, the best of all choices."""
 
 from dataclasses import replace
 from itertools import product
@@ -36,7 +36,7 @@ def test_it_takes_the_better_half_of_each():
 
 @pytest.mark.filterwarnings("error")
 def test_prices_beyond_32_bits_are_as_good_as_infinite():
-    """Beside an energy of 7, strokes of the greatest weight that are half a radian off."""
+    """Strokes of the greatest weight, half a radian off, compared with an energy of 7."""
     theta = np.full((8, 14), np.nan)
     theta[2:6, [1, 12]] = 0.3
     good = greedy(replace(sketch(np.ones(theta.shape, bool), theta), stroke_coefficient=MOST_WEIGHT))

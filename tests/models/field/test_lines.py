@@ -1,4 +1,4 @@
-"""Fields from two lines a pixel: the same crosses whatever the turns and the order, in every gauge."""
+"""Fields from two lines per pixel: the same crosses for all turns and orders, in every gauge."""
 
 import numpy as np
 import pytest
@@ -100,8 +100,8 @@ def test_lines_that_are_one_make_a_cross_of_one_line():
     [
         ([0.0], "u has shape (1,), but two has 2 pixels"),
         ([[0.0, 1.0]], "u has shape (1, 2), but two has 2 pixels"),
-        ([0.0, np.nan], "u of pixel 1 is nan, which is no angle"),
-        ([2e6, 0.0], "u of pixel 0 is 2000000.0, which is no angle"),
+        ([0.0, np.nan], "u of pixel 1 is nan, which is not an angle"),
+        ([2e6, 0.0], "u of pixel 0 is 2000000.0, which is not an angle"),
         (["a", "b"], "u holds something other than numbers"),
         ([1j, 0.0], "u holds something other than numbers"),
     ],

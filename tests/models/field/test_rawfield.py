@@ -1,4 +1,4 @@
-"""Raw fields read back: our own, and those that other programs leave on our mesh."""
+"""Raw fields read back: our own, and those of other programs on our mesh."""
 
 import numpy as np
 import pytest
@@ -91,10 +91,10 @@ def row(*, number=3, text=None, change=None):
     [
         (lambda _: [], "line 1: is '', not the degree 4"),
         (row(number=1, text="hello"), "line 1: is 'hello', not the degree 4"),
-        (row(number=1, text="2 50"), "line 1: has 2 vectors a face"),
+        (row(number=1, text="2 50"), "line 1: has 2 vectors per face"),
         (row(number=1, text="4 7"), "line 1: has 7 faces, but"),
-        (lambda lines: lines[:-1], "rows of vectors, but its first line says"),
-        (lambda lines: [*lines, lines[-1]], "rows of vectors, but its first line says"),
+        (lambda lines: lines[:-1], "rows of vectors, but its first line states"),
+        (lambda lines: [*lines, lines[-1]], "rows of vectors, but its first line states"),
         (row(change=lambda words: words[:11]), "line 3: has 11 numbers; give 12"),
         (row(change=lambda words: ["nan", *words[1:]]), "line 3: holds something other than numbers"),
         (row(change=lambda words: ["1_0", *words[1:]]), "line 3: holds something other than numbers"),

@@ -184,7 +184,7 @@ def test_one_pixel_solved(gauge, alpha, beta, solver):
 
 
 def test_two_pixels_solved():
-    """With the jump +1 as data the two labels of one cross are found; the first one is held by its stroke."""
+    """The jump +1 as data: the two labels of one cross are found; its stroke holds the first one."""
     instance = Instance(
         "two", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.3, HALF + 0.3]), np.ones(2)
     )

@@ -1,4 +1,4 @@
-"""A formulation may be named in short, as library entries do, wherever it is named."""
+"""A formulation may be named by its short name wherever it is named, as in library entries."""
 
 import crossfield as cf
 import pytest

@@ -210,13 +210,13 @@ def test_npz_that_promises_too_much_is_refused(instance, tmp_path):
     path.write_bytes(pack_arrays(others))
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("theta.npy", head.getvalue() + b"12345678")
-    refused(read_instance, path, "another length than its header says")
+    refused(read_instance, path, "another length than its header states")
 
 
 def test_a_key_that_is_there_twice_is_named(instance, tmp_path):
     path = tmp_path / "broken.json"
     path.write_text(to_json(instance).replace('"mask"', '"gauge": "box",\n  "mask"', 1))
-    refused(read_instance, path, "is not valid JSON: the key 'gauge' is there twice")
+    refused(read_instance, path, "is not valid JSON: the key 'gauge' appears twice")
 
 
 @for_each(

@@ -1,4 +1,4 @@
-"""A child process: when it is asked to stop and killed, what it prints, and how it ends."""
+"""A child process: requests to stop and kills, its output, and its end."""
 
 import os
 import signal
@@ -16,7 +16,7 @@ from crossfield.models.processes.messages import WorkerError
 
 
 class Clock:
-    """A clock that stands still until the work has begun, and then runs so many times as fast as others."""
+    """A clock that stands still until the work has begun, and then runs faster than others by a factor."""
 
     def __init__(self, begun: Path, speed: float):
         self.begun, self.speed, self.begin = begun, speed, None

@@ -1,4 +1,4 @@
-"""Deadlines: what is left, and that the parts of a budget never add up to more than the whole."""
+"""Deadlines: the time left, and that the parts of a budget never exceed the whole."""
 
 import math
 import pickle
@@ -11,7 +11,7 @@ SECONDS = st.floats(1e-3, 1e6)
 
 
 class Clock:
-    """A clock that moves when it is told to."""
+    """A clock that moves only on request."""
 
     def __init__(self):
         self.now = 1000.0
@@ -58,7 +58,7 @@ def test_without_a_limit_there_is_no_end():
 
 @given(SECONDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), SECONDS, SECONDS)))
 def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
-    """However much of its share each part takes, all end by the deadline of the whole."""
+    """For any use of their shares, all parts end by the deadline of the whole."""
     clock = Clock()
     whole = Deadline.after(seconds, clock)
     for part, taken, most, kept in steps:
@@ -69,7 +69,7 @@ def test_the_parts_of_a_budget_are_no_more_than_the_whole(seconds, steps):
 
 
 def test_a_deadline_goes_to_another_process():
-    """What is left travels, not the time of a clock that the other process may not share."""
+    """A pickled deadline holds the seconds left, because the other process may have another clock."""
     for seconds in (5.0, math.inf):
         sent, arrived = Deadline.after(seconds), pickle.loads(pickle.dumps(Deadline.after(seconds)))
         assert sent.at <= arrived.at <= Deadline.after(seconds).at

@@ -1,4 +1,4 @@
-"""Ctrl-C and a run: what it ends, what is kept, and that nobody is left behind."""
+"""Ctrl-C and a run: its end, the kept results, and that no process is left behind."""
 
 import json
 import os
@@ -17,14 +17,14 @@ FIELDS = {"field.npz", "field.json", "field.rawfield", "field.obj", "field.sings
 
 RUN = """
 import sys, crossfield as cf
-tell = lambda line: print(line, flush=True)
-report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=tell)
+show = lambda line: print(line, flush=True)
+report = cf.run(cf.sample("mouse", 10), sys.argv[1], limits=cf.Limits(float(sys.argv[2])), progress=show)
 """
 
 
 @contextmanager
 def started(command, first=None):
-    """A process that has printed a line which begins so; afterwards none that it has started is left."""
+    """A process that has printed a line with this start; in the end no child of it is left."""
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
@@ -39,7 +39,7 @@ def started(command, first=None):
 
 
 def press(process, times=1):
-    """Exit code and complaints of a process that Ctrl-C is pressed for."""
+    """Exit code and complaints of a process after Ctrl-C."""
     for _ in range(times):
         os.killpg(process.pid, signal.SIGINT)
     err = process.communicate()[1]
@@ -111,8 +111,8 @@ def test_ctrl_c_before_there_is_a_field_leaves_none(tmp_path):
 
 
 def test_the_plan_names_each_method_that_searches_and_the_sum():
-    told = plan(cf.Limits(20))
-    assert told.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
+    sentence = plan(cf.Limits(20))
+    assert sentence.startswith("at most 60 s: search 20, two-stage 20, prove 20;")
     timed = [method.name for method in METHODS.values() if method.timed]
     assert timed == ["search", "two-stage", "prove"]
 
@@ -121,12 +121,12 @@ def test_the_plan_is_the_first_thing_that_is_told(tmp_path):
     class StoppedError(Exception):
         pass
 
-    def tell(line):
+    def show(line):
         assert line == plan(cf.Limits(7))
         raise StoppedError
 
     with pytest.raises(StoppedError):
-        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=tell)
+        cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(7), progress=show)
 
 
 @pytest.mark.parametrize(
@@ -145,8 +145,8 @@ def test_too_many_threads_or_processes_are_refused_with_the_range(tmp_path, argu
 
     what, least = ("threads", 0) if "--threads" in arguments else ("jobs", 1)
     assert invoke([*arguments, "100000", "-o", str(tmp_path / "out")]) == 2
-    said = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
-    assert f"100000 {what} cannot be; give {least} to {MOST}" in said
+    output = " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
+    assert f"{what} must be between {least} and {MOST}, got 100000" in output
     assert not (tmp_path / "out").exists()
 
 
@@ -154,9 +154,9 @@ def test_too_many_jobs_are_refused_in_python_too(tmp_path):
     from crossfield.export.library.building.build import build
     from crossfield.export.library.plan.spec import default_spec
 
-    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
         cf.write_all(cf.sample("skew", 4), tmp_path, jobs=100000)
-    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
         build(default_spec(), tmp_path / "library", jobs=100000)
-    with pytest.raises(cf.CrossfieldError, match="100000 jobs cannot be; give 1 to"):
+    with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
         cf.search(cf.sample("mouse", 14), seconds=1, jobs=100000)

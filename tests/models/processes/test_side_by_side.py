@@ -1,4 +1,4 @@
-"""Work in several processes: answers in order, errors as they were raised, and nobody left behind."""
+"""Work in several processes: answers in order, errors as raised, and no process left behind."""
 
 import importlib
 import os
@@ -88,7 +88,7 @@ def work(task):
 
 @pytest.fixture
 def module_of_a_user(tmp_path, monkeypatch):
-    """A module beside the user's program: this process finds it, though it is not installed."""
+    """A module next to the user's program, which this process finds without installation."""
     (tmp_path / "users_module.py").write_text(MODULE)
     monkeypatch.syspath_prepend(tmp_path)
     yield importlib.import_module("users_module")
@@ -154,7 +154,7 @@ def test_a_task_is_sent_when_its_process_has_imported_the_work(tmp_path, monkeyp
 
 
 class Sent:
-    """A task that becomes, when it is sent, whether a file exists."""
+    """A task that turns into, when it is sent, whether a file exists."""
 
     def __init__(self, path):
         self.path = path
@@ -217,7 +217,7 @@ def test_how_many_may_be_asked_for_is_said():
     assert checked(1) == 1
     assert checked(MOST) == MOST >= 16
     for count in (0, -1, MOST + 1, 100000):
-        with pytest.raises(InputError, match=f"{count} jobs cannot be; give 1 to {MOST}"):
+        with pytest.raises(InputError, match=f"jobs must be between 1 and {MOST}, got {count}"):
             checked(count)
     with pytest.raises(InputError, match="100000 jobs"), side_by_side(abs, 100000):
         pass

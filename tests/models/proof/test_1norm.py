@@ -8,7 +8,7 @@ from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.common_lattice import CommonLattice
 from crossfield.models.proof.prove_1norm import forced_1norm
-from crossfield.models.proof.pruning import Left
+from crossfield.models.proof.pruning import RemainingCells
 from crossfield.models.search.box_lp import Residuals, fitted_1norm
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -106,7 +106,8 @@ def test_a_forced_jump_is_the_best_one_everywhere_in_its_boxes():
         middle = np.array([[0.5, 0.5 + HALF * p], rng.uniform(-0.7, 0.7, 2)]) + rng.normal(0, 0.2, (2, 2))
         low, high = middle - rng.uniform(0, 0.2, (2, 2)), middle + rng.uniform(0, 0.2, (2, 2))
         lattice = CommonLattice.near(cf.CrossField(instance, middle[0], middle[1], [p]), np.zeros(1), 4)
-        if not forced_1norm(Left(lattice, lattice.allowed, low[0], high[0], low[1], high[1])).pairs[0]:
+        left = RemainingCells(lattice, lattice.allowed, low[0], high[0], low[1], high[1])
+        if not forced_1norm(left).pairs[0]:
             continue
         found += 1
         alpha, beta = rng.uniform(low[..., None], high[..., None], (2, 2, 200))

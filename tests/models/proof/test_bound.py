@@ -1,4 +1,4 @@
-"""The bound of a lattice against all labellings of small ones, and what passes, threads, pruning do to it."""
+"""The bound of a lattice against all labellings of small ones, after passes, with threads and pruning."""
 
 from itertools import product
 
@@ -10,7 +10,7 @@ from crossfield.models.instance.instance import HALF, Instance
 from crossfield.models.processes.crew import crew
 from crossfield.models.processes.deadline import never
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer, left, prolonged
+from crossfield.models.proof.pruning import finer, prolonged, remaining_cells
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
@@ -66,7 +66,7 @@ def discrete(lattice):
 
 
 def least_labelling(unary, pairs):
-    """The least sum over all labellings: pixels are eliminated one by one, which forgets none."""
+    """The least sum over all labellings: pixels are eliminated one by one."""
     tables = [((i,), cost) for i, cost in enumerate(unary)] + [((i, j), cost) for i, j, cost in pairs]
     for pixel in range(len(unary)):
         mine = [table for table in tables if pixel in table[0]]
@@ -179,7 +179,7 @@ def test_pruning_keeps_every_field_of_no_more_energy():
                 dual.quantise()
                 bound = dual.bound()
                 assert bound <= best.energy().total
-                lattice = finer(left(dual, bound, energy))
+                lattice = finer(remaining_cells(dual, bound, energy))
                 dropped += (~lattice.allowed).sum()
                 assert holds(lattice, (best.alpha, best.beta))
                 for _ in range(20):

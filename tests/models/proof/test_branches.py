@@ -1,4 +1,4 @@
-"""Proofs whose levels are cut into branches: what they hold together, and what a checker makes of them."""
+"""Proofs whose levels are cut into branches: the cells that they hold together, and their check."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from crossfield.models.errors import InputError
 from crossfield.models.processes.crew import crew
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import branches, finer, left, prolonged
+from crossfield.models.proof.pruning import branches, finer, prolonged, remaining_cells
 from crossfield.models.proof.record import LevelRecord, Proof
 from crossfield.models.proof.sweep import Dual
 from crossfield.models.search.starts import first_field
@@ -35,7 +35,7 @@ def cut():
             records.append(LevelRecord.of(part, energy))
             parents.append(0)
         for number, part in enumerate(parts, 1):
-            after = prolonged(part, finer(left(part, records[number].bound, energy)))
+            after = prolonged(part, finer(remaining_cells(part, records[number].bound, energy)))
             after.ascend(5)
             records.append(LevelRecord.of(after, energy))
             parents.append(number)
@@ -56,7 +56,7 @@ def test_branches_cut_one_pixel_and_hold_all_cells_together(cut):
 
 
 def test_no_branch_is_below_its_level():
-    """Before what the branches hold is rounded in its turn."""
+    """Before the cells of the branches are rounded in their turn."""
     field = first_field(INSTANCE)
     with crew(1) as hands:
         root = Dual(Lattice.whole(field, 8), hands)
@@ -72,8 +72,8 @@ def test_a_certificate_that_is_cut_off_has_all_branches_of_a_level_or_none(cut, 
     parts = len(cut.parents) - 1
     whole = write_certificate(cut, tmp_path / "whole.npz")
     for checked in range(1, parts + 2):
-        asked = iter(range(checked * len(cut.field.alpha)))
-        found = write_certificate(cut, tmp_path / "it.npz", lambda asked=asked: next(asked, None) is None)
+        calls = iter(range(checked * len(cut.field.alpha)))
+        found = write_certificate(cut, tmp_path / "it.npz", lambda calls=calls: next(calls, None) is None)
         kept = len(found.verdict.levels)
         assert kept == (1 if checked < 5 else checked)
         assert read_certificate(tmp_path / "it.npz").bound == found.bound <= whole.bound

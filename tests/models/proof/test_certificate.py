@@ -79,7 +79,7 @@ def test_the_same_proof_gives_the_same_bytes(tmp_path):
 
 
 def test_a_certificate_that_is_cut_off_holds_with_the_levels_that_were_checked(written, tmp_path):
-    """It is over after so many questions, whenever that is."""
+    """Time is over after that many calls, at any point."""
     _, whole = written(3)
     bound, path, kept = check_certificate.check(whole).bound, tmp_path / "it.npz", []
     pixels = len(whole["alpha"])
@@ -98,9 +98,9 @@ def test_no_certificate_is_written_where_it_is_over_before_a_level_is_checked(tm
 
 
 def after(questions):
-    """Says that it is over when it has been asked so often."""
-    asked = iter(range(questions))
-    return lambda: next(asked, None) is None
+    """Return a function that reports the end of time after that many calls."""
+    left = iter(range(questions))
+    return lambda: next(left, None) is None
 
 
 def test_optima_of_small_instances_are_proven_and_no_bound_is_above_one(tmp_path):
@@ -220,16 +220,16 @@ def test_a_changed_byte_of_the_file_is_told_or_changes_nothing(written, tmp_path
     rng = np.random.default_rng(3)
     path, _ = written(3)
     data, verdict = path.read_bytes(), check_certificate.checked(str(path))
-    other, told = tmp_path / "other.npz", 0
+    other, refused_forgeries = tmp_path / "other.npz", 0
     for at in rng.integers(0, len(data), 100):
         other.write_bytes(data[:at] + bytes([data[at] ^ (1 << rng.integers(8))]) + data[at + 1 :])
         try:
             found = check_certificate.checked(str(other))
         except WRONG:
-            told += 1
+            refused_forgeries += 1
             continue
         assert (found.status, found.energy, found.bound) == (verdict.status, verdict.energy, verdict.bound)
-    assert told > 70
+    assert refused_forgeries > 70
 
 
 def test_what_is_refused_says_where(written):
@@ -255,9 +255,9 @@ def test_what_is_refused_says_where(written):
         "instance_w[0] is not in": arrays | {"instance_w": arrays["instance_w"] * 3},
     }
     for place, bad in cases.items():
-        said = refusal(bad)
-        assert place in said
-        assert "\n" not in said
+        text = refusal(bad)
+        assert place in text
+        assert "\n" not in text
 
 
 def flipped(array, at):
@@ -267,7 +267,7 @@ def flipped(array, at):
 
 
 def test_levels_that_do_not_follow_are_not_written(tmp_path):
-    """A prover that drops what may hold a better field is found out, and the file that stood there stays."""
+    """A prover that drops cells of a better field is detected, and the old file stays."""
     proof = proven(1)
     path = tmp_path / "it.npz"
     path.write_bytes(b"kept")
@@ -290,7 +290,7 @@ def test_unreadable_and_unsafe_files(tmp_path, written):
     path.write_bytes(pack_arrays(arrays)[:-30])
     for bad in (path, pickled, tmp_path / "long.npz", tmp_path / "absent.npz"):
         assert check_certificate.main([str(bad)]) == 2
-    with pytest.raises(InputError, match=r"it\.npz: is no certificate: is no \.npz, or has more or less"):
+    with pytest.raises(InputError, match=r"it\.npz: is not a certificate: is no \.npz, or has more or less"):
         read_certificate(path)
 
 
@@ -310,13 +310,13 @@ def test_every_forged_archive_is_refused_by_both_readers(written, tmp_path, caps
             other.write_bytes(forge(path.read_bytes()))
             assert check_certificate.main([str(other)]) == 2
             assert capsys.readouterr().out.startswith("unreadable: ")
-            with pytest.raises(InputError, match=r"other\.npz: is no certificate: "):
+            with pytest.raises(InputError, match=r"other\.npz: is not a certificate: "):
                 read_certificate(other)
 
 
 @pytest.mark.parametrize("second", ["head.NPY", "HEAD.npy", "head.bin", "head.npy"])
 def test_a_second_head_cannot_claim_twice_the_energy(second, written, tmp_path, capsys):
-    """One reader opens `head.npy`; another may take the last member, or cut the endings of names."""
+    """One reader opens `head.npy`; another may take the last member, or cut the suffixes of names."""
     path, arrays = written(1)
     twice = 2 * read_certificate(path).energy
     claims = members_of(pack_arrays(with_head(arrays, energy=twice, bound=twice, status="optimal")))
@@ -327,7 +327,7 @@ def test_a_second_head_cannot_claim_twice_the_energy(second, written, tmp_path, 
     other.write_bytes(data)
     assert check_certificate.main([str(other)]) == 2
     assert invoke(["prove", "--check", str(other)]) == 1
-    assert "is no certificate" in capsys.readouterr().err
+    assert "is not a certificate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("second", ["instance_head.NPY", "instance_head.bin"])
@@ -341,7 +341,7 @@ def test_a_proof_for_another_instance_is_refused(second, written, tmp_path):
     other = tmp_path / "other.npz"
     other.write_bytes(packed([*(members | {"instance_head.npy": npy(text)}).items(),
                               (second, members["instance_head.npy"])]))  # fmt: skip
-    with pytest.raises(InputError, match="is no certificate"):
+    with pytest.raises(InputError, match="is not a certificate"):
         read_certificate(other, on=instance)
     with pytest.raises(InputError, match="is a certificate of another instance"):
         read_certificate(path, on=instance)
@@ -369,7 +369,7 @@ def test_arrays_that_a_certificate_has_are_of_one_kind_each(written):
 def test_the_text_of_a_certificate_has_each_key_once(written):
     _, arrays = written(1)
     text = arrays["head"].tobytes().replace(b"{", b'{"bound": 1.0, ', 1)
-    assert "a key that is there twice" in refusal(arrays | {"head": np.frombuffer(text, np.uint8)})
+    assert "a repeated key" in refusal(arrays | {"head": np.frombuffer(text, np.uint8)})
     assert "levels is no whole number" in refusal(with_head(arrays, levels=1.5))
     assert "of version 1" in refusal(with_head(arrays, version=True))
 

@@ -1,4 +1,4 @@
-"""The search begins at what the dual of a coarse lattice suggests, the same for any number of threads."""
+"""The search starts from the dual of a coarse lattice, the same for any number of threads."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a proof does where passes are slow and the next level of lattices would be too large."""
+"""Proofs whose passes are slow and whose next level of lattices would be too large."""
 
 import crossfield as cf
 import numpy as np

@@ -1,4 +1,4 @@
-"""What the bound rests on, in exact rational numbers, and the same for the costs as they are computed."""
+"""The lemmas of the bound in exact rational numbers, and for the costs as they are computed."""
 
 import random
 from fractions import Fraction
@@ -11,7 +11,7 @@ from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.proof.costs import pair_deduction, unary_costs
 from crossfield.models.proof.forced import forced
 from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import Left
+from crossfield.models.proof.pruning import RemainingCells
 from exhaustive import random_instance
 
 pytestmark = pytest.mark.numeric
@@ -119,7 +119,7 @@ def test_a_forced_jump_is_best_and_the_tilted_quadratic_below_the_energy_all_ove
         lattice = Lattice.whole(smooth, 4)
         wide = rng.uniform(0.01, 0.5)
         ends = [rng.uniform(0, wide, size) for _ in range(4)]
-        left = Left(
+        left = RemainingCells(
             lattice, lattice.allowed, smooth.alpha - ends[0], smooth.alpha + ends[1],
             np.maximum(smooth.beta - ends[2], -QUARTER), np.minimum(smooth.beta + ends[3], QUARTER),
         )  # fmt: skip

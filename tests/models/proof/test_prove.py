@@ -1,4 +1,4 @@
-"""Proofs from end to end: what is proven is so, whatever the weights, gauge and mask."""
+"""Proofs from end to end: true for all weights, gauges and masks."""
 
 import crossfield as cf
 import numpy as np
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.numeric
 
 
 def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
-    """Where no window is in the way, all jumps are tried by dense least squares."""
+    """All jumps are tried by dense least squares, where no window binds."""
     for seed in range(12):
         instance = random_instance(seed, shape=(2, 2))
         proof = cf.prove(instance, jobs=1)
@@ -27,8 +27,8 @@ def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
 
 def a_few_steps():
     """Arguments that end a proof that cannot close its gap after a dozen reports."""
-    told = []
-    return {"progress": lambda *what: told.append(what), "stop": lambda: len(told) > 12}
+    seen = []
+    return {"progress": lambda *what: seen.append(what), "stop": lambda: len(seen) > 12}
 
 
 def weighted(seed, **weights):
@@ -113,11 +113,11 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
 
 def test_limits_end_a_proof_with_what_it_has():
     instance = cf.sample("bottle", 12, stroke_weight=0.5)
-    told = []
-    some = cf.prove(instance, gap=0.5, progress=lambda *what: told.append(what))
+    seen = []
+    some = cf.prove(instance, gap=0.5, progress=lambda *what: seen.append(what))
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
-    assert all(bound <= energy and labels > 0 for bound, energy, labels in told)
+    assert all(bound <= energy and labels > 0 for bound, energy, labels in seen)
     none = cf.prove(instance, stop=lambda: True)
     assert none.ended == "interrupted"
     assert none.bound <= some.energy
@@ -140,7 +140,7 @@ def test_ctrl_c_ends_a_proof_with_what_it_has():
 
 @pytest.mark.slow
 def test_a_stroke_that_either_line_may_carry_leaves_no_gap():
-    """At the end one box goes over an edge of its window, however fine the lattice."""
+    """At the end one box crosses an edge of its window, on lattices of any spacing."""
     instance = weighted(3, stroke_coefficient=0.1)
     proof = cf.prove(instance, jobs=1)
     assert proof.status == "optimal"

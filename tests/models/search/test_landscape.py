@@ -12,8 +12,8 @@ from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.free_field import free_bounds
 from crossfield.models.search.improvement import stroke_curves
-from crossfield.models.search.kicks import Kicks
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
+from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.search import _Hunt
 from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import explore
@@ -69,8 +69,8 @@ def assert_as_defined(land):
     assert land.energy == pytest.approx(energy + held + soft, rel=1e-9, abs=1e-9)
 
 
-def walked(instance, seed, kicks, steps):
-    """Kicks, and after each some steps of the best change of one jump; every point on the way is checked."""
+def walked(instance, seed, perturbations, steps):
+    """Perturb, then make the best change of one jump for some steps; check every point on the way."""
     field = first_field(instance)
     patch = Patch.of(instance, np.ones(instance.grid.size, bool))
     if not len(patch.pairs):
@@ -78,8 +78,8 @@ def walked(instance, seed, kicks, steps):
     curve = np.full(instance.grid.size, -1)
     curve[instance.stroke_index] = stroke_curves(instance)
     land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
-    draw, rng = Kicks(patch, curve).draw, np.random.default_rng(seed)
-    for _ in range(kicks):
+    draw, rng = Perturbations(patch, curve).draw, np.random.default_rng(seed)
+    for _ in range(perturbations):
         land.change(*draw(rng, land.p))
         assert_as_defined(land)
         for _ in range(steps):
@@ -90,12 +90,12 @@ def walked(instance, seed, kicks, steps):
             assert_as_defined(land)
 
 
-def explored(instance, seed, kicks):
-    """What the patches of a round find, checked, and a round of the search."""
+def explored(instance, seed, perturbations):
+    """Results of the patches of a round, checked, and a round of the search."""
     tasks = _Hunt(instance, seed, first_field(instance)).tasks(Deadline(np.inf))
     lower, upper = free_bounds(instance)
     for task in tasks:
-        better, whole = explore(replace(task, kicks=kicks))
+        better, whole = explore(replace(task, perturbations=perturbations))
         assert whole
         if better is not None:
             assert 0 <= better.energy < definition(instance, task.x, task.p)
@@ -119,15 +119,15 @@ def searched(instance, seed, rounds):
 @settings(deadline=None, max_examples=25)
 def test_energies_on_odd_instances_are_those_of_their_definition(seed):
     instance = odd_instance(seed)
-    walked(instance, seed, kicks=3, steps=4)
-    explored(instance, seed, kicks=2)
+    walked(instance, seed, perturbations=3, steps=4)
+    explored(instance, seed, perturbations=2)
 
 
 @pytest.mark.parametrize(
     "name, size, seed", [("wave_sheet", 5, 0), ("bottle", 8, 0), ("cylinder_bend", 7, 1)]
 )
 def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size, seed):
-    walked(cf.sample(name, size), seed, kicks=60, steps=6)
+    walked(cf.sample(name, size), seed, perturbations=60, steps=6)
 
 
 @pytest.mark.slow
@@ -135,6 +135,6 @@ def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size,
 @settings(deadline=None, max_examples=15)
 def test_searches_of_odd_instances_end(seed):
     instance = odd_instance(seed)
-    walked(instance, seed, kicks=12, steps=6)
-    explored(instance, seed, kicks=20)
+    walked(instance, seed, perturbations=12, steps=6)
+    explored(instance, seed, perturbations=20)
     searched(instance, seed, rounds=1)

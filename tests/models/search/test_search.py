@@ -15,8 +15,8 @@ from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy
 from crossfield.models.search.improvement import improved, stroke_curves
-from crossfield.models.search.kicks import Kicks
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
+from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.starts import first_field
 from crossfield.models.search.walk import Task, explore
 from exhaustive import exact, least_energy, random_instance, sketch
@@ -38,11 +38,11 @@ def landscape(field, free=None):
     return Landscape(patch, angles(field), field.p)
 
 
-def kicks_of(patch):
+def perturbations_of(patch):
     instance = patch.instance
     curve = np.full(instance.grid.size, -1)
     curve[instance.stroke_index] = stroke_curves(instance)
-    return Kicks(patch, curve)
+    return Perturbations(patch, curve)
 
 
 def gentle(seed):
@@ -75,10 +75,10 @@ def test_energy_after_many_changes_is_that_of_its_jumps(seed):
     field = first_field(gentle(seed))
     land = landscape(field)
     rng = np.random.default_rng(seed)
-    kicks = kicks_of(land.patch)
+    perturbations = perturbations_of(land.patch)
     start = land.saved()
     for _ in range(6):
-        land.change(*kicks.draw(rng, land.p))
+        land.change(*perturbations.draw(rng, land.p))
     least = least_energy(field.instance, land.p[None])[0]
     # Bounds only raise it; where none is met it is equal.
     assert land.energy >= least - 1e-6
@@ -94,9 +94,9 @@ def test_energy_after_many_changes_is_that_of_its_jumps(seed):
 def test_bounds_hold_after_changes():
     field = first_field(random_instance(4, shape=(5, 6), strokes=12))
     land = landscape(field)
-    kicks, rng = kicks_of(land.patch), np.random.default_rng(0)
+    perturbations, rng = perturbations_of(land.patch), np.random.default_rng(0)
     for _ in range(30):
-        land.change(*kicks.draw(rng, land.p))
+        land.change(*perturbations.draw(rng, land.p))
         beta = np.split(land.angles, 2)[1]
         assert np.abs(beta).max() < QUARTER + 1e-2
 
@@ -107,9 +107,9 @@ def test_angles_outside_the_patch_stay():
     free = grid.columns < 6
     land = landscape(field, free)
     assert land.energy == pytest.approx(field.energy().total, rel=1e-6)
-    kicks, rng = kicks_of(land.patch), np.random.default_rng(3)
+    perturbations, rng = perturbations_of(land.patch), np.random.default_rng(3)
     for _ in range(5):
-        land.change(*kicks.draw(rng, land.p))
+        land.change(*perturbations.draw(rng, land.p))
     outside = np.concatenate([~free, ~free])
     assert (land.angles[outside] == angles(field)[outside]).all()
     across = ~(free[grid.first] & free[grid.second])
@@ -124,11 +124,11 @@ def turns(instance, p):
 def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
     field = first_field(cf.sample("ring", 14))
     land = landscape(field)
-    kicks, rng = kicks_of(land.patch), np.random.default_rng(5)
+    perturbations, rng = perturbations_of(land.patch), np.random.default_rng(5)
     before = turns(field.instance, field.p)
     moved = set()
     for _ in range(200):
-        for change, most in ((kicks.turn(rng), 0), (kicks.shift(rng, field.p), 2)):
+        for change, most in ((perturbations.turn(rng), 0), (perturbations.shift(rng, field.p), 2)):
             pairs, steps = change
             assert len(pairs) == len(set(pairs.tolist()))
             p = field.p.copy()
@@ -224,14 +224,14 @@ def test_a_deadline_that_is_far_changes_no_bit():
 
 
 class Hourglass:
-    """Time that is over after it has been asked for so many times, and how often it was asked."""
+    """A time limit that is over after a number of calls, and counts them."""
 
     def __init__(self, grains):
-        self.grains, self.asked = grains, 0
+        self.grains, self.count = grains, 0
 
     def __call__(self):
-        self.asked += 1
-        return self.asked > self.grains
+        self.count += 1
+        return self.count > self.grains
 
 
 WORK = {
@@ -247,11 +247,11 @@ WORK = {
 def test_work_ends_soon_after_its_time_and_gives_a_field(work):
     whole = Hourglass(np.inf)
     WORK[work](whole)
-    assert whole.asked > 10
-    for grains in (0, 3, whole.asked // 2):
+    assert whole.count > 10
+    for grains in (0, 3, whole.count // 2):
         time = Hourglass(grains)
         assert np.isfinite(WORK[work](time).energy().total)
-        assert time.asked - grains <= 8
+        assert time.count - grains <= 8
 
 
 def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
@@ -263,7 +263,7 @@ def test_a_patch_without_time_is_not_whole_and_its_walk_stops():
         field.p,
         free,
         curve,
-        kicks=10**9,
+        perturbations=10**9,
         seed=(0,),
         deadline=Deadline.after(0.0),
     )

@@ -77,7 +77,7 @@ def test_ragged_grids_grow_from_coarse_ones_to_valid_fields(monkeypatch):
 
 
 def test_a_first_field_of_no_time_is_a_field_after_few_questions():
-    asked = []
-    field = first_field(cf.sample("mouse", 96), lambda: bool(asked.append(None)) or True)
+    calls = []
+    field = first_field(cf.sample("mouse", 96), lambda: bool(calls.append(None)) or True)
     assert np.isfinite(field.energy().total)
-    assert len(asked) <= 30
+    assert len(calls) <= 30

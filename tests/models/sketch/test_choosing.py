@@ -1,4 +1,4 @@
-"""What in a drawing is a curvature line: strokes chosen by label, and silhouettes that are none."""
+"""Curvature lines of a drawing: strokes chosen by label, and silhouettes that are excluded."""
 
 import io
 import json
@@ -91,7 +91,7 @@ REFUSED = {
     "#ff0000": "'#ff0000' chooses no strokes; write colour=red, class=flow, id=group2",
     "red": "'red' chooses no strokes",
     "class=": "'class=' chooses no strokes",
-    "colour=redish": "'redish' is no colour; write a name or #rrggbb",
+    "colour=redish": "'redish' is not a colour; write a name or #rrggbb",
     "id=empty": "draws nothing of id=empty",
 }
 

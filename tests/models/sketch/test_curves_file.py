@@ -1,4 +1,4 @@
-"""Strokes drawn in space, .curves: from where they are seen, and what is refused."""
+"""Strokes drawn in space, .curves: views, and refusals."""
 
 import contextlib
 

@@ -1,4 +1,4 @@
-"""mask.png: what was found, in the size that `--mask` takes, and what is solved when it is given back."""
+"""mask.png: the mask that was found, in the size for `--mask`, and the same region when it is given back."""
 
 import crossfield as cf
 import numpy as np
@@ -37,7 +37,7 @@ def drawings(folder):
 
 
 def assert_same_up_to_the_border(first, second):
-    """The middle of every pixel of the second is solved as the first has it, or lies beside its border."""
+    """The middle of every pixel of the second is solved as in the first, or lies at its border."""
     row, column = np.indices(second.mask.shape) + 0.5
     x, y = (
         (start + second.pixel_size * place - there) / first.pixel_size

@@ -37,7 +37,7 @@ def middles(instance):
 
 
 def cut(name, centre, gap):
-    """A sample's drawing without what lies within half a gap of a point."""
+    """A sample's drawing without the strokes within half a gap of a point."""
     curves = read_svg(sample_svg(name).encode())
     segments, owner = flatten(curves.points, 0.05)
     pieces = np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / 1.5).astype(int).clip(1)
@@ -82,7 +82,7 @@ def test_a_gap_in_the_outline_of_a_sample_leaves_its_mask_nearly_the_same(names)
 
 
 def bridged_gaps(name):
-    """How many of some gaps had to be bridged; at all of them the mask is nearly that of the whole sample."""
+    """Number of gaps that had to be bridged; the mask is nearly that of the whole sample for all of them."""
     whole = cf.sample(name, 48)
     side = max(whole.mask.shape) * whole.pixel_size
     rng = np.random.default_rng(2)

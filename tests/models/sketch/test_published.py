@@ -1,4 +1,4 @@
-"""Sketches as they are published: what a script could hide in is gone, and every stroke is the same."""
+"""Published sketches: places where a script could hide are gone, and every stroke is the same."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""Photographs: shadows are no ink, ink is not half of the paper, and even light changes nothing."""
+"""Photographs: shadows are not ink, ink is not half of the paper, and even light changes nothing."""
 
 import io
 

@@ -171,20 +171,20 @@ def test_the_method_bends_a_given_start_too(tmp_path):
 
 
 def test_rounds_end_when_the_time_is_over():
-    """Asked once a round; what was reached by then comes back, and the start where nothing was."""
+    """The function is called once per round; the present result is returned, or the start without one."""
     start = polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
-    asked = []
+    calls = []
 
     def over(rounds):
-        asked.append(rounds)
-        return len(asked) > rounds
+        calls.append(rounds)
+        return len(calls) > rounds
 
     assert bend_field(start, over=lambda: over(0)) is start
     energies = []
     for rounds in (1, 2, 3):
-        asked.clear()
+        calls.clear()
         found = bend_field(start, harmonic=HARMONIC, over=lambda rounds=rounds: over(rounds))
-        assert len(asked) == rounds + 1
+        assert len(calls) == rounds + 1
         energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)

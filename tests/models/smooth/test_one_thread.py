@@ -1,4 +1,4 @@
-"""BLAS keeps to one thread while anyone is inside `one_thread`, and has its own number afterwards."""
+"""BLAS uses one thread while any thread is inside `one_thread`, and its own number afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces over cross fields: near the truth, the same however crosses are written, and always ended."""
+"""Surfaces over cross fields: near the truth, independent of the notation of crosses, and always ended."""
 
 import functools
 from dataclasses import replace
@@ -32,7 +32,7 @@ def apart(first, second):
 
 
 def error(surface, true):
-    """Mean angle to the true normals, the side by the truth."""
+    """Mean angle to the true normals, on the side of the truth."""
     return min(apart(each.normals, true.normals).mean() for each in (surface, surface.flipped()))
 
 
@@ -100,10 +100,10 @@ def test_a_hint_and_flip_choose_the_side():
     found, turned = cf.surface(field), cf.surface(field, flip=True)
     assert turned.heights == pytest.approx(-found.heights, nan_ok=True)
     assert turned.normals == pytest.approx(found.flipped().normals)
-    told = [cf.surface(field, [each], flip=True) for each in (hint, other)]
-    assert [(apart(each.normals, true.normals).mean() < 20) for each in told] == [True, False]
+    flipped = [cf.surface(field, [each], flip=True) for each in (hint, other)]
+    assert [(apart(each.normals, true.normals).mean() < 20) for each in flipped] == [True, False]
     straight = cf.surface(field, [replace(hint, slant=0.05)], flip=True)
-    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # such a hint tells no side
+    assert straight.normals[:, :2].ravel() @ found.normals[:, :2].ravel() < 0  # no side follows
 
 
 @for_each(
@@ -119,7 +119,7 @@ def test_a_hint_and_flip_choose_the_side():
         ((6, 5, HALF, 0), "slant of 90 degrees; give one from 0 to less than 90"),
         ((6, 5, -0.1, 0), "slant"),
         ((6, 5, np.nan, 0), "slant of nan degrees"),
-        ((6, 5, 0.1, np.inf), "tilt inf, which is no direction"),
+        ((6, 5, 0.1, np.inf), "tilt inf, not a direction"),
     ],
 )
 def test_hints_that_say_nothing_possible_are_refused(hint, message):
@@ -203,9 +203,9 @@ def test_an_end_in_time_leaves_the_best_so_far():
 
 
 def test_progress_tells_of_every_part():
-    told = []
-    cf.surface(constant([[1, 0, 0, 1]]), progress=told.append)
-    assert told == ["surface, part 1 of 2", "surface, part 2 of 2"]
+    messages = []
+    cf.surface(constant([[1, 0, 0, 1]]), progress=messages.append)
+    assert messages == ["surface, part 1 of 2", "surface, part 2 of 2"]
 
 
 def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():

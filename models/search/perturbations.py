@@ -1,11 +1,11 @@
-"""Random changes of several jumps at once, out of a valley that single changes do not leave.
+"""Random perturbations of several jumps at once, to leave a valley that single changes do not leave.
 
 - `shift`: along a path of quads, which moves the turn at its start to its end: a singularity moves,
-  two opposite ones meet, or a pair of them is made;
+  two opposite ones meet, or a pair of them is created;
 - `turn`: round a piece of a curve, or a disc: the strokes inside change to the other family of lines.
 
-A change is (pairs, steps): local numbers of pairs of a patch, each at most once, and what is added to their
-jumps.
+A change is (pairs, steps): local numbers of pairs of a patch, each at most once, and the steps that are
+added to their jumps.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _TURNS: Final = 0.6  # share of turns
 _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-clockwise walk
 
 
-class Kicks:
-    """Random changes inside one patch."""
+class Perturbations:
+    """Random perturbations inside one patch."""
 
     def __init__(self, patch: Patch, curve: Ints) -> None:
-        """curve: number of the curve of each pixel, -1 without a stroke; shape (n,)."""
+        """Prepare the patch; curve: number of the curve of each pixel, -1 without a stroke; shape (n,)."""
         instance = patch.instance
         self._patch = patch
         local = np.full(len(instance.grid.first), -1)
@@ -44,7 +44,7 @@ class Kicks:
         self._column = instance.grid.columns[patch.pixels].astype(np.float64)
 
     def draw(self, rng: np.random.Generator, p: Ints) -> Change:
-        """A random change for the present jumps p (m,); never an empty one where the patch has a quad."""
+        """A random change for the present jumps p (m,); never an empty one if the patch has a quad."""
         kind = rng.random()
         change = self.turn(rng) if kind < _TURNS and len(self._strokes) else self.shift(rng, p)
         return change if len(change[0]) else self.shift(rng, p)
@@ -94,7 +94,7 @@ class Kicks:
 
 
 def _quads_of_pairs(quads: Ints, pairs: int) -> Ints:
-    """Quads of which a pair is bottom or right side [0], top or left side [1], or -1; (pairs, 2)."""
+    """The quads with each pair at bottom or right [0], and at top or left [1], or -1; (pairs, 2)."""
     beside = np.full((pairs, 2), -1)
     for side in range(4):
         beside[quads[:, side], 0 if side < 2 else 1] = np.arange(len(quads))
