@@ -47,7 +47,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
     Where the p1 are odd in sum round C, so are the jumps, the crosses turn, and the |A| round C come to pi/2
     at least.
     """
-    p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
+    p1, s = (np.arange(problem.n_columns)[problem.blocks[name].slice] for name in ("p1", "s"))
     for quad in problem.instance.grid.quads:
         for subset in range(16):
             inside = np.array([subset >> place & 1 for place in range(4)])
@@ -60,7 +60,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
 def bounds(problem: Problem, model: highspy.Highs) -> None:
     """Bound s and t by pi/2: the two nearest jumps leave |A| below that, and |beta| is at most pi/4."""
     for name in ("s", "t"):
-        for column in range(problem.columns)[problem.blocks[name].columns]:
+        for column in range(problem.n_columns)[problem.blocks[name].slice]:
             model.changeColBounds(column, 0.0, np.pi / 2)
 
 

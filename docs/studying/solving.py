@@ -90,8 +90,8 @@ def solved(run: Run) -> dict[str, Any]:
         "version": programs().version(run.solver),
         "format": format_for(problem, run.solver).format,
         **sizes(problem.instance),
-        "columns": problem.columns,
-        "rows": problem.row_count,
+        "columns": problem.n_columns,
+        "rows": problem.n_rows,
     }
     try:
         found = programs().solve(problem, run.solver, limits=cf.Limits(run.limit, GAP, 1), start=start)

@@ -355,10 +355,10 @@ def _document(
         "class": problem.problem_class,
         "convex": problem.convex,
         "counts": {
-            "columns": problem.columns,
+            "columns": problem.n_columns,
             "binary": sum(block.count for block in form.blocks("binary")),
             "integer": sum(block.count for block in form.blocks("integer")),
-            "rows": problem.row_count,
+            "rows": problem.n_rows,
             "pixels": instance.grid.size,
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),

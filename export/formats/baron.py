@@ -136,5 +136,5 @@ def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
     yield b"STARTING_POINT{\n"
     for block in problem.blocks.values():
         if block.count:
-            yield from _assigned(names.of(block), start[block.columns])
+            yield from _assigned(names.of(block), start[block.slice])
     yield b"}\n"

@@ -153,7 +153,7 @@ def _start(problem: Problem, start: Floats) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
             yield f"Parameter start_{block.name}({DOMAINS[block.over]}) /\n".encode()
-            level = words(start[block.columns])
+            level = words(start[block.slice])
             key = Words(keys(problem.instance, block.over), None)
             yield from render([key, b" ", level, b"\n"], block.count)
             over = SETS[block.over]

@@ -234,7 +234,7 @@ def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[s
 
 def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
     for block in problem.blocks.values():
-        level = words(start[block.columns])
+        level = words(start[block.slice])
         yield from render([names.of(block), b".l = ", level, b";\n"], block.count)
 
 

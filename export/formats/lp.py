@@ -71,7 +71,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 def _objective(form: Canonical, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
     names = form.names
     for block in form.problem.blocks.values():
-        cost = words(scalar_when_constant(form.costs[block.columns]), signed)
+        cost = words(scalar_when_constant(form.costs[block.slice]), signed)
         counted, name = Counted(counts, "linear costs", cost), Counted(counts, "columns", names.of(block))
         yield from render([b" ", counted, b" ", name, b"\n"], block.count)
     index, factor = products

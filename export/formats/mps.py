@@ -84,7 +84,7 @@ def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
-            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.columns]))
+            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.slice]))
             entries = [
                 entry
                 for family in problem.rows

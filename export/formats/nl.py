@@ -174,9 +174,9 @@ def generate(form: Canonical, *, binary: bool = False, start: Floats | None = No
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
-        yield from _once(code, code.segment(b"x", problem.columns))
-        parts = code.entry(np.arange(problem.columns, dtype=np.int32), code.number(start[layout.order]))
-        yield from render(parts, problem.columns, padded=code.padded)
+        yield from _once(code, code.segment(b"x", problem.n_columns))
+        parts = code.entry(np.arange(problem.n_columns, dtype=np.int32), code.number(start[layout.order]))
+        yield from render(parts, problem.n_columns, padded=code.padded)
     yield from _limits(layout, code)
     yield from _bounds(layout, code)
     yield from _jacobian(layout, code)
@@ -203,7 +203,7 @@ def _header(layout: Layout, code: Encoder) -> bytes:
     columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
         code.letter + b"3 1 1 0",
-        b" %d %d 1 0 %d" % (problem.columns, problem.row_count, equations),
+        b" %d %d 1 0 %d" % (problem.n_columns, problem.n_rows, equations),
         b" %d %d" % (sum(family.count for family in layout.nonlinear_rows), bool(layout.nonlinear_objective)),
         b" 0 0",
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
@@ -318,7 +318,7 @@ def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
 def _gradient(layout: Layout) -> tuple[Ints, Floats]:
     """Places and coefficients of G: costs of linear terms, and 0 for columns of nonlinear ones."""
     problem = layout.problem
-    costs = np.zeros(problem.columns)
+    costs = np.zeros(problem.n_columns)
     for family in problem.objective:
         if family.degree <= 1:
             for term in family.of_degree(1):
@@ -332,15 +332,15 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
     problem = layout.problem
     rows = [(family, _entries(family)) for family in layout.rows]
     if rows:
-        count = np.zeros(problem.columns, dtype=np.int32)
+        count = np.zeros(problem.n_columns, dtype=np.int32)
         for family, entries in rows:
             for symbol, _ in entries:
                 block, inside = family.block(symbol), family.inside(symbol)
-                count[block.columns] += 1 if inside is None else np.bincount(inside, minlength=block.count)
-        yield from _once(code, code.segment(b"k", problem.columns - 1))
+                count[block.slice] += 1 if inside is None else np.bincount(inside, minlength=block.count)
+        yield from _once(code, code.segment(b"k", problem.n_columns - 1))
         yield from render(
             code.integer(np.cumsum(count[layout.order])[:-1].astype(np.int32)),
-            problem.columns - 1,
+            problem.n_columns - 1,
             padded=code.padded,
         )
     first = 0

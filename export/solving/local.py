@@ -257,7 +257,7 @@ class Solvers:
             )
         except TooLargeError as error:
             raise UnsupportedBySolverError(
-                f"{entry.title}: {held.columns} columns and {held.row_count} rows are too many for its free "
+                f"{entry.title}: {held.n_columns} columns and {held.n_rows} rows are too many for its free "
                 f"edition, which takes {PROGRAMS[entry.program].free}"
             ) from error
         except (RefusedError, FailedError) as error:

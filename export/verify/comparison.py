@@ -32,7 +32,7 @@ def of_problem(problem: Problem) -> Meaning:
     """What an LP or MPS file of the problem should mean, from its arrays: ONE is the last column."""
     form = Canonical(problem)
     one = [ONE.decode()] * form.has_one
-    n, ones = problem.columns, np.ones(len(one))
+    n, ones = problem.n_columns, np.ones(len(one))
     at, value = _of_degree(problem, 1)
     products, product = _of_degree(problem, 2)
     return Meaning.of(
@@ -71,7 +71,7 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
         np.concatenate([np.zeros(0), *(family.values(point) + family.limit for family in problem.rows)])
         for point in points
     ]
-    return objective, np.array(rows).reshape(len(points), problem.row_count)
+    return objective, np.array(rows).reshape(len(points), problem.n_rows)
 
 
 def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
@@ -90,7 +90,7 @@ def difference(found: Meaning, problem: Problem, tolerance: float, points: Float
     wrong = next(filter(None, checks), "")
     if wrong:
         return wrong
-    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.columns))])
+    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.n_columns))])
     objective, rows = values_at(problem, points)
     accuracy = max(VALUES, 100 * tolerance)
     return _value_difference("the objective", found.objective(given), objective, accuracy) or (
@@ -173,8 +173,8 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
 
 def _unused(problem: Problem, columns: list[str]) -> set[str]:
     """Names of columns that stand in no term."""
-    used = np.zeros(problem.columns, dtype=bool)
+    used = np.zeros(problem.n_columns, dtype=bool)
     for family in (*problem.objective, *problem.rows):
         for symbol in family.variables:
-            used[family.columns(symbol)] = True
+            used[family.column_of(symbol)] = True
     return {columns[place] for place in np.nonzero(~used)[0].tolist()}

@@ -233,7 +233,7 @@ def _unpacked(source: Path, folder: Path) -> Path:
 def _points(problem: Problem) -> Points:
     """Points anywhere, then complete points of random fields, which keep bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
-    anywhere = rng.normal(size=(RANDOM, problem.columns))
+    anywhere = rng.normal(size=(RANDOM, problem.n_columns))
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
@@ -299,7 +299,7 @@ class _Bench:
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
-        return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
+        return f"{held.n_columns} columns and {held.n_rows} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _Subject, solver: str, seconds: float) -> Check:
         def ended(verdict: Verdict, words: str) -> Check:

@@ -60,13 +60,13 @@ class Canonical:
     @property
     def column_count(self) -> int:
         """Number of columns of LP and MPS."""
-        return self.problem.columns + self.has_one
+        return self.problem.n_columns + self.has_one
 
     @cached_property
     def costs(self) -> Floats:
         """Cost of every column (columns,). Raises UnsupportedByFormatError for an extreme one."""
         index, coefficient = self.problem.merged_objective(1)
-        costs = np.zeros(self.problem.columns)
+        costs = np.zeros(self.problem.n_columns)
         costs[index[:, 0]] = coefficient
         check_coefficients(coefficient, "the objective")
         return costs
@@ -123,12 +123,12 @@ class Canonical:
             return self.layout.order
         if file == "mod":
             return glpk_order(self.problem)
-        own, one = np.arange(self.problem.columns, dtype=np.int32), [self.problem.columns] * self.has_one
+        own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns] * self.has_one
         return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
 
     def row_count(self, file: Order) -> int:
         """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
-        return self.problem.row_count + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
+        return self.problem.n_rows + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
 
 
 def _zero_to_one(block: Block) -> Bools:

@@ -8,6 +8,7 @@ declaration: SymPy splits an expression into monomials once per family, index ar
 
 from __future__ import annotations
 
+import builtins
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -48,7 +49,7 @@ class Block:
         return len(self.lower)
 
     @property
-    def columns(self) -> slice:
+    def slice(self) -> builtins.slice:
         """The columns as a slice of a point."""
         return slice(self.offset, self.offset + self.count)
 
@@ -64,7 +65,7 @@ class Monomial:
     @property
     def factors(self) -> tuple[Ints, ...]:
         """Columns of its symbols, one array (count,) each; made anew at every call to spare memory."""
-        return tuple(map(self.family.columns, self.symbols))
+        return tuple(map(self.family.column_of, self.symbols))
 
     @property
     def degree(self) -> int:
@@ -94,7 +95,7 @@ class PlacedFamily:
         slots = SLOTS[self.family.over]
         return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
 
-    def columns(self, symbol: sp.Symbol) -> Ints:
+    def column_of(self, symbol: sp.Symbol) -> Ints:
         """Column of the symbol at each element, shape (count,)."""
         block, inside = self.block(symbol), self.inside(symbol)
         own = np.arange(block.count, dtype=np.int32) if inside is None else inside
@@ -165,7 +166,7 @@ class PlacedFamily:
         """The expression (of a row: left minus right side) at a point, shape (count,)."""
         symbols = sorted(self.family.body.free_symbols, key=_name)
         evaluate = numeric(symbols, self.family.body)
-        given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
+        given = (point[self.column_of(s)] if s in self.variables else self._datum(s) for s in symbols)
         return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
 
     def excess(self, point: Floats) -> Floats:
@@ -256,8 +257,8 @@ class Problem:
         """Formulation, class, instance, and how many columns and rows."""
         whole = f" ({count} integer)" if (count := int(self.integer.sum())) else ""
         return (
-            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.columns} columns{whole}, "
-            f"{self.row_count} rows"
+            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.n_columns} columns{whole}, "
+            f"{self.n_rows} rows"
         )
 
     @property
@@ -323,7 +324,7 @@ class Problem:
         return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
 
     @property
-    def columns(self) -> int:
+    def n_columns(self) -> int:
         """Number of columns."""
         return sum(block.count for block in self.blocks.values())
 
@@ -363,7 +364,7 @@ class Problem:
         return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
 
     @property
-    def row_count(self) -> int:
+    def n_rows(self) -> int:
         """Number of rows."""
         return sum(family.count for family in self.rows)
 
@@ -411,7 +412,7 @@ class Problem:
             return self._merged_costs([term for term, _ in terms])
         index = np.concatenate([ordered(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
-        return merged(index, np.concatenate(coefficients), scale, self.columns)
+        return merged(index, np.concatenate(coefficients), scale, self.n_columns)
 
     def _merged_costs(self, terms: list[Monomial]) -> tuple[Ints, Floats]:
         reached = [(term.family.block(term.symbols[0]).name, term) for term in terms]
@@ -453,12 +454,12 @@ class Problem:
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
-            jumps = whole_numbers(np.round(point[self.blocks["p"].columns]), "p")
+            jumps = whole_numbers(np.round(point[self.blocks["p"].slice]), "p")
         else:
-            halves = np.round(point[self.blocks["p2"].columns])
-            jumps = whole_numbers(np.round(point[self.blocks["p1"].columns] + 2 * halves), "p")
+            halves = np.round(point[self.blocks["p2"].slice])
+            jumps = whole_numbers(np.round(point[self.blocks["p1"].slice] + 2 * halves), "p")
         return CrossField(
-            self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps
+            self.instance, point[self.blocks["alpha"].slice], point[self.blocks["beta"].slice], jumps
         )
 
     @cached_property

@@ -81,8 +81,8 @@ def complete_point(problem: Problem, found: CrossField) -> Floats:
         lower = np.maximum(-QUARTER, first + QUARTER * odd - QUARTER)
         upper = np.minimum(first - QUARTER * odd + QUARTER, QUARTER * odd)
         z = np.where(odd > 0, first, np.clip((first - second) / 2, lower, upper))
-        point[problem.blocks["z"].columns] = z
-        point[problem.blocks["t"].columns] = np.abs(first - 2 * z - second)
+        point[problem.blocks["z"].slice] = z
+        point[problem.blocks["t"].slice] = np.abs(first - 2 * z - second)
     return point
 
 

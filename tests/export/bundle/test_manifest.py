@@ -59,7 +59,7 @@ def test_contents(tmp_path):
     grid = problem.instance.grid
     pairs, strokes = len(grid.first), len(problem.instance.theta)
     assert document["counts"] == {
-        "columns": problem.columns, "binary": pairs, "integer": pairs, "rows": problem.row_count,
+        "columns": problem.n_columns, "binary": pairs, "integer": pairs, "rows": problem.n_rows,
         "pixels": grid.size, "pairs": pairs, "stroke_pixels": strokes,
     }  # fmt: skip
     assert (document["class"], document["convex"], document["jumps"], document["refused"]) == (
@@ -68,11 +68,11 @@ def test_contents(tmp_path):
         None,
         {},
     )
-    assert sum(block["count"] for block in document["columns"]) == problem.columns
+    assert sum(block["count"] for block in document["columns"]) == problem.n_columns
     assert [block["first"] for block in document["columns"]] == [
         block.offset for block in problem.blocks.values()
     ]
-    assert sum(family["count"] for family in document["rows"]) == problem.row_count
+    assert sum(family["count"] for family in document["rows"]) == problem.n_rows
     names = [entry["name"] for entry in document["files"]]
     assert names == [f"tiny.milp-mccormick.{suffix}" for suffix in ("nl", "row", "col", "gms", "lp", "mps")]
     for entry in document["files"]:

@@ -393,7 +393,7 @@ def test_truncated_sol_files_are_refused(tmp_path, refused, instance, manifest, 
     problem = cf.formulate(instance, "milp-mccormick")
     whole = tmp_path / "whole.sol"
     point = problem.point(cf.greedy(instance))[Layout(problem).order]
-    write_ampl_sol(whole, "solved", point, problem.row_count, 0, binary=binary)
+    write_ampl_sol(whole, "solved", point, problem.n_rows, 0, binary=binary)
     content = whole.read_bytes()
     end = content.index(b"objno") if not binary else len(content)
     for length in np.linspace(1, end - 3, 12).astype(int):
@@ -416,7 +416,7 @@ def test_unknown_and_missing_names_in_a_solution_are_refused(tmp_path, refused, 
 def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, good_solution, manifest):
     other = cf.sample("skew", 8)
     problem = cf.formulate(other, "milp-mccormick")
-    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy(other)), problem.row_count, 0)
+    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy(other)), problem.n_rows, 0)
     line = refused(*read(tmp_path / "other.sol", manifest, tmp_path / "field.npz"))
     assert line.startswith(f"{tmp_path / 'other.sol'}: ")
     cf.write_problem(problem, tmp_path / "skew", ["nl"])
@@ -472,7 +472,7 @@ def test_solutions_without_a_point_are_refused(tmp_path, refused, manifest, word
 def test_an_infeasible_sol_file_is_refused(tmp_path, refused, instance, manifest):
     problem = cf.formulate(instance, "milp-mccormick")
     path = tmp_path / "none.sol"
-    write_ampl_sol(path, "no solution", np.zeros(0), problem.row_count, 220, columns=problem.columns)
+    write_ampl_sol(path, "no solution", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
     assert "holds no point: infeasible; no solution" in refused(*read(path, manifest, tmp_path / "field.npz"))
 
 

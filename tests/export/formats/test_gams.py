@@ -157,7 +157,7 @@ def readings(
     for case in CASES:
         problem = problem_of(case)
         start = problem.point(make_field(problem.instance))
-        points = rng.normal(size=(20, problem.columns))
+        points = rng.normal(size=(20, problem.n_columns))
         number = {name: index for index, name in enumerate(names_of(column_names(problem)))}
         for layout in LAYOUTS:
             folder = tmp_path_factory.mktemp("convert")
@@ -229,7 +229,7 @@ def test_read_columns(readings: dict[tuple[str, str], Reading], case: str, layou
         column
         for family in families
         for symbol in family.variables
-        for column in family.columns(symbol).tolist()
+        for column in family.column_of(symbol).tolist()
     }
     assert sorted(read.columns) == sorted(names[column] for column in used)
     at = [names.index(name) for name in read.columns]

@@ -66,7 +66,7 @@ def test_the_hull_is_larger(two):
     lifted = cf.solve(problem, "highs")
     assert lifted.violation.worst < 1e-6
     assert lifted.objective == pytest.approx(0.198, abs=1e-3)
-    z, p1, beta = (lifted.point[lifted.problem.blocks[name].columns] for name in ("z", "p1", "beta"))
+    z, p1, beta = (lifted.point[lifted.problem.blocks[name].slice] for name in ("z", "p1", "beta"))
     assert abs(z - p1 * beta[:1]).max() > 0.01
     best = min(cf.solve(problem, "ipopt", start=start).objective for start in starts(two))
     assert best == pytest.approx(0.247, abs=1e-3)

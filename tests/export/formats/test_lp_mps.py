@@ -64,7 +64,7 @@ def test_readers_see_the_problem(label: str, reader: str, suffix: str, tmp_path:
     assert_same(model, expected)
 
     points = points_of(problem)
-    ones = np.ones((len(points), len(expected.columns) - problem.columns))
+    ones = np.ones((len(points), len(expected.columns) - problem.n_columns))
     given = np.hstack([points, ones])
     values = [problem.objective_value(point) for point in points]
     np.testing.assert_allclose(model.objective(given), values, rtol=1e-9, atol=1e-9)
@@ -148,7 +148,7 @@ def test_names_suit_every_reader(label: str):
         names = names_of(column_names(each)) + (names_of(row_names(each)) if each.rows else [])
         assert (
             len({name.lower() for name in [*names, "one", "obj", "c_one"]})
-            == each.columns + each.row_count + 3
+            == each.n_columns + each.n_rows + 3
         )
         assert all(re.fullmatch(r"[a-df-hj-mo-z][a-z0-9_]{0,14}", name) for name in names)
 

@@ -355,7 +355,7 @@ def test_every_problem_can_be_had_from_instance_and_sidecar(built):
     for document in built.entries:
         problem = problem_of(built, document)
         assert problem.problem_class == document["class"]
-        assert problem.columns == document["counts"]["variables"]
+        assert problem.n_columns == document["counts"]["variables"]
 
 
 # Points, checked with readers that nobody here wrote
@@ -479,7 +479,7 @@ def test_the_free_z_of_the_printed_facet_is_the_best_for_its_field(built):
     )
     point = complete_point(problem, field)
     assert problem.violation(point).worst < 1e-12
-    z, t = (problem.blocks[name].columns for name in ("z", "t"))
+    z, t = (problem.blocks[name].slice for name in ("z", "t"))
     first, second = field.beta[instance.grid.first], field.beta[instance.grid.second]
     for share in np.linspace(-np.pi / 4, np.pi / 4, 101):
         trial = point.copy()
@@ -499,7 +499,7 @@ def test_eigenvalue_counts_are_those_of_differences_of_the_objective(built):
     """The Hessian once more, from values of the objective alone."""
     document = by_formulation(built, "cf_own_n004")["qp-fixed"]
     problem = problem_of(built, document)
-    n = problem.columns
+    n = problem.n_columns
     unit, zero = np.eye(n), problem.objective_value(np.zeros(n))
     single = np.array([problem.objective_value(row) for row in unit])
     hessian = np.array(

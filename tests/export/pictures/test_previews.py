@@ -40,8 +40,8 @@ def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, 
         assert len(line) < 130
     assert instance.summary in told[0]
     assert f"{field.energy().total:.6g}" in told[1]
-    assert f"{problem.columns} columns" in told[2]
-    assert f"{problem.row_count} rows" in told[2]
+    assert f"{problem.n_columns} columns" in told[2]
+    assert f"{problem.n_rows} rows" in told[2]
     assert f"objective {solution.objective:.6g}" in told[3]
     assert "optimal" in told[3]
 

@@ -44,8 +44,8 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
 
     lower = problem.point(cf.power_field(problem.instance))
     worse, broken = problem.point(cf.greedy(problem.instance)), lower.copy()
-    worse[problem.blocks["s"].columns] += 0.1
-    broken[problem.blocks["s"].columns] -= 10 * FEASIBLE
+    worse[problem.blocks["s"].slice] += 0.1
+    broken[problem.blocks["s"].slice] -= 10 * FEASIBLE
     start = watch.value
     assert seen(worse[order]) == seen(broken[order]) == start
     assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))

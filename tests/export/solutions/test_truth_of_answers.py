@@ -178,7 +178,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
     bad[: len(instance.theta)] += 1
     for values in (point, bad):
         path = tmp_path / "x.sol"
-        write_ampl_sol(path, "some words", values[Layout(held).order], held.row_count, code)
+        write_ampl_sol(path, "some words", values[Layout(held).order], held.n_rows, code)
         exit_code, facts, complaint, written = reading(path)
         assert (exit_code, written) == (1, False)
         assert facts["claimed"] == status
@@ -245,7 +245,7 @@ def answers(tmp_path_factory):
     point = read_solution(folder / "x.sol", milp).point[Layout(milp).order]
     for binary in (False, True):
         path = write_ampl_sol(
-            folder / "a.sol", "optimal solution found", point, milp.row_count, 0, binary=binary
+            folder / "a.sol", "optimal solution found", point, milp.n_rows, 0, binary=binary
         )
         found[f"ampl binary={binary}"] = (path.read_bytes(), milp)
     return found

@@ -348,7 +348,7 @@ def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
     problem = formulate(sample("skew", 5), "minlp-quartic")
     with Solvers() as solvers:
         found = solvers.solve(problem, "xpress", tmp_path, limits=Limits(1.0, threads=1))
-    assert found.point is None or len(found.point) == found.problem.columns
+    assert found.point is None or len(found.point) == found.problem.n_columns
 
 
 # the table of capabilities is true
