@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from .models.proof.dual_start import search as search
     from .models.proof.prove import prove as prove
     from .models.proof.record import Proof as Proof
-    from .models.search.greedy import greedy as greedy
-    from .models.search.improvement import improved as improved
+    from .models.search.greedy import greedy_field as greedy_field
+    from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
@@ -78,8 +78,8 @@ _HOME: Final = {
     "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
-    "greedy": ".models.search.greedy",
-    "improved": ".models.search.improvement",
+    "greedy_field": ".models.search.greedy",
+    "improved_field": ".models.search.improvement",
     "polyvector_field": ".models.smooth.polyvector",
     "power_field": ".models.smooth.power_field",
     "preview": ".export.pictures.draw",

@@ -187,7 +187,7 @@ def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes"
 def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
     """The solution of a formulation, started at the greedy baseline."""
     return cf.solve(
-        cf.formulate(instance, name, **options), start=cf.greedy(instance), limits=cf.Limits(120.0)
+        cf.formulate(instance, name, **options), start=cf.greedy_field(instance), limits=cf.Limits(120.0)
     )
 
 

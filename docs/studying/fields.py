@@ -106,7 +106,7 @@ def _by_method(run: Run, instance: Instance) -> Found:
 
 def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
     """A local optimum near the greedy field: random crosses at some pixels, best jumps, then best angles."""
-    field, rng = cf.greedy(instance), np.random.default_rng([3, seed])
+    field, rng = cf.greedy_field(instance), np.random.default_rng([3, seed])
     chosen = rng.random(instance.grid.size) < share
     alpha = np.where(chosen, rng.uniform(0, np.pi, instance.grid.size), field.alpha)
     moved = relabelled(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
@@ -114,8 +114,8 @@ def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
 
 
 PLAIN: Final[dict[str, Callable[[Instance], CrossField]]] = {
-    "greedy": cf.greedy,
-    "improved": lambda instance: cf.improved(cf.greedy(instance)),
+    "greedy": cf.greedy_field,
+    "improved": lambda instance: cf.improved_field(cf.greedy_field(instance)),
     "power": lambda instance: fitted(cf.power_field(instance)),
     "polyvector": lambda instance: fitted(cf.polyvector_field(instance)),
     "bend": lambda instance: cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS))),

@@ -56,7 +56,7 @@ def programs() -> Solvers:
 @lru_cache(maxsize=4)
 def greedy(name: str, size: int) -> CrossField:
     """The greedy field of an instance, with the best angles: where starts and given jumps come from."""
-    return cf.greedy(made(name, size))
+    return cf.greedy_field(made(name, size))
 
 
 @lru_cache(maxsize=4)

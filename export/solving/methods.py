@@ -17,7 +17,7 @@ from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
-from ...models.search.greedy import greedy
+from ...models.search.greedy import greedy_field
 from ...models.search.search import Search
 from ...models.search.starts import first_field, polyvector_start
 from ...models.smooth.bend import bend_field
@@ -148,7 +148,7 @@ class Method:
 def _greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
     over = request.deadline().passed
-    yield _timed("greedy", lambda: greedy(request.instance, over=over))
+    yield _timed("greedy", lambda: greedy_field(request.instance, over=over))
 
 
 def _power(request: Request) -> Iterator[Candidate]:

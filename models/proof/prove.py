@@ -28,7 +28,7 @@ from ..instance.instance import Instance
 from ..processes.crew import Crew, crew
 from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
-from ..search.improvement import improved
+from ..search.improvement import improved_field
 from ..search.search import search
 from ..search.starts import first_field, polyvector_start
 from ..smooth.systems import one_thread
@@ -167,9 +167,9 @@ def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossF
     """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
     fields = [first_field(instance, over)]
     if given is not None:
-        fields.append(improved(given, over))
+        fields.append(improved_field(given, over))
     if not over():
-        fields.append(improved(polyvector_start(instance, over), over))
+        fields.append(improved_field(polyvector_start(instance, over), over))
     return min(fields, key=lambda field: round(field.energy().total, 9))
 
 
@@ -221,7 +221,7 @@ class Work:
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, with jumps and angles improved."""
-        return improved(field, over)
+        return improved_field(field, over)
 
     def energy(self, field: CrossField) -> float:
         """The energy that the proof is of."""

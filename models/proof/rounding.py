@@ -19,7 +19,7 @@ from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
 from ..search.energy import LinearSolver
 from ..search.free_field import FreeField
-from ..search.improvement import improved, settle
+from ..search.improvement import improved_field, settle
 from .products import add, share_of, sized
 from .sweep import Dual, Indices, State
 
@@ -69,7 +69,7 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
-    return min(best, improved(state.bounded(over), over), key=lambda field: field.energy().total)
+    return min(best, improved_field(state.bounded(over), over), key=lambda field: field.energy().total)
 
 
 def decoded(dual: Dual, *, forwards: bool) -> tuple[Floats, Floats]:

@@ -50,7 +50,9 @@ _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
 @one_thread()
-def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
+def greedy_field(
+    instance: Instance, *, progress: JumpProgress | None = None, over: Over = never
+) -> CrossField:
     """The field of the greedy strategy: least 2-norm energy for its jumps, within all bounds.
 
     The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where each time
@@ -66,9 +68,9 @@ def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Ov
 
 
 def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
-    """As `greedy`, in a tenth of its time: some 60 batches, angles brought up to date locally, no bounds.
+    """As `greedy_field`, in a tenth of its time: 60 batches, angles updated locally, no bounds.
 
-    The jumps are others, and as good: which strategy has the best is a matter of luck.
+    The jumps differ, and are as good on average.
     """
     state, nearest = _cells(instance)
     _stitch(state, nearest, _ROUGH, over)

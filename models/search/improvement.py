@@ -35,7 +35,7 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 @one_thread()
-def improved(field: CrossField, over: Over = never) -> CrossField:
+def improved_field(field: CrossField, over: Over = never) -> CrossField:
     """A field that neither best jumps, nor best angles, nor the turn of a curve lead down from.
 
     Its 2-norm energy is at most that of the one given.

@@ -28,7 +28,7 @@ from ..smooth.systems import one_thread
 from .coarse import halved, prolonged
 from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
-from .improvement import improved, settle, stroke_curves
+from .improvement import improved_field, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
 from .starts import first_field, polyvector_start
@@ -177,11 +177,11 @@ def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> Cro
     """
     fields = [first_field(instance, limits.over)]
     if given is not None:
-        fields.append(improved(given, limits.over))
+        fields.append(improved_field(given, limits.over))
     if not limits.over():
-        fields.append(improved(polyvector_start(instance, limits.over), limits.over))
+        fields.append(improved_field(polyvector_start(instance, limits.over), limits.over))
     if not limits.over():
-        fields.append(improved(power_field(instance), limits.over))
+        fields.append(improved_field(power_field(instance), limits.over))
     best = min(fields, key=_energy)
     return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
 
@@ -275,7 +275,7 @@ class _Hunt:
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:
-            self.offer(improved(self.best(over), over))
+            self.offer(improved_field(self.best(over), over))
 
     def _adopt(self, task: Task, better: Point, over: Over) -> None:
         """Take over a patch's angles and jumps if that lowers the energy beside what else was taken over."""

@@ -50,7 +50,7 @@ def test_the_public_names_are_sorted_and_there():
 def test_all_steps_from_a_sketch_to_a_picture_are_public():
     wanted = (
         "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw "
-        "two_stage run greedy sample"
+        "two_stage run greedy_field sample"
     )
     assert set(wanted.split()) <= set(crossfield.__all__)
 
@@ -141,7 +141,7 @@ def test_the_models_know_no_solver_and_no_template():
 
 
 def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
-    loaded = loaded_after("import crossfield as cf\ncf.greedy(cf.sample('skew', 6))")
+    loaded = loaded_after("import crossfield as cf\ncf.greedy_field(cf.sample('skew', 6))")
     assert not loaded & SOLVERS_AND_LAYOUT
 
 

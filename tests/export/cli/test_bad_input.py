@@ -341,7 +341,7 @@ def test_an_instance_has_no_crosses_to_draw(tmp_path, refused, instance):
 
 def test_a_start_on_another_instance_is_refused(tmp_path, refused, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
-    cf.write_field(cf.greedy(instance.turned()), tmp_path / "other.npz")
+    cf.write_field(cf.greedy_field(instance.turned()), tmp_path / "other.npz")
     for command in (
         ["solve", tmp_path / "tiny.json", "-f", "milp-mccormick"],
         ["export", tmp_path / "tiny.json"],
@@ -392,7 +392,7 @@ def test_truncated_solutions_are_refused(tmp_path, refused, good_solution, manif
 def test_truncated_sol_files_are_refused(tmp_path, refused, instance, manifest, binary):
     problem = cf.formulate(instance, "milp-mccormick")
     whole = tmp_path / "whole.sol"
-    point = problem.point(cf.greedy(instance))[Layout(problem).order]
+    point = problem.point(cf.greedy_field(instance))[Layout(problem).order]
     write_ampl_sol(whole, "solved", point, problem.n_rows, 0, binary=binary)
     content = whole.read_bytes()
     end = content.index(b"objno") if not binary else len(content)
@@ -416,7 +416,7 @@ def test_unknown_and_missing_names_in_a_solution_are_refused(tmp_path, refused, 
 def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, good_solution, manifest):
     other = cf.sample("skew", 8)
     problem = cf.formulate(other, "milp-mccormick")
-    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy(other)), problem.n_rows, 0)
+    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
     line = refused(*read(tmp_path / "other.sol", manifest, tmp_path / "field.npz"))
     assert line.startswith(f"{tmp_path / 'other.sol'}: ")
     cf.write_problem(problem, tmp_path / "skew", ["nl"])
@@ -562,7 +562,7 @@ def test_a_run_without_solvers_still_gives_a_field(tmp_path, instance):
 @pytest.mark.parametrize("where", ["file", "proc"])
 def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, where):
     cf.write_instance(instance, tmp_path / "tiny.json")
-    cf.write_field(cf.greedy(instance), tmp_path / "field.npz")
+    cf.write_field(cf.greedy_field(instance), tmp_path / "field.npz")
     (tmp_path / "regular").write_text("a file")
     if where == "proc" and not Path("/proc/sys").is_dir():
         pytest.skip("there is no /proc")
@@ -604,7 +604,7 @@ SLOW = ("solve", "run", "draw pdf", "draw", "export")
 def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch, case):
     arguments, output, limit = DISK[case]
     monkeypatch.chdir(tmp_path)
-    cf.write_field(cf.greedy(cf.sample("mouse", 8)), "field.npz")
+    cf.write_field(cf.greedy_field(cf.sample("mouse", 8)), "field.npz")
     done = in_child(*arguments, "-o", output, prelude=FULL.format(limit))
     assert (done.returncode, PLAN.sub("", done.stdout)) == (1, "")
     assert complaints(done.stderr).count("\n") == 1

@@ -107,7 +107,7 @@ def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
 
 
 def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
-    cf.write_field(cf.greedy(cf.sample("skew", 4)), tmp_path / "field.npz")
+    cf.write_field(cf.greedy_field(cf.sample("skew", 4)), tmp_path / "field.npz")
     start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
     assert invoke(["solve", "skew", "--size", "4", "--stroke-weight", "10", "-m", "search", *start]) == 1
     said = capsys.readouterr().err

@@ -43,7 +43,7 @@ from crossfield.models.field.file import read_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.file import read_instance
-from crossfield.models.search.greedy import greedy
+from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.published import redrawn
 from crossfield.models.sketch.samples import sample, sample_svg
 from crossfield.models.sketch.svg import read_svg
@@ -592,7 +592,7 @@ def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
         highs.setOptionValue("threads", threads)
         highs.addConstr(highs.addVariable(ub=5, obj=-1, type=highspy.HighsVarType.kInteger) <= 2.5)
         assert highs.run() == highspy.HighsStatus.kOk
-        found.append([each.field.energy(1).total for each in better_in_1norm(greedy(instance), "tiny")])
+        found.append([each.field.energy(1).total for each in better_in_1norm(greedy_field(instance), "tiny")])
     assert len(found[0]) == 2
     assert found[0] == found[1]
 

@@ -17,7 +17,7 @@ from crossfield.models.search.starts import first_field
 def ring():
     """A sample whose greedy field is improved by other jumps: they are not the same data."""
     instance = cf.sample("ring", 8, stroke_weight=0.3, skew_weight=1e-7)
-    assert (cf.greedy(instance).p != first_field(instance).p).any()
+    assert (cf.greedy_field(instance).p != first_field(instance).p).any()
     return instance
 
 
@@ -68,14 +68,16 @@ def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
     arguments = ["solve", str(instance), "--formulation", "qp-fixed", "-o", str(tmp_path / "both"), "-q"]
     assert invoke(arguments) == 0
     assert listed() == [".col", ".gms", ".lp", ".mps", ".nl", ".row"]
-    greedy = cf.write_field(cf.greedy(cf.read_instance(instance)), tmp_path / "greedy.npz")
+    greedy = cf.write_field(cf.greedy_field(cf.read_instance(instance)), tmp_path / "greedy.npz")
     assert invoke([*arguments, "--start", str(greedy)]) == 0
     assert listed() == [".col", ".nl", ".row"]
 
 
 def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
     """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
-    other = cf.write_problem(cf.formulate(ring, "qp-fixed", p=cf.greedy(ring).p), tmp_path / "files", ["nl"])
+    other = cf.write_problem(
+        cf.formulate(ring, "qp-fixed", p=cf.greedy_field(ring).p), tmp_path / "files", ["nl"]
+    )
     assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
     assert "solution of another problem" in capsys.readouterr().err
     assert not (tmp_path / "field.npz").exists()

@@ -173,7 +173,7 @@ def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
 def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, tmp_path, code, status):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
-    point = held.point(cf.greedy(instance))
+    point = held.point(cf.greedy_field(instance))
     bad = point.copy()
     bad[: len(instance.theta)] += 1
     for values in (point, bad):
@@ -193,7 +193,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
 def test_values_that_no_column_can_have_are_refused(skew, reading, tmp_path):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
-    point = held.point(cf.greedy(instance))
+    point = held.point(cf.greedy_field(instance))
     for block, value in (("p2", 4294967296.0), ("p2", 1e308), ("alpha", 1e300), ("s", -1.1 * LARGEST)):
         wrong = point.copy()
         wrong[held.blocks[block].offset] = value

@@ -16,7 +16,7 @@ from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import _Limits
-from crossfield.models.search.greedy import greedy
+from crossfield.models.search.greedy import greedy_field
 
 
 class Ticking:
@@ -48,7 +48,7 @@ def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path
 
 
 def test_two_stages_without_time_return_the_start(tmp_path):
-    start = greedy(cf.sample("mouse", 12))
+    start = greedy_field(cf.sample("mouse", 12))
     request = Request(start.instance, tmp_path, Limits(1e-3), start=start, clock=Ticking())
     (only,) = METHODS["two-stage"].find(request)
     assert only.field.energy(1).total == pytest.approx(start.energy(1).total, rel=1e-9)
@@ -56,7 +56,7 @@ def test_two_stages_without_time_return_the_start(tmp_path):
 
 def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
     """The deadline is far away, although its clock began long after that of other processes."""
-    field = greedy(cf.sample("mouse", 6))
+    field = greedy_field(cf.sample("mouse", 6))
     problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
     held = write(problem, tmp_path / "model.nl", start=field).problem
     files, deadline = Files.beside(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)

@@ -13,7 +13,7 @@ from crossfield.models.processes.deadline import Deadline
 def test_without_time_the_start_is_the_answer(tmp_path, name):
     """No solver is started then; a feasible start is the best point so far."""
     instance = cf.sample("skew", 6)
-    start = cf.greedy(instance)
+    start = cf.greedy_field(instance)
     problem = cf.formulate(instance, name, p=start.p if name == "qp-fixed" else None)
     found = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
     assert found.status == Status.LIMIT_WITH_POINT
@@ -50,7 +50,7 @@ def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
 
 def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
     instance = cf.sample("skew", 6)
-    start, problem = cf.greedy(instance), cf.formulate(instance, "milp-mccormick")
+    start, problem = cf.greedy_field(instance), cf.formulate(instance, "milp-mccormick")
     found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
     assert found.bound is None

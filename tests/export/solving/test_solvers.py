@@ -59,7 +59,7 @@ def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, skew_c
 def formulated(instance, name, *, relax=False):
     recipe = FORMULATIONS[name]
     return cf.formulate(
-        instance, name, p=cf.greedy(instance).p if recipe.fixed else None, relax=relax or None
+        instance, name, p=cf.greedy_field(instance).p if recipe.fixed else None, relax=relax or None
     )
 
 
@@ -205,8 +205,8 @@ def test_bonmin_and_highs_agree_on_a_milp():
 def test_three_solvers_agree_on_a_qp():
     instance = random_instance(5, 6, 6)
     problem = formulated(instance, "qp-fixed")
-    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in BUNDLED]
-    assert found == pytest.approx([least_squares(instance, cf.greedy(instance).p)] * 3, abs=1e-6)
+    found = [cf.solve(problem, solver, start=cf.greedy_field(instance)).objective for solver in BUNDLED]
+    assert found == pytest.approx([least_squares(instance, cf.greedy_field(instance).p)] * 3, abs=1e-6)
 
 
 # The table of solvers and classes
@@ -232,7 +232,7 @@ REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer 
 @cache
 def solution_of(label, solver):
     name, relax = split(label)
-    start = cf.greedy(SMALL)
+    start = cf.greedy_field(SMALL)
     return cf.solve(formulated(SMALL, name, relax=relax), solver, start=start, limits=cf.Limits(250))
 
 
@@ -243,7 +243,7 @@ def test_every_pair_of_the_table_is_solved(label, solver):
     problem = solution.problem
     assert solution.status in SOLVED
     assert solution.violation.worst < 1e-6
-    assert solution.objective <= problem.objective_value(problem.point(cf.greedy(SMALL))) + 1e-6
+    assert solution.objective <= problem.objective_value(problem.point(cf.greedy_field(SMALL))) + 1e-6
     if problem.convex:
         everyone = [solution_of(label, other).objective for label_, other in DONE if label_ == label]
         assert everyone == pytest.approx([solution.objective] * len(everyone), abs=2e-5)
@@ -296,7 +296,7 @@ def test_a_missing_package_is_a_named_error(small, monkeypatch):
 
 @pytest.mark.parametrize("name", TWO_NORM)
 def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
-    start = cf.greedy(small)
+    start = cf.greedy_field(small)
     expected = least_squares(small, start.p)
     solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
     assert solution.objective == pytest.approx(expected, abs=1e-6)
@@ -305,7 +305,7 @@ def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
 
 @pytest.mark.parametrize("name", ["miqcp-bilinear-l1", "milp-mccormick"])
 def test_with_integers_fixed_ipopt_finds_what_the_lp_finds(small, name):
-    start = cf.greedy(small)
+    start = cf.greedy_field(small)
     expected = least_deviations(small, start.p)
     solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
     assert solution.objective == pytest.approx(expected, abs=1e-6)
@@ -334,7 +334,7 @@ def hard():
 )
 def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
     """No solver proves it in hours, and all take the start at once: three seconds are as good as thirty."""
-    problem, start = cf.formulate(hard, name), cf.greedy(hard)
+    problem, start = cf.formulate(hard, name), cf.greedy_field(hard)
     solution = cf.solve(problem, solver, start=start, limits=cf.Limits(3))
     assert solution.status == Status.LIMIT_WITH_POINT
     assert solution.objective <= problem.objective_value(problem.point(start)) + 1e-9
@@ -383,7 +383,7 @@ def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, 
 def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch):
     """A HiGHS that never looks at the clock: the parent ends it, and the start is the answer."""
     instance = cf.sample("mouse", 8)
-    start = cf.greedy(instance)
+    start = cf.greedy_field(instance)
     told_to_highs(
         """
         import signal, time
@@ -417,7 +417,9 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
     problem, files = cf.formulate(cf.sample("mouse", 8), "milp-mccormick"), tmp_path / "files"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        found = cf.solve(problem, "highs", files, limits=cf.Limits(2.0), start=cf.greedy(problem.instance))
+        found = cf.solve(
+            problem, "highs", files, limits=cf.Limits(2.0), start=cf.greedy_field(problem.instance)
+        )
     finally:
         signal.signal(signal.SIGINT, before)
     assert found.status == Status.LIMIT_WITH_POINT
@@ -425,7 +427,7 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
 
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
-    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
     cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
     log = (tmp_path / "mouse.milp-mccormick.highs.log").read_text()
     claimed = re.search(r"MIP start solution is feasible, objective value is (\S+)", log)
@@ -434,7 +436,7 @@ def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
 
 @pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact", "minlp-cubic"])
 def test_the_start_is_in_the_nl_file(tmp_path, small, name):
-    problem, start = formulated(small, name), cf.greedy(small)
+    problem, start = formulated(small, name), cf.greedy_field(small)
     cf.write(problem, tmp_path / "model.nl", start=start)
     builder = ca.NlpBuilder()
     builder.import_nl(str(tmp_path / "model.nl"))
@@ -459,7 +461,7 @@ def test_bonmin_improves_a_start_that_is_not(small):
 
 
 def test_a_wide_gap_ends_the_search_early(hard):
-    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
     solution = cf.solve(problem, "highs", start=start, limits=cf.Limits(300, gap=0.97))
     assert solution.status == Status.OPTIMAL_GLOBAL
     assert solution.bound < 0.9 * solution.objective
@@ -566,7 +568,7 @@ def test_ctrl_c_keeps_the_best_point(tmp_path, solver):
     if solver != "ipopt":
         assert (
             field.energy(1 if solver == "highs" else 2).total
-            <= cf.greedy(field.instance).energy(1 if solver == "highs" else 2).total + 1e-9
+            <= cf.greedy_field(field.instance).energy(1 if solver == "highs" else 2).total + 1e-9
         )
     assert not list(tmp_path.rglob("*.part"))
 

@@ -41,7 +41,7 @@ def toy():
 @pytest.mark.slow
 def test_a_toy_formulation_is_one_function(toy, tmp_path):
     instance = cf.sample("skew", 4)
-    field = cf.greedy(instance)
+    field = cf.greedy_field(instance)
     problem = cf.formulate(instance, "toy")
     (listed,) = (each for each in tables()["formulations"][1] if each["name"] == "toy")
     assert (listed["class"], listed["summary"]) == ("MILP", "directions alone")

@@ -13,8 +13,8 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halved, prolonged
-from crossfield.models.search.greedy import greedy
-from crossfield.models.search.improvement import improved, stroke_curves
+from crossfield.models.search.greedy import greedy_field
+from crossfield.models.search.improvement import improved_field, stroke_curves
 from crossfield.models.search.kicks import Kicks
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
 from crossfield.models.search.starts import first_field
@@ -156,7 +156,7 @@ def test_search_is_never_above_what_it_starts_from(name):
     instance = cf.sample(name, 10)
     start = cf.power_field(instance)
     found = cf.search(instance, rounds=1, start=start).field
-    for other in (greedy(instance), first_field(instance), start):
+    for other in (greedy_field(instance), first_field(instance), start):
         assert found.energy().total <= other.energy().total + 1e-9
     assert (np.abs(found.beta) <= QUARTER).all()
     assert (found.alpha >= instance.alpha_lower).all()
@@ -164,7 +164,7 @@ def test_search_is_never_above_what_it_starts_from(name):
 
 
 def test_a_start_on_another_instance_is_refused():
-    start = greedy(cf.sample("skew", 6))
+    start = greedy_field(cf.sample("skew", 6))
     for other in (cf.sample("skew", 5), start.instance.with_gauge("box")):
         with pytest.raises(InstanceError, match=r"the field is on another instance .* not on this one"):
             cf.search(other, rounds=0, jobs=1, start=start)
@@ -235,8 +235,8 @@ class Hourglass:
 
 
 WORK = {
-    "greedy": lambda over: greedy(cf.sample("mouse", 16), over=over),
-    "improved": lambda over: improved(greedy(cf.sample("mouse", 16)), over),
+    "greedy": lambda over: greedy_field(cf.sample("mouse", 16), over=over),
+    "improved": lambda over: improved_field(greedy_field(cf.sample("mouse", 16)), over),
     "prolonged": lambda over: prolonged(
         first_field(halved(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
     ),
@@ -302,10 +302,10 @@ def test_ctrl_c_gives_the_best_field_so_far():
 @given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
 @settings(deadline=None, max_examples=30)
 def test_improved_fields_are_no_worse_and_stay_improved(seed, gauge):
-    field = greedy(random_instance(seed, gauge=gauge))
-    better = improved(field)
+    field = greedy_field(random_instance(seed, gauge=gauge))
+    better = improved_field(field)
     assert better.energy().total <= field.energy().total
-    assert improved(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
+    assert improved_field(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
 
 
 def test_a_constant_field_stays_constant_on_finer_grids():

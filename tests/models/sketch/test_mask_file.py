@@ -103,7 +103,7 @@ def test_warnings_reach_standard_error_and_the_report_once(tmp_path, capsys):
     assert invoke(["instance", str(drawing), "-o", str(tmp_path / "b.json"), "--size", "48", "-q"]) == 0
     assert capsys.readouterr().err == ""
     assert (tmp_path / "mask.png").read_bytes() == cf.write_mask(instance, tmp_path / "m.png").read_bytes()
-    report = Report(instance, (Candidate(START, cf.greedy(instance), 0.0),), ())
+    report = Report(instance, (Candidate(START, cf.greedy_field(instance), 0.0),), ())
     assert report.document()["warnings"] == [warning]
 
 
