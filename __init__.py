@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
     from .export.solving.evaluate import evaluate as evaluate
-    from .export.solving.limits import Limits as Limits
     from .export.solving.local import solve as solve
     from .export.solving.run import run as run
     from .export.solving.two_stage import fit_angles as fit_angles
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from .models.instance.file import read_instance as read_instance
     from .models.instance.file import write_instance as write_instance
     from .models.instance.instance import Instance as Instance
+    from .models.processes.limits import Limits as Limits
     from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
     from .models.proof.certificate import write_certificate as write_certificate
@@ -66,7 +66,7 @@ _HOME: Final = {
     "Hint": ".models.surface.hints",
     "Instance": ".models.instance.instance",
     "Light": ".export.shading.light",
-    "Limits": ".export.solving.limits",
+    "Limits": ".models.processes.limits",
     "Problem": ".models.formulations.problem",
     "Proof": ".models.proof.record",
     "Search": ".models.search.search",

@@ -92,7 +92,7 @@ prints it. Sections and numbers in brackets are those of the paper."""
 def methods(instance: Instance) -> Iterator[Candidate]:
     """Every field that a run considers."""
     with tempfile.TemporaryDirectory() as folder:
-        request = Request(instance, Path(folder), cf.Limits(seconds=SECONDS))
+        request = Request(instance, Path(folder), cf.Limits(SECONDS))
         for method in METHODS.values():
             yield from method.find(request)
 

@@ -137,7 +137,7 @@ def run_command(
     The methods are {methods}. The bend field is kept, and that of least 2-norm energy beside it.
     report.json has all facts. Ctrl-C ends the run with the fields so far; a second one ends at once.
     """
-    from ..solving.limits import Limits
+    from ...models.processes.limits import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)
@@ -405,7 +405,7 @@ def draw_command(
         show("reading")
         subject = field_or_instance(what, on)
         show("drawing")
-        draw(subject, output, kind=kind, over=over, title=title)
+        draw(subject, output, kind=kind, underlay=over, title=title)
     if not quiet:
         say(str(output))
 

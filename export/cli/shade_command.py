@@ -184,7 +184,7 @@ def _refuse_options(what: str, choice: Choice, *options: object) -> None:
 
 def _made(instance: Instance, method: str | None, folder: Path, seconds: float, show: Progress) -> Candidate:
     """The last field of a method. Raises InputError for a method that is none."""
-    from ..solving.limits import Limits
+    from ...models.processes.limits import Limits
     from ..solving.methods import METHODS, Request
     from ..solving.run import KEPT
 

@@ -14,11 +14,11 @@ from ...models.errors import CrossfieldError, InputError
 from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
 from ...models.instance.instance import Instance
 from ...models.processes.interruption import interruptible
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
-from .limits import Limits
 from .methods import METHODS, Request
 
 DEFAULT_METHODS: Final = ("greedy", "search")
@@ -78,7 +78,7 @@ class Evaluation:
                 "stroke_weight": self.instance.stroke_weight,
                 "skew_weight": self.instance.skew_weight,
             },
-            "seconds_per_field": self.limits.seconds,
+            "seconds_per_field": self.limits.time_limit,
             "curves_of": "sketch" if self.drawn else "chains",
             "methods": {method: _facts(self.summary(method)) for method in self.methods},
             "curves": [
@@ -117,7 +117,7 @@ def evaluate(
     read. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
     Raises InputError for unknown methods, and when no curve can be hidden.
     """
-    methods, limits = tuple(dict.fromkeys(methods)), limits or Limits(SECONDS)
+    methods, limits = tuple(dict.fromkeys(methods)), Limits.bounded(limits or Limits(SECONDS))
     for name in methods:
         if name not in METHODS:
             raise InputError(f"there is no method {name!r}; choose one of {', '.join(METHODS)}")

@@ -30,6 +30,7 @@ from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.child import Child, KilledError
 from ...models.processes.deadline import Deadline
+from ...models.processes.limits import Limits
 from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, leave_manifest
@@ -41,7 +42,6 @@ from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
 from ..writing.sink import save
-from .limits import Limits
 
 FEASIBLE: Final = 1e-6
 """Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
@@ -204,8 +204,8 @@ class Solvers:
         start: CrossField | None = None,
     ) -> Solution:
         """Solve a problem; parameters, result and errors are those of the function `solve`."""
-        limits = limits or Limits()
-        deadline = Deadline.after(limits.seconds)
+        limits = Limits.bounded(limits)
+        deadline = Deadline.after(limits.time_limit)
         with _folder(folder) as place:
             taking = format_for(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
@@ -214,7 +214,7 @@ class Solvers:
             if folder is not None and is_recordable(problem):
                 leave_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.
-            search = deadline.later(deadline.left() - limits.seconds)
+            search = deadline.later(deadline.left() - limits.time_limit)
             return self.solve_file(written.problem, solver, files, limits, search, start=start)
 
     def solve_file(
@@ -242,7 +242,7 @@ class Solvers:
             files.model,
             files.solution,
             begins,
-            limits.seconds,
+            limits.time_limit,
             deadline,
             limits.gap,
             limits.threads,

@@ -13,6 +13,7 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Clock, Deadline
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
@@ -25,7 +26,6 @@ from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
-from .limits import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
 
 if TYPE_CHECKING:
@@ -123,9 +123,13 @@ class Request:
     progress: Progress = silent
     clock: Clock = time.monotonic
 
+    def __post_init__(self) -> None:
+        """Refuse limits without a time limit. Raises InputError."""
+        Limits.bounded(self.limits)
+
     def deadline(self) -> Deadline:
         """Return the end of the time limit, counted from now."""
-        return Deadline.after(self.limits.seconds, self.clock)
+        return Deadline.after(self.limits.time_limit, self.clock)
 
     def begin(self, deadline: Deadline) -> CrossField:
         """The field to start from; the greedy one is improved for no more than half of the time."""
@@ -242,7 +246,7 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
     start = request.begin(jumps_until(deadline))
     begin, limits = time.perf_counter(), request.limits.until(jumps_until(deadline))
     request.progress(
-        f"HiGHS: MILP for the jumps, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far"
+        f"HiGHS: MILP for the jumps, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far"
     )
     milp = find_jumps(request.instance, request.folder, limits=limits, start=start, **request.options)
     yield _of("MILP", milp)

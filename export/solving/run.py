@@ -12,6 +12,7 @@ from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
@@ -25,7 +26,6 @@ from ..solutions.solution import Solution
 from ..surfaces.files import SHADED, write_shaded
 from ..surfaces.report import surface_facts
 from .compiling import compiling
-from .limits import Limits
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven
 from .stopwatch import Stopwatch
@@ -149,8 +149,8 @@ class Report:
 def plan(limits: Limits) -> str:
     """How long the searches of a run may take in all, and each."""
     timed = [method.name for method in METHODS.values() if method.timed]
-    each = ", ".join(f"{name} {limits.seconds:g}" for name in timed)
-    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures on top"
+    each = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
+    return f"at most {len(timed) * limits.time_limit:g} s: {each}; files and pictures on top"
 
 
 def run(
@@ -187,7 +187,7 @@ def run(
     a drawing that is unreadable or lies elsewhere.
     """
     below = None if drawing is None else read_drawing(drawing, on=instance)
-    folder, limits = make_folder(folder), limits or Limits()
+    limits, folder = Limits.bounded(limits), make_folder(folder)
     _clear(folder)
     progress(plan(limits))
     watch = Stopwatch()
@@ -275,7 +275,7 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
         return None
     progress("writing and checking the certificate")
     try:
-        return Proven.by(by.proof, path, Deadline.after(limits.seconds - by.seconds))
+        return Proven.by(by.proof, path, Deadline.after(limits.time_limit - by.seconds))
     except CrossfieldError as error:
         found.failures["certificate"] = str(error)
     except KeyboardInterrupt:
@@ -294,7 +294,7 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
             draw(subject, folder / _picture(kind), kind=kind)
         for name in OVERLAY:
             progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, over=below)
+            draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
     return report

@@ -11,9 +11,9 @@ from ...models.formulations.catalogue import FORMULATIONS
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Deadline
+from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
 from ..solutions.solution import Solution
-from .limits import Limits
 from .local import solve
 
 _ANGLES: Final = 0.2
@@ -61,8 +61,8 @@ def find_jumps(
     start: the incumbent handed to HiGHS, the first field when None: cold, HiGHS is lost beyond 10 x
     10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError, SolutionError.
     """
-    limits = limits or Limits()
-    deadline = Deadline.after(limits.seconds)
+    limits = Limits.bounded(limits)
+    deadline = Deadline.after(limits.time_limit)
     start = start or first_field(instance, deadline.share(_STARTING).passed)
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
@@ -84,8 +84,8 @@ def two_stage(
     when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
     MissingSolverError, SolverError, SolutionError.
     """
-    limits = limits or Limits()
-    deadline = Deadline.after(limits.seconds)
+    limits = Limits.bounded(limits)
+    deadline = Deadline.after(limits.time_limit)
     milp = find_jumps(instance, folder, limits=limits.until(jumps_until(deadline)), start=start, **options)
     return TwoStage(milp, fit_angles(milp.field, folder, limits=limits.until(deadline)))
 

@@ -26,6 +26,7 @@ from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverErr
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.processes.deadline import Deadline
+from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
@@ -34,7 +35,6 @@ from ..programs.reading import Points
 from ..solutions.readers.text import Status
 from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
-from ..solving.limits import Limits
 from ..solving.local import Files, Solvers
 from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of

@@ -23,12 +23,12 @@ from ....models.errors import (
 )
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
+from ....models.processes.limits import Limits
 from ....models.processes.progress import Progress, silent
 from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
-from ...solving.limits import Limits
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library

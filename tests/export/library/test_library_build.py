@@ -35,7 +35,6 @@ from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.field import CrossField
@@ -43,6 +42,7 @@ from crossfield.models.field.file import read_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.file import read_instance
+from crossfield.models.processes.limits import Limits
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.published import redrawn
 from crossfield.models.sketch.samples import sample, sample_svg

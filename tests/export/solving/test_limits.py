@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.export.solving.proven import NOTHING, certified
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.limits import Limits
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import _Limits
 from crossfield.models.search.greedy import greedy_field

@@ -1,6 +1,7 @@
 """Local solvers: right optima, limits, starts, interrupts, and refusals by name."""
 
 import itertools
+import math
 import re
 import signal
 import subprocess
@@ -20,6 +21,7 @@ from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
+from crossfield.export.solving.methods import Request
 from crossfield.export.solving.run import plan
 from crossfield.models.errors import (
     InputError,
@@ -482,9 +484,8 @@ def test_threads_may_change_from_solve_to_solve(tmp_path, small):
 @pytest.mark.parametrize(
     "given",
     [
-        {"seconds": 0},
-        {"seconds": float("nan")},
-        {"seconds": float("inf")},
+        {"time_limit": 0},
+        {"time_limit": float("nan")},
         {"gap": -1},
         {"threads": -1},
         {"threads": 100000},
@@ -493,6 +494,20 @@ def test_threads_may_change_from_solve_to_solve(tmp_path, small):
 def test_impossible_limits_are_refused(given):
     with pytest.raises(InputError, match=r"out of range|cannot be"):
         cf.Limits(**given)
+
+
+def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):
+    endless, instance = cf.Limits(math.inf), cf.sample("skew", 4)
+    for work in (
+        lambda: cf.solve(cf.formulate(instance, "milp-mccormick"), limits=endless),
+        lambda: cf.run(instance, tmp_path, limits=endless),
+        lambda: cf.two_stage(instance, limits=endless),
+        lambda: cf.evaluate(cf.sample("mouse", 8), limits=endless),
+        lambda: Request(instance, tmp_path, endless),
+    ):
+        with pytest.raises(InputError, match=r"a time limit of inf s .* out of range"):
+            work()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_solved_is_the_file(tmp_path, small):

@@ -18,7 +18,6 @@ from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.verify.verify import (
     Verdict,
@@ -37,6 +36,7 @@ from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.limits import Limits
 from crossfield.models.sketch.samples import sample
 from loops import for_each
 
