@@ -208,12 +208,14 @@ USES: Final = (
 def certificate(instance: Instance, seconds: float) -> Certificate:
     """The certificate of an instance."""
     with tempfile.TemporaryDirectory() as folder:
-        return write_certificate(prove(instance, seconds=seconds), Path(folder) / "certificate.npz")
+        return write_certificate(
+            prove(instance, limits=cf.Limits(seconds, gap=0)), Path(folder) / "certificate.npz"
+        )
 
 
 def here(instance: Instance, norm: Norm, seconds: float) -> Answer:
     """What `crossfield prove` says of an instance, in the norm that a formulation minimises."""
-    proof = prove(instance, norm=norm, seconds=seconds)
+    proof = prove(instance, norm=norm, limits=cf.Limits(seconds, gap=0))
     return Answer(proof.energy, proof.bound, 0, proof.seconds)
 
 

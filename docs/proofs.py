@@ -28,6 +28,7 @@ from typing import Any, Final
 import proof_pictures
 import proof_solvers
 from crossfield.export.solvers_table import SOLVERS
+from crossfield.models.processes.limits import Limits
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import MOST_LABELS, prove
@@ -115,7 +116,7 @@ def optima(asked: Asked) -> Iterator[tuple[str, Facts]]:
     for instance in tiny():
         if not asked.wants(instance.name):
             continue
-        proof = prove(instance, seconds=asked.seconds)
+        proof = prove(instance, limits=Limits(asked.seconds, gap=0))
         best, _ = optimum(instance, proof.field, (*PROVERS, "casadi"))
         yield instance.name, {
             "grid": f"{instance.grid.width} x {instance.grid.height}",
@@ -141,7 +142,7 @@ def settings(asked: Asked) -> Iterator[tuple[str, Facts]]:
 
 def pictures(asked: Asked) -> Iterator[tuple[str, Facts]]:
     """The pictures of what every level leaves of the crosses."""
-    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), seconds=asked.seconds)
+    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), limits=Limits(asked.seconds, gap=0))
     certificate = write_certificate(proof, asked.work / f"{PICTURED}.certificate.npz")
     proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")

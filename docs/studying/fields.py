@@ -85,12 +85,12 @@ def _field(run: Run, instance: Instance) -> Found:
     if run.way in PLAIN:
         return PLAIN[run.way](instance), {}
     if run.way == "search":
-        return cf.search(instance, seconds=run.limit, jobs=1, seed=run.seed).field, {}
+        return cf.search(instance, limits=cf.Limits(run.limit), jobs=1, seed=run.seed).field, {}
     return _by_method(run, instance)
 
 
 def _proven(run: Run, instance: Instance) -> Found:
-    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, seconds=run.limit, jobs=1)
+    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, limits=cf.Limits(run.limit, gap=0), jobs=1)
     return proof.field, {"status": proof.status, "bound": proof.bound, "note": proof.ended}
 
 

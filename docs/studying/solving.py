@@ -63,7 +63,7 @@ def greedy(name: str, size: int) -> CrossField:
 def windows(name: str, size: int, seconds: float) -> Windows:
     """What a certificate of an instance leaves."""
     with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
-        proof = cf.prove(made(name, size), seconds=seconds, jobs=1)
+        proof = cf.prove(made(name, size), limits=cf.Limits(seconds, gap=0), jobs=1)
         return windows_left(cf.write_certificate(proof, Path(folder) / "a.certificate.npz"))
 
 
@@ -120,7 +120,9 @@ def proved(run: Run) -> dict[str, Any]:
     if run.way == ANGLES:
         energy = fitted(greedy(run.instance, run.size)).energy().total
         return facts | {"status": "optimal", "objective": energy, "bound": energy}
-    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, seconds=run.limit, jobs=1, seed=run.seed)
+    proof = cf.prove(
+        instance, norm=1 if run.norm == 1 else 2, limits=cf.Limits(run.limit, gap=0), jobs=1, seed=run.seed
+    )
     facts |= {"status": proof.status, "objective": proof.energy, "bound": proof.bound}
     return facts | {"seconds": proof.seconds, "note": proof.ended, **energies(proof.field)}
 

@@ -106,6 +106,7 @@ def prove_command(
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.field.file import read_field
     from ...models.processes.deadline import Deadline
+    from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
 
     with progress(quiet=quiet) as show:
@@ -126,12 +127,9 @@ def prove_command(
             loaded,
             norm=cast("Norm", norm),
             start=None if start is None else read_field(start, on=loaded),
-            seconds=deadline,
+            limits=Limits(time_limit, gap).until(deadline),
             certified=True,
-            gap=gap,
-            progress=lambda bound, energy, labels: show(
-                f"bound {bound:.6f}, energy {energy:.6f}, {labels} labels; Ctrl-C keeps them"
-            ),
+            progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
         show("writing and checking the certificate")
         document = _write(proof, output, deadline)

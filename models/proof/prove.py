@@ -13,8 +13,8 @@ the least of their bounds is that of all.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 from typing import ClassVar, Final
@@ -26,10 +26,13 @@ from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..processes.crew import Crew, crew
-from ..processes.deadline import Deadline, Over, never
+from ..processes.deadline import Deadline, Over, Stop, asked, never
 from ..processes.interruption import interruptible
+from ..processes.limits import Limits
+from ..processes.progress import Progress, silent
+from ..processes.side_by_side import checked
 from ..search.improvement import improved_field
-from ..search.search import search
+from ..search.search import search_patches
 from ..search.starts import first_field, polyvector_start
 from ..smooth.systems import one_thread
 from .certificate_pace import certificate_effort, checking_pace
@@ -40,9 +43,6 @@ from .pruning import branches, finer, left, prolonged
 from .record import EXACT, LevelRecord, Proof, Status
 from .rounding import Rounding, improve
 from .sweep import Dual
-
-ProofProgress = Callable[[float, float, int], object]
-"""Is told the bound, the least energy so far, and how many labels are left, every few passes."""
 
 COARSEST: Final = 16  # steps in pi/2 of the first level
 _FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
@@ -75,48 +75,83 @@ def prove(
     *,
     norm: Norm = 2,
     start: CrossField | None = None,
-    seconds: float | Deadline | None = None,
+    limits: Limits | None = None,
+    work: int | None = None,
     certified: bool = False,
-    gap: float = 0.0,
     seed: int = 0,
     jobs: int = 2,
-    progress: ProofProgress = lambda *_: None,
-    stop: Over = never,
+    progress: Progress = silent,
+    stop: Stop | None = None,
 ) -> Proof:
-    """The field of least energy that was found, and a lower bound of the energy of all fields.
+    """Find a field of low energy, and prove a lower bound of the energy of all fields.
 
-    norm: 2, or 1 for the 1-norm energy, which `milp-mccormick` minimises; of its proofs there are no
-    certificates. seconds: when to end; levels that could not be recorded by then are not begun. If no level
-    was recorded, the bound is 0 and `levels` is empty. certified: end sooner, by the estimated time that
-    `write_certificate` takes for the levels; a level whose certificate would be late is not begun. gap: the
-    relative gap, (energy - bound) / energy, that is enough; 0 asks for optimality. start: a field to begin
-    with where, improved, it is better than the first field. seed: of the search that follows where
-    the lattices leave a gap. jobs: threads, and processes of that search. stop: asked at every good place
-    whether to end. Ctrl-C ends the proof with what it has. Without seconds the same arguments give the same
-    proof, for any number of threads. The bound holds for both gauges; under `box` it is that of `strokes`,
-    and seldom tight.
-    Raises InputError for a limit that is not positive, a gap below 0, another norm, and too many jobs.
+    The bound holds for both gauges. Under `box` it is the bound of `strokes`, and seldom tight. Without a
+    time limit the same arguments give the same proof, for any number of threads. Ctrl-C ends the proof with
+    what it has.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    norm
+        2, or 1 for the 1-norm energy, which `milp-mccormick` minimises. Proofs in the 1-norm have no
+        certificates.
+    start
+        A field to begin with where, improved, it is lower than the first field.
+    limits
+        Time limit, relative gap at which to end (0 asks for optimality), and threads (0: as many as `jobs`).
+        Levels that could not be recorded in time are not begun. If no level was recorded, the bound is 0 and
+        `levels` is empty. None: no time limit, and a gap of 0.
+    work
+        Number of labels, counted at each rounding, after which to end: a limit that no clock decides.
+    certified
+        Whether to keep the estimated time that `write_certificate` takes for the levels. A level whose
+        certificate would be late is not begun.
+    seed
+        Seed of the search that follows where the lattices leave a gap.
+    jobs
+        Number of processes of that search.
+    progress
+        Receives a line of text every few passes.
+    stop
+        A function or an event that says whether to stop. The proof so far is then returned.
+
+    Returns
+    -------
+    Proof
+        The field, its energy, the bound, and the levels that prove it.
+
+    Raises
+    ------
+    InputError
+        For another norm, and for too few or too many jobs or threads.
+    InstanceError
+        For a start on another instance.
+
     """
-    spent = isinstance(seconds, int | float) and not seconds > 0
-    if spent or not gap >= 0 or jobs < 1:
-        raise InputError("a proof needs a positive number of seconds and of jobs, and a gap of 0 or more")
     if norm not in (1, 2):
         raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
+    if start is not None:
+        start.check_instance(instance)
+    given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
-    with interruptible() as interrupted, crew(jobs) as hands:
-        limits = _Limits(Deadline.of(seconds), interrupted, stop, gap, certified and norm == 2)
+    with interruptible() as interrupted, crew(given.threads or checked(jobs)) as hands:
+        own = _Limits(
+            given.deadline(), interrupted, asked(stop), given.gap, certified and norm == 2, work or math.inf
+        )
         kind = _of_norm(norm)
-        work = kind(instance, kind.first(instance, start, limits.over), limits, hands, (seed, jobs), progress)
-        ended = work.run()
-        return work.proof(time.monotonic() - began, ended)
+        proving = kind(instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress)
+        ended = proving.run()
+        return proving.proof(time.monotonic() - began, ended)
 
 
 @dataclass
 class _Limits:
-    """When to end: a deadline, whether the user or the caller asks for it, and a gap that is enough.
+    """When to end: a deadline, whether the user or the caller asks for it, a sufficient gap, enough work.
 
-    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. pace:
-    greatest measured seconds per unit of its effort. kept: the seconds that it is expected to take.
+    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. work:
+    greatest number of labels; labels: those so far. pace: greatest measured seconds per unit of the
+    certificate's effort. kept: the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
@@ -124,6 +159,8 @@ class _Limits:
     stop: Over
     gap: float
     certified: bool
+    work: float = math.inf
+    labels: int = 0
     pace: float = 0.0
     kept: float = 0.0
 
@@ -146,9 +183,11 @@ class _Limits:
         self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
-        """Which limit of time is met; empty when none is."""
+        """Which limit is met; empty when none is."""
         if self.interrupted() or self.stop():
             return "interrupted"
+        if self.labels > self.work:
+            return "work"
         return "time" if self.deadline.passed() else ""
 
     def over(self, ahead: float = 0.0) -> bool:
@@ -167,9 +206,9 @@ def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossF
     """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
     fields = [first_field(instance, over)]
     if given is not None:
-        fields.append(improved_field(given, over))
+        fields.append(improved_field(given, stop=over))
     if not over():
-        fields.append(improved_field(polyvector_start(instance, over), over))
+        fields.append(improved_field(polyvector_start(instance, over), stop=over))
     return min(fields, key=lambda field: round(field.energy().total, 9))
 
 
@@ -212,7 +251,7 @@ class Work:
     limits: _Limits
     hands: Crew
     seed_and_jobs: tuple[int, int]
-    progress: ProofProgress
+    progress: Progress
     chain: _Chain = field(default_factory=_Chain)
     proven: _Chain = field(default_factory=_Chain)
     searched: bool = False
@@ -221,7 +260,7 @@ class Work:
 
     def improved(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, with jumps and angles improved."""
-        return improved_field(field, over)
+        return improved_field(field, stop=over)
 
     def energy(self, field: CrossField) -> float:
         """The energy that the proof is of."""
@@ -336,7 +375,7 @@ class Work:
             self.chain.bound = min(waiting[0].bound, self.energy(self.best))
             if self.chain.bound > self.proven.bound:
                 self.proven = replace(self.chain, levels=levels[:], parents=self.chain.parents[:])
-            self.progress(self.proven.bound, self.energy(self.best), _labels(waiting))
+            self._tell(self.proven.bound, _labels(waiting))
         return ended or self._ended()
 
     def _parts(self, branch: _Branch) -> list[Dual]:
@@ -384,13 +423,16 @@ class Work:
         seed, jobs = self.seed_and_jobs
         timed = np.isfinite(self.limits.deadline.left())
         self._offer(
-            search(
+            search_patches(
                 self.instance,
-                seconds=self.limits.deadline.share(share) if timed else None,
+                deadline=self.limits.deadline.share(share) if timed else None,
                 rounds=None if timed else _ROUNDS,
-                seed=seed + self.searches, jobs=jobs, start=self.best,
+                seed=seed + self.searches,
+                jobs=jobs,
+                start=self.best,
+                stop=self.limits.stop,
             ).field
-        )  # fmt: skip
+        )
         self.searches += 1
 
     def _offer(self, found: CrossField) -> None:
@@ -403,10 +445,15 @@ class Work:
             bound = dual.ascend(_PASSES, closing)
             self.best = rounding.lower(self.best, closing)
             energy = self.energy(self.best)
-            self.progress(max(self.proven.bound, min(bound, energy)), energy, int(dual.lattice.allowed.sum()))
+            self._tell(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
             if closing() or self._exact(bound) or bound - reached <= slow * (energy - bound):
                 return
             reached = bound
+
+    def _tell(self, bound: float, labels: int) -> None:
+        """Report bound, least energy and remaining labels, and count the labels as work."""
+        self.limits.labels += labels
+        self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
 
     def _record(self, dual: Dual, *, again: bool) -> Forced | None:
         """Record the level and what it proves, prune it, and see what is forced; not when the time is over.

@@ -67,7 +67,7 @@ class Proof:
     bound is the energy but for rounding, energy - bound <= 1e-9 (1 + energy): then the jumps are forced, and
     the field solves the convex problem that is left; else `gap`. forced: number of pairs whose jump is that
     of the levels' centre in every field that could be better. levels: the last chain of lattices, coarsest
-    first. seconds: of the whole work. ended: `optimal`, `gap` (the one asked for is reached), `time`,
+    first. seconds: of the whole work. ended: `optimal`, `gap` (the one asked for is reached), `time`, `work`,
     `interrupted`, or `labels` where the next level would be too large. norm: 1 or 2. parents: the number of
     the level from which each follows, -1 for the first; empty where each follows from the one before. Where
     several follow from one, they are branches: the alpha of one pixel is cut.

@@ -69,7 +69,7 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
-    return min(best, improved_field(state.bounded(over), over), key=lambda field: field.energy().total)
+    return min(best, improved_field(state.bounded(over), stop=over), key=lambda field: field.energy().total)
 
 
 def decoded(dual: Dual, *, forwards: bool) -> tuple[Floats, Floats]:

@@ -56,7 +56,7 @@ def halved(instance: Instance) -> Instance | None:
 
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
     """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
-    return improved_field(grown(coarse, instance, over), over)
+    return improved_field(grown(coarse, instance, over), stop=over)
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:

@@ -49,7 +49,7 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     Deterministic where time does not cut it off.
     """
     if instance.grid.size <= _SMALL:
-        return improved_field(greedy_field(instance, over=over), over)
+        return improved_field(greedy_field(instance, stop=over), stop=over)
     return _best_of_many(instance, over)[0].bounded(over)
 
 

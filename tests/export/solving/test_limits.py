@@ -73,7 +73,7 @@ def passed():
 
 
 def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
-    proof = cf.prove(cf.sample("mouse", 24), seconds=passed, certified=True)
+    proof = cf.prove(cf.sample("mouse", 24), limits=cf.Limits().until(passed), certified=True)
     assert (proof.bound, proof.status, proof.levels, proof.ended) == (0.0, "gap", (), "time")
     path = tmp_path / "certificate.npz"
     with pytest.raises(SolverError, match="nothing was proven"):

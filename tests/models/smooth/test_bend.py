@@ -179,13 +179,13 @@ def test_rounds_end_when_the_time_is_over():
         asked.append(rounds)
         return len(asked) > rounds
 
-    assert bend_field(start, over=lambda: over(0)) is start
+    assert bend_field(start, stop=lambda: over(0)) is start
     energies = []
     for rounds in (1, 2, 3):
         asked.clear()
-        found = bend_field(start, harmonic=HARMONIC, over=lambda rounds=rounds: over(rounds))
+        found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(asked) == rounds + 1
         energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
-    assert np.array_equal(bend_field(start, over=lambda: False).alpha, whole.alpha)
+    assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)
