@@ -172,7 +172,7 @@ class _Bend:
 
 def _lines(field: CrossField) -> tuple[Floats, Floats]:
     """The angles of u and v, shape (n,) each."""
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
+    return field.u_angle, field.v_angle
 
 
 def _differences(field: CrossField) -> tuple[Any, Floats]:
