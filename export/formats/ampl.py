@@ -30,7 +30,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, Variable, elements, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance

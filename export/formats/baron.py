@@ -28,7 +28,8 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.counting import Expected, check

@@ -26,7 +26,8 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, Variable, elements
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance

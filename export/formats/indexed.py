@@ -9,7 +9,8 @@ from typing import ClassVar, Final
 import sympy as sp
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.problem import PlacedFamily, Problem
+from ...models.formulations.families import Coefficient, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet
 from ..writing.expressions import Language, wrapped
 from ..writing.records import Piece, check_coefficients
@@ -98,6 +99,6 @@ def check_indexed(problem: Problem, layout: str, instead: str) -> None:
     instance = problem.instance
     if problem.pinned is not None:
         raise UnsupportedByFormatError(f"{layout} has no place for columns fixed one by one; write {instead}")
-    weights = (instance.w, instance.stroke_coefficient, instance.skew_coefficient)
+    weights: tuple[Coefficient, ...] = (instance.w, instance.stroke_coefficient, instance.skew_coefficient)
     for name, values in zip(("w", "w_strokes", "w_beta"), weights, strict=True):
         check_coefficients(values, f"{name} of {instance.name}")

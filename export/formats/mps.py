@@ -24,7 +24,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Floats, Grid, Ints
 from ..writing.canonical import Canonical, coefficient

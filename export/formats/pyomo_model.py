@@ -18,7 +18,8 @@ import pyomo.environ as pyo
 import sympy as sp
 
 from ...models.field.field import CrossField
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, pixel_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance

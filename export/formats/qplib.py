@@ -37,7 +37,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.problem import PlacedFamily
+from ...models.formulations.families import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check

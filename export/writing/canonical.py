@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Coefficient, Monomial, Problem
+from ...models.formulations.families import Block, Coefficient, Monomial
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .glpk_order import glpk_order
 from .names import Names

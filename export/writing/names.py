@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS, IndexSet, pixel_of
 from ...models.instance.instance import Instance
 from .records import Bytes, Piece, Tagged, Words, digits, filled, table

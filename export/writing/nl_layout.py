@@ -17,7 +17,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Ints
 from .counting import Expected, check
 from .names import OBJECTIVE, Names

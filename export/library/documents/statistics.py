@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.formulations.problem import PlacedFamily, Problem
+from ....models.formulations.families import PlacedFamily
+from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical

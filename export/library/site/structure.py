@@ -15,7 +15,8 @@ import sympy as sp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ....models.formulations.problem import PlacedFamily, Problem
+from ....models.formulations.families import PlacedFamily
+from ....models.formulations.problem import Problem
 from ...pictures.sparsity import Parts, Pattern, Places
 
 _HIGHEST: Final = 4
