@@ -27,6 +27,7 @@ import numpy as np
 import sympy as sp
 
 from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.names import Bytes, element_names
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, Variable, elements
 from ...models.instance.grid import Floats
@@ -34,8 +35,7 @@ from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.counting import Expected, check
-from ..writing.names import element_names
-from ..writing.records import Bytes, Counted, Piece, Words, number, render, words
+from ..writing.records import Counted, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
 from .indexed import Indexed, check_indexed, described, narrowed
 

@@ -32,11 +32,12 @@ import numpy as np
 import sympy as sp
 
 from ...models.formulations.families import Monomial, PlacedFamily
+from ...models.formulations.names import name_length
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
 from ..writing.expressions import is_data, split
-from ..writing.names import OBJECTIVE, name_length
+from ..writing.names import OBJECTIVE
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
     Counted,

@@ -7,11 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from ..programs.reading import Evaluation, Meaning, Points, places
 from ..writing.canonical import Canonical
-from ..writing.names import ONE, column_names, row_names
+from ..writing.names import ONE
 from ..writing.terms import terms
 
 VALUES: Final = 1e-9

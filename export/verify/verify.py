@@ -24,6 +24,7 @@ import numpy as np
 
 from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError
 from ...models.field.field import CrossField
+from ...models.formulations.names import column_names
 from ...models.formulations.problem import Problem
 from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
@@ -36,7 +37,6 @@ from ..solutions.readers.text import Status
 from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import Files, Solvers
-from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
 from .leeway import saved
 

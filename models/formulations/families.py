@@ -42,7 +42,7 @@ class Block:
 
 
 class Placement(Protocol):
-    """What families are placed on: an instance, blocks of columns, and the data that symbols may mean."""
+    """A problem as its families see it: instance, blocks of columns, data that symbols may mean, rows."""
 
     @property
     def instance(self) -> Instance:
@@ -55,6 +55,10 @@ class Placement(Protocol):
     @property
     def data(self) -> dict[str, Any]:
         """Arrays by the name of their quantity."""
+
+    @property
+    def rows(self) -> tuple[PlacedFamily, ...]:
+        """Families of rows in row order."""
 
 
 @dataclass(frozen=True, eq=False)

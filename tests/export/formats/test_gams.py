@@ -19,10 +19,10 @@ from crossfield.export.formats import gams_indexed, lp
 from crossfield.export.formats import gams_scalar as gams
 from crossfield.export.writing import records
 from crossfield.export.writing.canonical import Canonical
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.field.field import CrossField, relabelled
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 from loops import for_each

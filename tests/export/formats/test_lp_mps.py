@@ -14,9 +14,9 @@ from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, carried, header, write
 from crossfield.export.solving.local import solve
 from crossfield.export.writing.canonical import Canonical
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each

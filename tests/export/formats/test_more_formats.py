@@ -35,10 +35,10 @@ from crossfield.export.verify.comparison import evaluation_difference, of_proble
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
 from crossfield.export.writing.curvature import probtype
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem, with_integers_fixed
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample

@@ -14,9 +14,9 @@ import pytest
 from cases import CASES, LOW_DEGREE, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.writing.names import column_names
 from crossfield.models.errors import InstanceError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from loops import for_each
 from oracles import by_casadi, by_highs, by_scip

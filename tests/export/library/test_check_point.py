@@ -19,8 +19,8 @@ from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, pr
 from crossfield.export.formats.registry import FORMATS, carried, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
-from crossfield.export.writing.names import column_names
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance

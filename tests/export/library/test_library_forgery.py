@@ -223,7 +223,7 @@ def point_of(lib):
 def written(problem, point, folder):
     """The point as a list of names and values."""
     from crossfield.export.verify.comparison import names_of
-    from crossfield.export.writing.names import column_names
+    from crossfield.models.formulations.names import column_names
 
     lines = [
         f"{name} {value!r}"

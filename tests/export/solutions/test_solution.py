@@ -7,9 +7,9 @@ from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import ROUND, Solution, read_solution
-from crossfield.export.writing.names import column_names
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate, lifted
 from loops import for_each
 

@@ -71,7 +71,7 @@ def relaxed_by_highs(skew, path):
 def by_names(problem, values):
     """A plain list of names and values."""
     from cases import names_of
-    from crossfield.export.writing.names import column_names
+    from crossfield.models.formulations.names import column_names
 
     pairs = zip(names_of(column_names(problem)), map(float, values), strict=True)
     return "".join(f"{name} {value!r}\n" for name, value in pairs)
