@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .models.field.field import CrossField as CrossField
     from .models.field.file import read_field as read_field
     from .models.field.file import write_field as write_field
+    from .models.formulations.arrays import ProblemArrays as ProblemArrays
     from .models.formulations.problem import Problem as Problem
     from .models.formulations.problem import formulate as formulate
     from .models.formulations.problem import with_integers_fixed as with_integers_fixed
@@ -68,6 +69,7 @@ _HOME: Final = {
     "Light": ".export.shading.light",
     "Limits": ".models.processes.limits",
     "Problem": ".models.formulations.problem",
+    "ProblemArrays": ".models.formulations.arrays",
     "Proof": ".models.proof.record",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",

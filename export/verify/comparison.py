@@ -7,9 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.formulations.arrays import row_terms
 from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.grid import Bools, Floats
 from ..programs.reading import Evaluation, Meaning, Points, places
 from ..writing.canonical import Canonical
 from ..writing.names import ONE
@@ -34,8 +35,8 @@ def of_problem(problem: Problem) -> Meaning:
     form = Canonical(problem)
     one = [ONE.decode()] * form.has_one
     n, ones = problem.n_columns, np.ones(len(one))
-    at, value = _of_degree(problem, 1)
-    products, product = _of_degree(problem, 2)
+    at, value = row_terms(problem.rows, 1)
+    products, product = row_terms(problem.rows, 2)
     return Meaning.of(
         names_of(column_names(problem)) + one,
         names_of_rows(problem) or ["c_ONE"],
@@ -49,20 +50,6 @@ def of_problem(problem: Problem) -> Meaning:
         matrix=terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
         row_quadratic=terms(products, product, indices=3, products=2),
     )
-
-
-def _of_degree(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """Entries (row, columns...) and coefficients of the rows' terms of a degree."""
-    at: list[Ints] = [np.zeros((0, degree + 1), np.int64)]
-    values: list[Floats] = [np.zeros(0)]
-    start = 0
-    for family in problem.rows:
-        row = np.arange(start, start + family.count)
-        for term in family.of_degree(degree):
-            at.append(np.stack([row, *term.factors], axis=1).astype(np.int64))
-            values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
-        start += family.count
-    return np.concatenate(at), np.concatenate(values)
 
 
 def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:

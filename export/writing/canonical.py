@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from ...models.formulations.arrays import row_sides
 from ...models.formulations.families import Block, Coefficient, Monomial
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
@@ -99,19 +100,16 @@ class Canonical:
     @cached_property
     def row_lower(self) -> Floats:
         """Left sides of all rows, constants moved there, -inf where there is none, shape (rows,)."""
-        return self._sides("<=", -np.inf)
+        return self._sides[0]
 
     @cached_property
     def row_upper(self) -> Floats:
         """Right sides of all rows, inf where there is none, shape (rows,)."""
-        return self._sides(">=", np.inf)
+        return self._sides[1]
 
-    def _sides(self, without: str, infinity: float) -> Floats:
-        sides = [
-            np.full(family.count, infinity) if family.family.sense == without else family.limit
-            for family in self.problem.rows
-        ]
-        return np.concatenate([np.zeros(0), *sides]) + 0.0
+    @cached_property
+    def _sides(self) -> tuple[Floats, Floats]:
+        return row_sides(self.problem.rows)
 
     @cached_property
     def layout(self) -> Layout:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 import sympy as sp
@@ -17,6 +17,9 @@ from .monomials import beyond_noise, monomials
 from .symbols import SCALARS, SLOTS, IndexSet, numeric, way
 
 Coefficient = float | Floats
+
+ANY_DEGREE: Final = 99
+"""Degree of what is no polynomial."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ class PlacedFamily:
     @property
     def degree(self) -> int:
         """Degree of the polynomial; 99 for what is none."""
-        return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
+        return ANY_DEGREE if self.terms is None else max((term.degree for term in self.terms), default=0)
 
     def of_degree(self, degree: int) -> tuple[Monomial, ...]:
         """Its monomials of that degree."""

@@ -21,9 +21,11 @@ from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 from ..previews import table_of
+from .arrays import ProblemArrays, arrays_of
 from .catalogue import AT_JUMPS, TWO_NORM, declare
 from .declaration import FORMULATIONS, Family, Formulation
-from .families import Block, Monomial, PlacedFamily, block_costs, symbol_name
+from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, symbol_name
+from .highs_model import check_highs, highs_of
 from .lifting import lift_products
 from .monomials import merged, ordered
 from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
@@ -251,13 +253,26 @@ class Problem:
         """Whether its continuous relaxation is known to be convex."""
         return self.formulation.convex
 
-    def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
-        """The monomials of that degree, each set of columns once, sorted:
-        columns (k, degree) and coefficients (k,).
+    def merged_objective(self, degree: int, *, up_to: int = ANY_DEGREE) -> tuple[Ints, Floats]:
+        """Monomials of that degree, each set of columns once, sorted.
 
-        Coefficients that cancel are left out. Shape (1, 0) for the constant.
+        Coefficients that cancel are left out.
+
+        Parameters
+        ----------
+        degree
+            Number of columns of each monomial; 0 for the constant.
+        up_to
+            Greatest degree of the terms of the objective that are counted.
+
+        Returns
+        -------
+        tuple of arrays
+            Columns, shape (k, degree), and coefficients, shape (k,). For the constant k is 1.
+
         """
-        terms = [(term, family) for family in self.objective for term in family.of_degree(degree)]
+        chosen = [family for family in self.objective if family.degree <= up_to]
+        terms = [(term, family) for family in chosen for term in family.of_degree(degree)]
         coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
         if degree == 0:
             total = sum(float(np.sum(values)) for values in coefficients)
@@ -278,6 +293,36 @@ class Problem:
         ]
         index, cost = zip(*costs, strict=True)
         return np.concatenate(index), np.concatenate(cost)
+
+    def to_arrays(self, *, names: bool = True) -> ProblemArrays:
+        """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
+
+        Parameters
+        ----------
+        names
+            Whether to make the names of columns and rows.
+
+        Returns
+        -------
+        ProblemArrays
+            Costs, matrices, bounds and names. `nonlinear` lists what is not in the arrays.
+
+        """
+        return arrays_of(self, names=names)
+
+    def to_highs(self) -> Any:
+        """Return a `highspy.Highs` with the problem, passed by arrays; its output is switched off.
+
+        Names and order are those of the files. There is no column ONE.
+
+        Raises
+        ------
+        UnsupportedBySolverError
+            When the problem is neither an LP or MILP nor a convex QP.
+
+        """
+        check_highs(self.problem_class, convex=self.convex)
+        return highs_of(self.to_arrays(), self.instance.name)
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,)."""
