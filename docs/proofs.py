@@ -31,7 +31,8 @@ from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.processes.limits import Limits
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.prove import MOST_LABELS, prove
+from crossfield.models.proof.prove import prove
+from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES
 from energies import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import markdown, said

@@ -1,4 +1,4 @@
-"""The work of a proof in the 1-norm: that of models/proof/prove.py, on the lattices of common_lattice.py.
+"""The work of a proof in the 1-norm: that of models/proof/work.py, on the lattices of common_lattice.py.
 
 Once a level's boxes leave no choice of jumps, the energy on them is that of a linear program but for
 strokes at the edges of their windows. Its multipliers prove its least value.
@@ -26,8 +26,8 @@ from ..processes.deadline import Over, never
 from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
 from .common_lattice import CommonLattice
 from .forced import Forced
-from .prove import COARSEST, Work, first_of
 from .pruning import Left
+from .work import COARSEST, Work, first_of
 
 
 class WorkIn1Norm(Work):

@@ -21,7 +21,8 @@ from ..search.energy import LinearSolver
 from ..search.free_field import FreeField
 from ..search.improvement import improved_field, settle
 from .products import add, share_of, sized
-from .sweep import Dual, Indices, State
+from .state import Indices, State
+from .sweep import Dual
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _HALF: Final = float(np.pi / 2)

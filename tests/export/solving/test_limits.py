@@ -15,7 +15,7 @@ from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.prove import _Limits
+from crossfield.models.proof.work import WorkLimits
 from crossfield.models.search.greedy import greedy_field
 
 
@@ -107,7 +107,7 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
 
 def limits(seconds):
     """Limits of a certified proof whose clock stands still."""
-    return _Limits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
+    return WorkLimits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
 
 
 def test_a_proof_keeps_time_for_its_certificate():

@@ -4,7 +4,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.instance.instance import QUARTER
-from crossfield.models.proof.prove import first_of
+from crossfield.models.proof.work import first_of
 from crossfield.models.search import starts
 from crossfield.models.search.coarse import grown, halved, prolonged
 from crossfield.models.search.greedy import greedy_field
