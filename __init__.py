@@ -1,6 +1,19 @@
 """From a concept sketch to optimization instances, and from solvers' answers back to a cross field.
 
-The verbs are imported on first use, so that `import crossfield` itself takes milliseconds.
+All public names are here, the errors too: every error that crossfield raises on purpose is a
+`CrossfieldError`. Names are imported on first use, so that `import crossfield` itself takes milliseconds.
+
+Options are keywords, and one word has one meaning in every function:
+
+- `limits`: a `Limits` with the time limit in seconds, the relative gap, and the threads.
+- `jobs`: number of processes, or of files written at the same time; `threads`, in `Limits`, are those inside
+  one solver.
+- `progress`: a function that receives lines of text.
+- `stop`: a function without arguments that returns whether to stop, or an event such as `threading.Event`.
+  The work then ends early and returns the best result so far.
+- `start`: a field to begin with.
+
+Results have the field that was found as `.field`: `Search`, `Proof`, `Solution`, `TwoStage` and `Report`.
 """
 
 from __future__ import annotations
@@ -23,11 +36,24 @@ if TYPE_CHECKING:
     from .export.solving.evaluate import Evaluation as Evaluation
     from .export.solving.evaluate import evaluate as evaluate
     from .export.solving.local import solve as solve
+    from .export.solving.run import Report as Report
     from .export.solving.run import run as run
+    from .export.solving.two_stage import TwoStage as TwoStage
     from .export.solving.two_stage import fit_angles as fit_angles
     from .export.solving.two_stage import two_stage as two_stage
     from .export.surfaces.files import write_surface as write_surface
+    from .models.errors import ConsistencyError as ConsistencyError
     from .models.errors import CrossfieldError as CrossfieldError
+    from .models.errors import FormulationError as FormulationError
+    from .models.errors import InputError as InputError
+    from .models.errors import InstanceError as InstanceError
+    from .models.errors import MissingSolverError as MissingSolverError
+    from .models.errors import NoStrokeError as NoStrokeError
+    from .models.errors import OutputError as OutputError
+    from .models.errors import SolutionError as SolutionError
+    from .models.errors import SolverError as SolverError
+    from .models.errors import UnsupportedByFormatError as UnsupportedByFormatError
+    from .models.errors import UnsupportedBySolverError as UnsupportedBySolverError
     from .models.field.field import CrossField as CrossField
     from .models.field.file import read_field as read_field
     from .models.field.file import write_field as write_field
@@ -61,19 +87,32 @@ if TYPE_CHECKING:
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
+    "ConsistencyError": ".models.errors",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",
+    "FormulationError": ".models.errors",
     "Hint": ".models.surface.hints",
+    "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
+    "InstanceError": ".models.errors",
     "Light": ".export.shading.light",
     "Limits": ".models.processes.limits",
+    "MissingSolverError": ".models.errors",
+    "NoStrokeError": ".models.errors",
+    "OutputError": ".models.errors",
     "Problem": ".models.formulations.problem",
     "ProblemArrays": ".models.formulations.arrays",
     "Proof": ".models.proof.record",
+    "Report": ".export.solving.run",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
+    "SolutionError": ".models.errors",
+    "SolverError": ".models.errors",
     "Surface": ".models.surface.surface",
+    "TwoStage": ".export.solving.two_stage",
+    "UnsupportedByFormatError": ".models.errors",
+    "UnsupportedBySolverError": ".models.errors",
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",

@@ -323,7 +323,7 @@ def optimum(
     """
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
-        write_all(instance, folder, ["miqp-exact"], ["mps", "nl"], start=start)
+        write_all(instance, folder, formulations=["miqp-exact"], formats=["mps", "nl"], start=start)
         for prover in provers:
             for check in verify(folder, seconds=PROOF_SECONDS, programs=[prover]).checks:
                 if check.step == "solve" and check.proven:

@@ -50,7 +50,7 @@ def asked(run: Run, folder: Path | None) -> Instance:
         found = noisy(surface(run.instance, run.size).instance, run.noise, run.seed)
     else:
         found = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
-    return found.with_weights(run.w_strokes, run.w_beta)
+    return found.with_weights(stroke_weight=run.w_strokes, skew_weight=run.w_beta)
 
 
 def error(run: Run, field: CrossField, folder: Path | None) -> float | None:

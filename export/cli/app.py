@@ -286,8 +286,8 @@ def export_command(
         manifests = write_all(
             loaded,
             output,
-            formulations,
-            formats,
+            formulations=formulations,
+            formats=formats,
             start=field,
             jumps_of=None if proof is None else proof.field,
             windows=None if proof is None else windows_left(proof),

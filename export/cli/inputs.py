@@ -39,7 +39,9 @@ def load(
     from ...models.memory import available_memory
     from ...models.sketch.read import check_memory
 
-    instance = _found(what, size, mask, gauge, choice).with_weights(stroke_weight, skew_weight)
+    instance = _found(what, size, mask, gauge, choice).with_weights(
+        stroke_weight=stroke_weight, skew_weight=skew_weight
+    )
     check_memory(int(np.count_nonzero(instance.mask)), available_memory())
     warn_of(instance, quiet=quiet)
     return instance
@@ -65,7 +67,7 @@ def _found(what: str, size: int | None, mask: Path | None, gauge: Gauge | None, 
             raise InputError(
                 f"the sample {what} has its own curvature lines; leave --curvature and --view out"
             )
-        return sample(what, pixels, gauge or "strokes", silhouette=choice.silhouette)
+        return sample(what, pixels, gauge=gauge or "strokes", silhouette=choice.silhouette)
     if not path.exists():
         raise InputError(
             "there is no such file and no such sample; `crossfield samples` lists the samples", file=what

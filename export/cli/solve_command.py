@@ -184,7 +184,7 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
     problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, solver, request.folder, limits=limits, start=start)
+    solution = solve(problem, solver, folder=request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None or solution.doubt:
         target.unlink(missing_ok=True)  # that of an earlier call is not the answer to this one

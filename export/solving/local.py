@@ -54,8 +54,8 @@ _NO_BETTER: Final = "nothing better than the start"
 def solve(
     problem: Problem,
     solver: str | None = None,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
     stop: Stop | None = None,
@@ -103,7 +103,7 @@ def solve(
     """
     chosen = solver_for(problem, solver)
     with Solvers() as solvers:
-        return solvers.solve(problem, chosen.name, folder, limits=limits, start=start, stop=stop)
+        return solvers.solve(problem, chosen.name, folder=folder, limits=limits, start=start, stop=stop)
 
 
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
@@ -230,8 +230,8 @@ class Solvers:
         self,
         problem: Problem,
         solver: str,
-        folder: str | Path | None = None,
         *,
+        folder: str | Path | None = None,
         limits: Limits | None = None,
         start: CrossField | None = None,
         stop: Stop | None = None,

@@ -256,7 +256,12 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
         f"HiGHS: MILP for the jumps, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far"
     )
     milp = find_jumps(
-        request.instance, request.folder, limits=limits, start=start, stop=request.stop, **request.options
+        request.instance,
+        folder=request.folder,
+        limits=limits,
+        start=start,
+        stop=request.stop,
+        **request.options,
     )
     yield _of("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
@@ -264,7 +269,7 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
         return
     request.progress("Ipopt: angles for the jumps of the MILP")
     rest = request.limits.until(deadline)
-    yield _of("two-stage", fit_angles(milp.field, request.folder, limits=rest, stop=request.stop))
+    yield _of("two-stage", fit_angles(milp.field, folder=request.folder, limits=rest, stop=request.stop))
 
 
 METHODS: Final = {

@@ -37,8 +37,8 @@ class TwoStage:
 
 def fit_angles(
     field: CrossField,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     stop: Stop | None = None,
 ) -> Solution:
@@ -66,13 +66,13 @@ def fit_angles(
 
     """
     problem = formulate(field.instance, "qp-fixed", p=field.p)
-    return solve(problem, "ipopt", folder, limits=limits, start=field, stop=stop)
+    return solve(problem, "ipopt", folder=folder, limits=limits, start=field, stop=stop)
 
 
 def find_jumps(
     instance: Instance,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
     stop: Stop | None = None,
@@ -88,13 +88,13 @@ def find_jumps(
     start = start or first_field(instance, deadline.share(_STARTING).passed)
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
-    return solve(problem, None, folder, limits=limits.until(deadline), start=start, stop=stop)
+    return solve(problem, None, folder=folder, limits=limits.until(deadline), start=start, stop=stop)
 
 
 def two_stage(
     instance: Instance,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
     stop: Stop | None = None,
@@ -135,8 +135,8 @@ def two_stage(
     limits = Limits.bounded(limits)
     deadline = Deadline.after(limits.time_limit)
     first = limits.until(jumps_until(deadline))
-    milp = find_jumps(instance, folder, limits=first, start=start, stop=stop, **options)
-    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits.until(deadline), stop=stop))
+    milp = find_jumps(instance, folder=folder, limits=first, start=start, stop=stop, **options)
+    return TwoStage(milp, fit_angles(milp.field, folder=folder, limits=limits.until(deadline), stop=stop))
 
 
 def jumps_until(deadline: Deadline) -> Deadline:

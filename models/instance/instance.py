@@ -275,7 +275,9 @@ class Instance(Pictured):
         """The same instance under another gauge."""
         return replace(self, gauge=gauge)
 
-    def with_weights(self, stroke_weight: float | None = None, skew_weight: float | None = None) -> Instance:
+    def with_weights(
+        self, *, stroke_weight: float | None = None, skew_weight: float | None = None
+    ) -> Instance:
         """The same instance under other weights, which mean the same on every grid (docs/weights.md).
 
         stroke_weight, skew_weight: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On

@@ -214,7 +214,9 @@ def everything(instance: Instance, formulation: str, suffix: str, path: Path, jo
 
     names = [formulation] if formulation != "all" else list(FORMULATIONS)
     dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
-    return lambda: write_all(instance, path.with_name("set"), names, dialects=dialects, jobs=jobs)
+    return lambda: write_all(
+        instance, path.with_name("set"), formulations=names, dialects=dialects, jobs=jobs
+    )
 
 
 TITLES = {

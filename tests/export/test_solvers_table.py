@@ -59,7 +59,7 @@ def test_a_solver_that_others_run_is_one_entry(tmp_path: Path, monkeypatch: pyte
     assert set(answers) == set(FORMULATIONS)
     assert answers["milp-mccormick"] == "yes"
     assert "Toy reads no products" in answers["miqcp-bilinear"]
-    write_all(make_instance("hole"), tmp_path, ["milp-mccormick"], ["lp"])
+    write_all(make_instance("hole"), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
     (manifest,) = tmp_path.glob("*.manifest.json")
     assert read_manifest(manifest).document["solvers"]["toy"]["format"] == "lp"
     assert PROGRAMS["cbc"].solvers == ("cbc", "toy")

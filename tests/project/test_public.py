@@ -10,6 +10,7 @@ from types import FunctionType
 
 import crossfield
 import pytest
+from crossfield.models import errors
 
 ROOT = Path(crossfield.__file__).parent
 MODULES = [
@@ -53,6 +54,52 @@ def test_all_steps_from_a_sketch_to_a_picture_are_public():
         "two_stage run greedy_field sample"
     )
     assert set(wanted.split()) <= set(crossfield.__all__)
+
+
+def test_every_error_that_is_raised_on_purpose_is_public():
+    family = {name for name, thing in vars(errors).items() if is_error(thing)}
+    assert len(family) > 10
+    assert family <= set(crossfield.__all__)
+
+
+def is_error(thing):
+    return inspect.isclass(thing) and issubclass(thing, crossfield.CrossfieldError)
+
+
+def test_results_have_the_field_that_was_found():
+    for name in ("Proof", "Report", "Search", "Solution", "TwoStage"):
+        result = getattr(crossfield, name)
+        assert hasattr(result, "field") or "field" in result.__dataclass_fields__, name
+
+
+WORDS = {
+    "limits": {"Limits | None"},
+    "progress": {"Progress"},
+    "stop": {"Stop | None"},
+    "jobs": {"int"},
+    "start": {"CrossField", "CrossField | None"},
+}
+"""What a parameter of a public function is by its name."""
+POSITIONAL = {"hints", "size", "solver"}
+"""Parameters with a default that may be given by position."""
+
+
+def test_one_word_has_one_meaning_and_options_are_keywords():
+    faults = []
+    for name in crossfield.__all__:
+        thing = getattr(crossfield, name)
+        if not inspect.isfunction(thing):
+            continue
+        for number, each in enumerate(inspect.signature(thing).parameters.values()):
+            if each.name in WORDS and each.annotation not in WORDS[each.name]:
+                faults.append((name, each.name, each.annotation))
+            if each.name in {"seconds", "time_limit", "gap", "threads", "over", "deadline"}:
+                faults.append((name, each.name))
+            is_keyword = each.kind in {each.KEYWORD_ONLY, each.VAR_KEYWORD}
+            optional = number > 0 and each.default is not each.empty
+            if optional and not is_keyword and each.name not in POSITIONAL:
+                faults.append((name, each.name, "by position"))
+    assert faults == []
 
 
 def test_type_checkers_see_the_same_names():

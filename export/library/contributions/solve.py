@@ -210,7 +210,7 @@ class _Solving:
         entry, limits = SOLVERS[solver], Limits(self.limit, GAP, 1)
         start = _start(self.library, document, problem) if entry.bundled else None
         with tempfile.TemporaryDirectory(dir=self.folder) as folder:
-            found = self.solvers.solve(problem, solver, folder, limits=limits, start=start)
+            found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
             log = next(Path(folder).glob("*.log"), None)
             if log is None and not found.interrupted:
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")

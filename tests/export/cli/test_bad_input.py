@@ -60,7 +60,7 @@ def instance():
 @pytest.fixture
 def exported(tmp_path, instance):
     """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest; the instance elsewhere."""
-    cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", ["nl", "mps"])
+    cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", formats=["nl", "mps"])
     return tmp_path / "set"
 
 
@@ -419,7 +419,7 @@ def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, 
     write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
     line = refused(*read(tmp_path / "other.sol", manifest, tmp_path / "field.npz"))
     assert line.startswith(f"{tmp_path / 'other.sol'}: ")
-    cf.write_problem(problem, tmp_path / "skew", ["nl"])
+    cf.write_problem(problem, tmp_path / "skew", formats=["nl"])
     other_manifest = tmp_path / "skew" / "skew.milp-mccormick.manifest.json"
     assert "another instance" in refused(*read(good_solution, other_manifest, tmp_path / "field.npz"))
 

@@ -85,7 +85,10 @@ def test_a_weight_means_the_same_on_every_grid():
         np.ones(10),
     )
     energies = []
-    for instance in (coarse.with_weights(3.0, 1e-2), fine.with_weights(3.0, 1e-2)):
+    for instance in (
+        coarse.with_weights(stroke_weight=3.0, skew_weight=1e-2),
+        fine.with_weights(stroke_weight=3.0, skew_weight=1e-2),
+    ):
         scale = 24 / max(instance.mask.shape)
         assert (instance.stroke_coefficient, instance.skew_coefficient) == pytest.approx(
             (3 * scale, 1e-2 * scale**2)

@@ -112,7 +112,9 @@ def test_they_are_written_only_when_asked_for(tmp_path: Path):
     assert DEFAULTS == ("nl", "gms", "lp", "mps")
     problem = make_problem("milp-mccormick", make_instance())
     assert {entry["format"] for entry in write_problem(problem, tmp_path).document["files"]} == set(DEFAULTS)
-    (manifest,) = write_all(problem.instance, tmp_path / "more", ["milp-mccormick"], MORE)
+    (manifest,) = write_all(
+        problem.instance, tmp_path / "more", formulations=["milp-mccormick"], formats=MORE
+    )
     listed = [entry["name"] for entry in manifest.document["files"]]
     assert listed == [f"tiny.milp-mccormick.{suffix}" for suffix in ("mod", "dat", "osil", "qplib", "bar")]
     for entry in read_manifest(manifest.path).document["files"]:
@@ -153,7 +155,7 @@ def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
         f"write_all(sample('skew', 6), sys.argv[1], {chosen!r}, {MORE!r})"
     )
     here = tmp_path / "here"
-    write_all(sample("skew", 6), here, chosen, MORE)
+    write_all(sample("skew", 6), here, formulations=chosen, formats=MORE)
     environment = os.environ | {"PYTHONHASHSEED": "7"}
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "there")], check=True, env=environment)
     files = sorted(path.name for path in here.iterdir())

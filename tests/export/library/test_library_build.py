@@ -583,7 +583,7 @@ def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_byte
 @pytest.mark.slow
 def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
     """Its threads stay in the process, and their number used to make the next run fail in silence."""
-    instance = sample("mouse", 4, "box", stroke_weight=0.2)
+    instance = sample("mouse", 4, gauge="box", stroke_weight=0.2)
     found = []
     for threads in (1, 2):
         highs = highspy.Highs()

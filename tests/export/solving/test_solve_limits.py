@@ -52,7 +52,7 @@ def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
 def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
     instance = cf.sample("skew", 6)
     start, problem = cf.greedy_field(instance), cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
+    found = cf.solve(problem, "highs", folder=tmp_path, start=start, limits=cf.Limits(1e-6))
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
     assert found.bound is None
     assert not list(tmp_path.glob("*.log"))
@@ -63,7 +63,7 @@ def test_an_event_ends_a_solve_with_its_best_point(tmp_path):
     start, asked = cf.greedy_field(cf.sample("bottle", 16)), threading.Event()
     problem = cf.formulate(start.instance, "milp-mccormick")
     asked.set()
-    found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
+    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
     assert found.interrupted
     assert found.objective <= problem.objective_value(problem.point(start)) + 1e-6
     assert found.field.instance.sha256 == start.instance.sha256

@@ -256,7 +256,7 @@ def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, rea
     name, relax = split(label)
     folder = tmp_path / "out"
     with pytest.raises(UnsupportedBySolverError) as caught:
-        cf.solve(formulated(small, name, relax=relax), solver, folder)
+        cf.solve(formulated(small, name, relax=relax), solver, folder=folder)
     assert reason in str(caught.value)
     assert name in str(caught.value)
     assert solver in str(caught.value)
@@ -348,7 +348,7 @@ def test_without_a_start_and_time_there_is_no_point(tmp_path):
     instance = cf.sample("mouse", 30)
     (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
     problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(1e-6))
+    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(1e-6))
     assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
     with pytest.raises(SolutionError, match="left no answer within its time; give it more, or a start"):
         _ = found.field
@@ -397,7 +397,7 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
         monkeypatch,
     )
     problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path / "files", limits=cf.Limits(2.0), start=start)
+    found = cf.solve(problem, "highs", folder=tmp_path / "files", limits=cf.Limits(2.0), start=start)
     assert found.status == Status.LIMIT_WITH_POINT
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
     assert not list((tmp_path / "files").glob("*.start"))
@@ -420,7 +420,7 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         found = cf.solve(
-            problem, "highs", files, limits=cf.Limits(2.0), start=cf.greedy_field(problem.instance)
+            problem, "highs", folder=files, limits=cf.Limits(2.0), start=cf.greedy_field(problem.instance)
         )
     finally:
         signal.signal(signal.SIGINT, before)
@@ -430,7 +430,7 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
     problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
-    cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
+    cf.solve(problem, "highs", folder=tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
     log = (tmp_path / "mouse.milp-mccormick.highs.log").read_text()
     claimed = re.search(r"MIP start solution is feasible, objective value is (\S+)", log)
     assert float(claimed[1]) == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
@@ -473,11 +473,11 @@ def test_a_wide_gap_ends_the_search_early(hard):
 def test_threads_may_change_from_solve_to_solve(tmp_path, small):
     problem = cf.formulate(small, "milp-mccormick")
     found = [
-        cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=threads)).objective
+        cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=threads)).objective
         for threads in (1, 2, 1, 0)
     ]
     assert found == pytest.approx([found[0]] * 4, abs=1e-7)
-    cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=1))
+    cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=1))
     assert "threads" in (tmp_path / "random_1.milp-mccormick.highs.log").read_text().lower()
 
 
@@ -513,7 +513,7 @@ def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):
 def test_what_is_solved_is_the_file(tmp_path, small):
     """Another bound in the file would show: the solvers see nothing else."""
     problem = formulated(small, "qp-fixed")
-    solution = cf.solve(problem, "ipopt", tmp_path)
+    solution = cf.solve(problem, "ipopt", folder=tmp_path)
     stem = tmp_path / "random_1.qp-fixed"
     left = {path for path in tmp_path.iterdir() if "instance" not in path.name}
     assert {path.name.removeprefix(stem.name) for path in left} == {
@@ -528,7 +528,7 @@ def test_what_is_solved_is_the_file(tmp_path, small):
 
 def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, monkeypatch):
     problem = formulated(small, "qp-fixed")
-    cf.solve(problem, "ipopt", tmp_path)
+    cf.solve(problem, "ipopt", folder=tmp_path)
     answer = tmp_path / "random_1.qp-fixed.ipopt.sol"
     assert answer.exists()
     broken = tmp_path / "broken"
@@ -536,7 +536,7 @@ def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, mon
     (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
     monkeypatch.setenv("PYTHONPATH", str(broken))
     with pytest.raises(SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"):
-        cf.solve(problem, "ipopt", tmp_path)
+        cf.solve(problem, "ipopt", folder=tmp_path)
     assert not answer.exists()
 
 

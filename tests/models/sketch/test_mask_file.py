@@ -112,5 +112,5 @@ def test_what_the_reader_says_is_no_part_of_the_instance(tmp_path):
     again = cf.read_instance(cf.write_instance(instance, tmp_path / "a.json"))
     assert again.sha256 == instance.sha256
     assert again.reading is None
-    assert instance.with_gauge("box").with_weights(2.0).reading is instance.reading
+    assert instance.with_gauge("box").with_weights(stroke_weight=2.0).reading is instance.reading
     assert instance.turned().reading is None
