@@ -346,7 +346,7 @@ def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progre
     return report
 
 
-def _shaded(report: Report, folder: Path, progress: Progress, stop: Over) -> Report:
+def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never) -> Report:
     """The report with the surface over its field, which is drawn if nothing speaks against it."""
     deadline = Deadline.after(LONGEST_LIFT)
     try:

@@ -24,7 +24,7 @@ def test_bound_and_energy_are_the_optimum_that_highs_proves():
         instance = random_instance(seed, (2 + seed % 3,) * 2, strokes=(2 + seed % 3) ** 2)
         proof = cf.prove(instance, norm=1, jobs=1)
         optimum = cf.solve(
-            cf.formulate(instance, "milp-mccormick"), "highs", limits=cf.Limits(seconds=100, gap=1e-9)
+            cf.formulate(instance, "milp-mccormick"), "highs", limits=cf.Limits(100, gap=1e-9)
         ).objective
         assert proof.bound <= optimum + 1e-9, seed
         assert proof.energy >= optimum - 1e-7, seed
