@@ -1,6 +1,19 @@
 """From a concept sketch to optimization instances, and from solvers' answers back to a cross field.
 
-The verbs are imported on first use, so that `import crossfield` itself takes milliseconds.
+All public names are here, the errors too: every error that crossfield raises on purpose is a
+`CrossfieldError`. Names are imported on first use, so that `import crossfield` itself takes milliseconds.
+
+Options are keywords, and one word has one meaning in every function:
+
+- `limits`: a `Limits` with the time limit in seconds, the relative gap, and the threads.
+- `jobs`: number of processes, or of files written at the same time; `threads`, in `Limits`, are those inside
+  one solver.
+- `progress`: a function that receives lines of text.
+- `stop`: a function without arguments that returns whether to stop, or an event such as `threading.Event`.
+  The work then ends early and returns the best result so far.
+- `start`: a field to begin with.
+
+Results have the field that was found as `.field`: `Search`, `Proof`, `Solution`, `TwoStage` and `Report`.
 """
 
 from __future__ import annotations
@@ -22,30 +35,44 @@ if TYPE_CHECKING:
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
     from .export.solving.evaluate import evaluate as evaluate
-    from .export.solving.limits import Limits as Limits
     from .export.solving.local import solve as solve
+    from .export.solving.run import Report as Report
     from .export.solving.run import run as run
+    from .export.solving.two_stage import TwoStage as TwoStage
     from .export.solving.two_stage import fit_angles as fit_angles
     from .export.solving.two_stage import two_stage as two_stage
     from .export.surfaces.files import write_surface as write_surface
+    from .models.errors import ConsistencyError as ConsistencyError
     from .models.errors import CrossfieldError as CrossfieldError
+    from .models.errors import FormulationError as FormulationError
+    from .models.errors import InputError as InputError
+    from .models.errors import InstanceError as InstanceError
+    from .models.errors import MissingSolverError as MissingSolverError
+    from .models.errors import NoStrokeError as NoStrokeError
+    from .models.errors import OutputError as OutputError
+    from .models.errors import SolutionError as SolutionError
+    from .models.errors import SolverError as SolverError
+    from .models.errors import UnsupportedByFormatError as UnsupportedByFormatError
+    from .models.errors import UnsupportedBySolverError as UnsupportedBySolverError
     from .models.field.field import CrossField as CrossField
     from .models.field.file import read_field as read_field
     from .models.field.file import write_field as write_field
+    from .models.formulations.arrays import ProblemArrays as ProblemArrays
     from .models.formulations.problem import Problem as Problem
     from .models.formulations.problem import formulate as formulate
     from .models.formulations.problem import with_integers_fixed as with_integers_fixed
     from .models.instance.file import read_instance as read_instance
     from .models.instance.file import write_instance as write_instance
     from .models.instance.instance import Instance as Instance
+    from .models.processes.limits import Limits as Limits
     from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
     from .models.proof.certificate import write_certificate as write_certificate
     from .models.proof.dual_start import search as search
     from .models.proof.prove import prove as prove
     from .models.proof.record import Proof as Proof
-    from .models.search.greedy import greedy as greedy
-    from .models.search.improvement import improved as improved
+    from .models.search.greedy import greedy_field as greedy_field
+    from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
     from .models.sketch.read import read_sketch as read_sketch
     from .models.sketch.samples import sample as sample
@@ -60,26 +87,40 @@ if TYPE_CHECKING:
 
 _HOME: Final = {
     "Certificate": ".models.proof.certificate",
+    "ConsistencyError": ".models.errors",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "Evaluation": ".export.solving.evaluate",
+    "FormulationError": ".models.errors",
     "Hint": ".models.surface.hints",
+    "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
+    "InstanceError": ".models.errors",
     "Light": ".export.shading.light",
-    "Limits": ".export.solving.limits",
+    "Limits": ".models.processes.limits",
+    "MissingSolverError": ".models.errors",
+    "NoStrokeError": ".models.errors",
+    "OutputError": ".models.errors",
     "Problem": ".models.formulations.problem",
+    "ProblemArrays": ".models.formulations.arrays",
     "Proof": ".models.proof.record",
+    "Report": ".export.solving.run",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
+    "SolutionError": ".models.errors",
+    "SolverError": ".models.errors",
     "Surface": ".models.surface.surface",
+    "TwoStage": ".export.solving.two_stage",
+    "UnsupportedByFormatError": ".models.errors",
+    "UnsupportedBySolverError": ".models.errors",
     "analytic": ".models.sketch.surfaces",
     "bend_field": ".models.smooth.bend",
     "draw": ".export.pictures.draw",
     "evaluate": ".export.solving.evaluate",
     "fit_angles": ".export.solving.two_stage",
     "formulate": ".models.formulations.problem",
-    "greedy": ".models.search.greedy",
-    "improved": ".models.search.improvement",
+    "greedy_field": ".models.search.greedy",
+    "improved_field": ".models.search.improvement",
     "polyvector_field": ".models.smooth.polyvector",
     "power_field": ".models.smooth.power_field",
     "preview": ".export.pictures.draw",

@@ -46,7 +46,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
     Sum of p1 over F minus that over C - F <= |F| - 1 + (2/pi) sum of s over C. If the sum of the p1 round C
     is odd, so is the sum of the jumps, the crosses turn, and the |A| round C add up to at least pi/2.
     """
-    p1, s = (np.arange(problem.columns)[problem.blocks[name].columns] for name in ("p1", "s"))
+    p1, s = (np.arange(problem.n_columns)[problem.blocks[name].slice] for name in ("p1", "s"))
     for quad in problem.instance.grid.quads:
         for subset in range(16):
             inside = np.array([subset >> place & 1 for place in range(4)])
@@ -59,7 +59,7 @@ def odd_cycles(problem: Problem, model: highspy.Highs) -> None:
 def bounds(problem: Problem, model: highspy.Highs) -> None:
     """Bound s and t by pi/2: the two nearest jumps make |A| smaller, and |beta| is at most pi/4."""
     for name in ("s", "t"):
-        for column in range(problem.columns)[problem.blocks[name].columns]:
+        for column in range(problem.n_columns)[problem.blocks[name].slice]:
             model.changeColBounds(column, 0.0, np.pi / 2)
 
 

@@ -200,7 +200,7 @@ def row(sketch: Sketch, size: int, seconds: float, folder: Path) -> Row:
     here = place(folder, sketch, size)
     facts = [solved(sketch, size, method, seconds, here / method) for method in ("greedy", "power", "search")]
     greedy = cf.read_field(field_in(here / "greedy"))
-    found = Row(sketch, size, greedy.instance.grid.size, *facts, cf.improved(greedy).energy().total)
+    found = Row(sketch, size, greedy.instance.grid.size, *facts, cf.improved_field(greedy).energy().total)
     print(*found.cells(), file=sys.stderr, flush=True)
     return found
 
@@ -236,7 +236,7 @@ def best_angles(sketch: Sketch, folder: Path) -> list[str]:
     begin = time.perf_counter()
     ours = fitted(large).energy().total
     took = time.perf_counter() - begin
-    small = cold(cf.greedy(sketch.instance(IPOPT_SIZE)))
+    small = cold(cf.greedy_field(sketch.instance(IPOPT_SIZE)))
     ipopt = cf.fit_angles(small, limits=cf.Limits(seconds)).field.energy().total
     cells = [
         sketch.name,
@@ -288,7 +288,7 @@ def proofs() -> str:
         begin = time.perf_counter()
         field = cf.search(instance, rounds=40).field
         seconds = time.perf_counter() - begin
-        greedy, found = cf.greedy(instance).energy().total, field.energy().total
+        greedy, found = cf.greedy_field(instance).energy().total, field.energy().total
         best, bound = optimum(instance, field)
         same = best is not None and abs(found - best.objective) <= 1e-6 * max(1, found)
         proven += best is not None
@@ -321,7 +321,7 @@ def optimum(
     """The check of the first prover that closes `miqp-exact`, or None, and the best dual bound of all."""
     bounds = []
     with tempfile.TemporaryDirectory() as folder:
-        write_all(instance, folder, ["miqp-exact"], ["mps", "nl"], start=start)
+        write_all(instance, folder, formulations=["miqp-exact"], formats=["mps", "nl"], start=start)
         for prover in provers:
             for check in verify(folder, seconds=PROOF_SECONDS, programs=[prover]).checks:
                 if check.step == "solve" and check.proven:

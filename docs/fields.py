@@ -100,7 +100,7 @@ def weights(task: Task) -> Rows:
 
 def strokes(task: Task) -> Rows:
     """The share of the stroke pixels of a drawing that greedy fields miss by more than OFF, by weight."""
-    fields = [cf.greedy(task.instance.with_weights(stroke_weight=w)) for w in TRIED]
+    fields = [cf.greedy_field(task.instance.with_weights(stroke_weight=w)) for w in TRIED]
     return [
         {"drawing": task.name, "size": task.size, "weight": w, "off": round(missing(field), 5)}
         for w, field in zip(TRIED, fields, strict=True)
@@ -114,7 +114,7 @@ def surfaces(task: Task) -> Rows:
     for w in TRIED:
         errors = []
         for seed in range(SEEDS if task.noise else 1):
-            field = cf.greedy(noisy(truth.instance, task.noise, seed).with_weights(stroke_weight=w))
+            field = cf.greedy_field(noisy(truth.instance, task.noise, seed).with_weights(stroke_weight=w))
             errors.append(np.degrees(field.cross_error(truth.u_angle, truth.v_angle)).mean())
         facts = {"surface": task.name, "size": task.size, "noise": task.noise, "weight": w}
         rows.append(facts | {"error": round(float(np.mean(errors)), 3)})

@@ -97,7 +97,7 @@ prints it. Sections and numbers in brackets are those of the paper."""
 def methods(instance: Instance) -> Iterator[Candidate]:
     """Every field that a run considers, by method."""
     with tempfile.TemporaryDirectory() as folder:
-        request = Request(instance, Path(folder), cf.Limits(seconds=SECONDS))
+        request = Request(instance, Path(folder), cf.Limits(SECONDS))
         for method in METHODS.values():
             yield from method.find(request)
 
@@ -192,7 +192,7 @@ def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes"
 def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
     """The solution of a formulation, started at the greedy baseline."""
     return cf.solve(
-        cf.formulate(instance, name, **options), start=cf.greedy(instance), limits=cf.Limits(120.0)
+        cf.formulate(instance, name, **options), start=cf.greedy_field(instance), limits=cf.Limits(120.0)
     )
 
 

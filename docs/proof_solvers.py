@@ -141,7 +141,7 @@ def fits(problem: Problem, solver: str) -> bool:
         return True
     most, most_quadratic = FREE[solver]
     linear = problem.objective_degree == 1
-    return max(problem.columns, problem.row_count) <= most and (linear or problem.columns <= most_quadratic)
+    return max(problem.n_columns, problem.n_rows) <= most and (linear or problem.n_columns <= most_quadratic)
 
 
 def largest(name: str, size: int, formulation: str, solver: str) -> Instance:
@@ -208,12 +208,14 @@ USES: Final = (
 def certificate(instance: Instance, seconds: float) -> Certificate:
     """The certificate of an instance."""
     with tempfile.TemporaryDirectory() as folder:
-        return write_certificate(prove(instance, seconds=seconds), Path(folder) / "certificate.npz")
+        return write_certificate(
+            prove(instance, limits=cf.Limits(seconds, gap=0)), Path(folder) / "certificate.npz"
+        )
 
 
 def here(instance: Instance, norm: Norm, seconds: float) -> Answer:
     """Result of `crossfield prove` for an instance, in the norm that a formulation minimises."""
-    proof = prove(instance, norm=norm, seconds=seconds)
+    proof = prove(instance, norm=norm, limits=cf.Limits(seconds, gap=0))
     return Answer(proof.energy, proof.bound, 0, proof.seconds)
 
 
@@ -232,7 +234,7 @@ def both(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator
         row = {
             "name": name, "width": instance.grid.width, "height": instance.grid.height,
             "pixels": instance.grid.size, "solver": solver, "formulation": formulation,
-            "columns": cold.columns, "rows": cold.row_count, "seconds": seconds,
+            "columns": cold.n_columns, "rows": cold.n_rows, "seconds": seconds,
             "energy": proof.energy, "proof": proof.bound, "status": proof.status,
             "free_jumps": int((narrow.data["p_min"] < narrow.data["p_max"]).sum()),
             "pairs": len(instance.grid.first),

@@ -29,9 +29,11 @@ from typing import Any, Final
 import proof_pictures
 import proof_solvers
 from crossfield.export.solvers_table import SOLVERS
+from crossfield.models.processes.limits import Limits
 from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.prove import MOST_LABELS, prove
+from crossfield.models.proof.prove import prove
+from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES
 from energies import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import generated, markdown
@@ -116,7 +118,7 @@ def optima(request: Request) -> Iterator[tuple[str, Facts]]:
     for instance in tiny():
         if not request.wants(instance.name):
             continue
-        proof = prove(instance, seconds=request.seconds)
+        proof = prove(instance, limits=Limits(request.seconds, gap=0))
         best, _ = optimum(instance, proof.field, (*PROVERS, "casadi"))
         yield instance.name, {
             "grid": f"{instance.grid.width} x {instance.grid.height}",
@@ -142,7 +144,7 @@ def settings(request: Request) -> Iterator[tuple[str, Facts]]:
 
 def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     """The pictures of the crosses left at every level."""
-    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), seconds=request.seconds)
+    proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), limits=Limits(request.seconds, gap=0))
     certificate = write_certificate(proof, request.work / f"{PICTURED}.certificate.npz")
     proof_pictures.maps(proof, certificate.verdict.boxes, DOCS / "pictures" / "proof_levels.png")
     pixels = proof_pictures.strips(proof, DOCS / "pictures" / "proof_strips.png")

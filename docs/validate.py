@@ -71,9 +71,9 @@ class Run:
 def run(gauge: Gauge, facet: str, formulations: tuple[str, ...], seconds: float) -> Run:
     """The verification of the instance's files, solves included."""
     instance = instance_of(gauge)
-    best = cf.solve(cf.formulate(instance, "milp-mccormick"), start=cf.greedy(instance)).field
+    best = cf.solve(cf.formulate(instance, "milp-mccormick"), start=cf.greedy_field(instance)).field
     with tempfile.TemporaryDirectory() as folder:
-        write_all(instance, folder, formulations, start=best, options={"facet": facet})
+        write_all(instance, folder, formulations=formulations, start=best, options={"facet": facet})
         found = verify(folder, seconds=seconds, progress=lambda words: print(words, file=sys.stderr))
     return Run(gauge, facet, found)
 

@@ -50,7 +50,7 @@ def instance_of(run: Run, folder: Path | None) -> Instance:
         found = noisy(surface(run.instance, run.size).instance, run.noise, run.seed)
     else:
         found = drawing(run.instance, run.size, folder) if run.hidden < 0 else hidden(run, folder).rest
-    return found.with_weights(run.w_strokes, run.w_beta)
+    return found.with_weights(stroke_weight=run.w_strokes, skew_weight=run.w_beta)
 
 
 def error(run: Run, field: CrossField, folder: Path | None) -> float | None:
@@ -85,12 +85,12 @@ def _field(run: Run, instance: Instance) -> Found:
     if run.way in PLAIN:
         return PLAIN[run.way](instance), {}
     if run.way == "search":
-        return cf.search(instance, seconds=run.limit, jobs=1, seed=run.seed).field, {}
+        return cf.search(instance, limits=cf.Limits(run.limit), jobs=1, seed=run.seed).field, {}
     return _by_method(run, instance)
 
 
 def _proven(run: Run, instance: Instance) -> Found:
-    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, seconds=run.limit, jobs=1)
+    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, limits=cf.Limits(run.limit, gap=0), jobs=1)
     return proof.field, {"status": proof.status, "bound": proof.bound, "note": proof.ended}
 
 
@@ -106,7 +106,7 @@ def _by_method(run: Run, instance: Instance) -> Found:
 
 def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
     """A local optimum near the greedy field: random crosses at some pixels, best jumps, then best angles."""
-    field, rng = cf.greedy(instance), np.random.default_rng([3, seed])
+    field, rng = cf.greedy_field(instance), np.random.default_rng([3, seed])
     chosen = rng.random(instance.grid.size) < share
     alpha = np.where(chosen, rng.uniform(0, np.pi, instance.grid.size), field.alpha)
     moved = relabelled(instance, alpha, np.where(chosen, 0.0, field.beta), field.p)
@@ -114,8 +114,8 @@ def perturbed(instance: Instance, share: float, seed: int) -> CrossField:
 
 
 PLAIN: Final[dict[str, Callable[[Instance], CrossField]]] = {
-    "greedy": cf.greedy,
-    "improved": lambda instance: cf.improved(cf.greedy(instance)),
+    "greedy": cf.greedy_field,
+    "improved": lambda instance: cf.improved_field(cf.greedy_field(instance)),
     "power": lambda instance: fitted(cf.power_field(instance)),
     "polyvector": lambda instance: fitted(cf.polyvector_field(instance)),
     "bend": lambda instance: cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS))),

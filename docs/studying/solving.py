@@ -55,15 +55,15 @@ def programs() -> Solvers:
 
 @lru_cache(maxsize=4)
 def greedy(name: str, size: int) -> CrossField:
-    """The greedy field of an instance, with the best angles: the source of starts and given jumps."""
-    return cf.greedy(made(name, size))
+    """The greedy field of an instance, with the best angles: where starts and given jumps come from."""
+    return cf.greedy_field(made(name, size))
 
 
 @lru_cache(maxsize=4)
 def windows(name: str, size: int, seconds: float) -> Windows:
     """The windows of a certificate of an instance."""
     with tempfile.TemporaryDirectory(prefix="crossfield-study-") as folder:
-        proof = cf.prove(made(name, size), seconds=seconds, jobs=1)
+        proof = cf.prove(made(name, size), limits=cf.Limits(seconds, gap=0), jobs=1)
         return windows_left(cf.write_certificate(proof, Path(folder) / "a.certificate.npz"))
 
 
@@ -90,8 +90,8 @@ def solved(run: Run) -> dict[str, Any]:
         "version": programs().version(run.solver),
         "format": format_for(problem, run.solver).format,
         **sizes(problem.instance),
-        "columns": problem.columns,
-        "rows": problem.row_count,
+        "columns": problem.n_columns,
+        "rows": problem.n_rows,
     }
     try:
         found = programs().solve(problem, run.solver, limits=cf.Limits(run.limit, GAP, 1), start=start)
@@ -120,7 +120,9 @@ def proved(run: Run) -> dict[str, Any]:
     if run.way == ANGLES:
         energy = fitted(greedy(run.instance, run.size)).energy().total
         return facts | {"status": "optimal", "objective": energy, "bound": energy}
-    proof = cf.prove(instance, norm=1 if run.norm == 1 else 2, seconds=run.limit, jobs=1, seed=run.seed)
+    proof = cf.prove(
+        instance, norm=1 if run.norm == 1 else 2, limits=cf.Limits(run.limit, gap=0), jobs=1, seed=run.seed
+    )
     facts |= {"status": proof.status, "objective": proof.energy, "bound": proof.bound}
     return facts | {"seconds": proof.seconds, "note": proof.ended, **energies(proof.field)}
 

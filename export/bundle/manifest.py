@@ -35,6 +35,7 @@ from ...models.input_limits import MAX_BYTES
 from ...models.instance.file import check_schema, check_version, parse_json, read_instance, write_instance
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
+from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import checked
 from ...models.storage import make_folder, read_bytes, write_bytes
 from ..formats.registry import DEFAULTS, FORMATS, Written, generator, write
@@ -133,8 +134,8 @@ def read_manifest(path: str | Path) -> Manifest:
 def write_problem(
     problem: Problem,
     folder: str | Path,
-    formats: Iterable[str] = DEFAULTS,
     *,
+    formats: Iterable[str] = DEFAULTS,
     start: CrossField | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
@@ -157,9 +158,9 @@ def write_problem(
 def write_all(
     instance: Instance,
     folder: str | Path,
+    *,
     formulations: Iterable[str] = tuple(FORMULATIONS),
     formats: Iterable[str] = DEFAULTS,
-    *,
     start: CrossField | None = None,
     jumps_of: CrossField | None = None,
     windows: Windows | None = None,
@@ -167,7 +168,7 @@ def write_all(
     dialects: dict[str, str] | None = None,
     compress: bool = False,
     jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = silent,
 ) -> list[Manifest]:
     """Write every formulation in every format that carries it, and return the manifests.
 
@@ -355,10 +356,10 @@ def _document(
         "class": problem.problem_class,
         "convex": problem.convex,
         "counts": {
-            "columns": problem.columns,
+            "columns": problem.n_columns,
             "binary": sum(block.count for block in form.blocks("binary")),
             "integer": sum(block.count for block in form.blocks("integer")),
-            "rows": problem.row_count,
+            "rows": problem.n_rows,
             "pixels": instance.grid.size,
             "pairs": len(instance.grid.first),
             "stroke_pixels": len(instance.theta),

@@ -87,7 +87,7 @@ def _cplex(start: Start) -> Iterator[bytes]:
         f'<header problemName={name} solutionName="start" solutionIndex="0" MIPStartEffortLevel="4"/>\n'
         "<variables>\n"
     ).encode()
-    count = start.problem.columns
+    count = start.problem.n_columns
     names, index, values = start.form.names.all, Decimals(np.arange(count)), words(start.point)
     parts: Pieces = [b'<variable name="', names, b'" index="', index, b'" value="', values, b'"/>\n']
     yield from render(parts, count)

@@ -120,7 +120,7 @@ def run_command(
     The methods are {methods}. The field of bend is kept; the field of minimum 2-norm energy is written too.
     report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
     """
-    from ..solving.limits import Limits
+    from ...models.processes.limits import Limits
     from ..solving.run import plan, run
 
     limits = Limits(time_limit, gap, threads)
@@ -201,8 +201,8 @@ def export_command(
         manifests = write_all(
             instance,
             output,
-            formulations,
-            formats,
+            formulations=formulations,
+            formats=formats,
             start=field,
             jumps_of=None if proof is None else proof.field,
             windows=None if proof is None else windows_left(proof),
@@ -282,7 +282,7 @@ def draw_command(
         show("reading")
         subject = field_or_instance(source, on)
         show("drawing")
-        draw(subject, output, kind=kind, over=underlay, title=title)
+        draw(subject, output, kind=kind, underlay=underlay, title=title)
     if not quiet:
         print_line(str(output))
 

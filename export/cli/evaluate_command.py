@@ -30,8 +30,8 @@ def evaluate_command(
     The measure is the mean angle between the hidden curve and the nearer line of the field computed from
     the other curves. Random crosses have 22.5 degrees. Ctrl-C keeps the curves done so far.
     """
+    from ...models.processes.limits import Limits
     from ..solving.evaluate import DEFAULT_METHODS, evaluate
-    from ..solving.limits import Limits
     from ..solving.methods import METHODS
 
     methods = known(method or list(DEFAULT_METHODS), METHODS, "method")

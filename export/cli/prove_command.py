@@ -49,6 +49,7 @@ def prove_command(
     if source is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.processes.deadline import Deadline
+    from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
 
     with progress(quiet=printing.quiet) as show:
@@ -59,12 +60,9 @@ def prove_command(
             instance,
             norm=cast("NormOfField", norm),
             start=read_start(start, instance),
-            seconds=deadline,
+            limits=Limits(time_limit, gap).until(deadline),
             certified=True,
-            gap=gap,
-            progress=lambda bound, energy, labels: show(
-                f"bound {bound:.6f}, energy {energy:.6f}, {labels} labels; Ctrl-C keeps them"
-            ),
+            progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
         )
         show("writing and checking the certificate")
         document = _write(proof, output, deadline)

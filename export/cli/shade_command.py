@@ -99,7 +99,7 @@ def _saved(source: str, on: Path | None) -> CrossField | None:
 
 def _made(instance: Instance, method: str | None, folder: Path, seconds: float, show: Progress) -> Candidate:
     """Final field of a method. Raises InputError for an unknown method."""
-    from ..solving.limits import Limits
+    from ...models.processes.limits import Limits
     from ..solving.methods import METHODS, Request
     from ..solving.run import KEPT
 

@@ -107,7 +107,9 @@ class SketchOptions:
         from ...models.memory import available_memory
         from ...models.sketch.read import check_memory
 
-        instance = self._read(what).with_weights(self.stroke_weight, self.skew_weight)
+        instance = self._read(what).with_weights(
+            stroke_weight=self.stroke_weight, skew_weight=self.skew_weight
+        )
         check_memory(int(np.count_nonzero(instance.mask)), available_memory())
         print_warnings(instance, quiet=quiet)
         return instance
@@ -146,7 +148,7 @@ class SketchOptions:
                 f"the sample {name} has its own curvature lines; leave --curvature and --view out"
             )
         size = DEFAULT_SIZE if self.size is None else self.size
-        return sample(name, size, self.gauge or "strokes", silhouette=self.silhouette)
+        return sample(name, size, gauge=self.gauge or "strokes", silhouette=self.silhouette)
 
     def _saved(self, path: Path) -> Instance:
         from ...models.instance.file import read_instance

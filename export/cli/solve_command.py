@@ -53,7 +53,7 @@ def solve_command(
     approximate field, unless --start gives another. Ctrl-C ends the search and keeps the best field so far.
     """
     deadline = Deadline.after(time_limit)  # the time to load libraries counts
-    from ..solving.limits import Limits
+    from ...models.processes.limits import Limits
     from ..solving.methods import Request
 
     if (formulation is None) == (method is None):
@@ -124,13 +124,13 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
     from ..solving.local import solve
 
     (name,) = formulations_of([name])
-    instance, deadline = request.instance, Deadline.after(request.limits.seconds)
+    instance, deadline = request.instance, Deadline.after(request.limits.time_limit)
     request.progress("greedy start")
     start = request.begin(deadline)
     problem = formulate(instance, name, p=fixed_jumps(instance, name, start), **request.options)
     limits = request.limits.until(deadline)
-    request.progress(f"solving {name}, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, solver, request.folder, limits=limits, start=start)
+    request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")
+    solution = solve(problem, solver, folder=request.folder, limits=limits, start=start)
     target = request.folder / f"{instance.name}.{name}.field.npz"
     if solution.point is None or solution.doubt:
         target.unlink(missing_ok=True)  # a field of an earlier call is not the result of this one

@@ -30,14 +30,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.names import name_length
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, Variable, elements, pixel_of
 from ...models.instance.grid import Ints
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.counting import Expected, check
-from ..writing.names import name_length
 from ..writing.records import Counted, Decimals, Pieces, Words, number, render, table, words
 from .indexed import Indexed, check_indexed, described, narrowed
 

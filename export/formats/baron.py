@@ -28,7 +28,8 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical, Kind, coefficient
 from ..writing.counting import Expected, check
@@ -136,5 +137,5 @@ def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
     yield b"STARTING_POINT{\n"
     for block in problem.blocks.values():
         if block.count:
-            yield from _assigned(names.of(block), start[block.columns])
+            yield from _assigned(names.of(block), start[block.slice])
     yield b"}\n"

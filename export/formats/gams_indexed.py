@@ -26,15 +26,16 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.names import Bytes, element_names
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, Variable, elements
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.counting import Expected, check
-from ..writing.names import element_names
-from ..writing.records import Bytes, Counted, Piece, Words, number, render, words
+from ..writing.records import Counted, Piece, Words, number, render, words
 from .gams_scalar import MODEL_TYPES, SENSES, power
 from .indexed import Indexed, check_indexed, described, narrowed
 
@@ -153,7 +154,7 @@ def _start(problem: Problem, start: Floats) -> Iterator[bytes]:
     for block in problem.blocks.values():
         if block.count:
             yield f"Parameter start_{block.name}({DOMAINS[block.over]}) /\n".encode()
-            level = words(start[block.columns])
+            level = words(start[block.slice])
             key = Words(keys(problem.instance, block.over), None)
             yield from render([key, b" ", level, b"\n"], block.count)
             over = SETS[block.over]

@@ -35,7 +35,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...templates import stream
 from ..writing.canonical import Canonical
@@ -234,7 +235,7 @@ def _bound_parts(block: Block, names: Names, at: NDArray[Any], suffixes: tuple[s
 
 def _start(problem: Problem, names: Names, start: Floats) -> Iterator[bytes]:
     for block in problem.blocks.values():
-        level = words(start[block.columns])
+        level = words(start[block.slice])
         yield from render([names.of(block), b".l = ", level, b";\n"], block.count)
 
 

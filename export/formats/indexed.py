@@ -9,7 +9,8 @@ from typing import ClassVar, Final
 import sympy as sp
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.problem import PlacedFamily, Problem
+from ...models.formulations.families import PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SCALARS, SLOTS, IndexSet
 from ..writing.expressions import Language, wrapped
 from ..writing.records import Piece, check_coefficients

@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from ...models.formulations.problem import Block, PlacedFamily
+from ...models.formulations.families import Block, PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
@@ -71,7 +71,7 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
 def _objective(form: Canonical, products: tuple[Ints, Floats], counts: Counter[str]) -> Iterator[bytes]:
     names = form.names
     for block in form.problem.blocks.values():
-        cost = words(scalar_when_constant(form.costs[block.columns]), signed)
+        cost = words(scalar_when_constant(form.costs[block.slice]), signed)
         counted, name = Counted(counts, "linear costs", cost), Counted(counts, "columns", names.of(block))
         yield from render([b" ", counted, b" ", name, b"\n"], block.count)
     index, factor = products

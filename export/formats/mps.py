@@ -24,7 +24,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import SLOTS
 from ...models.instance.grid import Bools, Floats, Grid, Ints
 from ..writing.canonical import Canonical, coefficient
@@ -84,7 +85,7 @@ def _columns(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
-            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.columns]))
+            name, cost = names.of(block), words(scalar_when_constant(form.costs[block.slice]))
             entries = [
                 entry
                 for family in problem.rows

@@ -31,12 +31,13 @@ from typing import Any, Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Monomial, PlacedFamily
+from ...models.formulations.families import Monomial, PlacedFamily
+from ...models.formulations.names import name_length
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
 from ..writing.expressions import is_data, split
-from ..writing.names import OBJECTIVE, name_length
+from ..writing.names import OBJECTIVE
 from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
     Counted,
@@ -174,9 +175,9 @@ def generate(form: Canonical, *, binary: bool = False, start: Floats | None = No
         first += family.count
     yield from _objective(layout, code)
     if start is not None:
-        yield from _once(code, code.segment(b"x", problem.columns))
-        parts = code.entry(np.arange(problem.columns, dtype=np.int32), code.number(start[layout.order]))
-        yield from render(parts, problem.columns, padded=code.padded)
+        yield from _once(code, code.segment(b"x", problem.n_columns))
+        parts = code.entry(np.arange(problem.n_columns, dtype=np.int32), code.number(start[layout.order]))
+        yield from render(parts, problem.n_columns, padded=code.padded)
     yield from _limits(layout, code)
     yield from _bounds(layout, code)
     yield from _jacobian(layout, code)
@@ -203,7 +204,7 @@ def _header(layout: Layout, code: Encoder) -> bytes:
     columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
         code.letter + b"3 1 1 0",
-        b" %d %d 1 0 %d" % (problem.columns, problem.row_count, equations),
+        b" %d %d 1 0 %d" % (problem.n_columns, problem.n_rows, equations),
         b" %d %d" % (sum(family.count for family in layout.nonlinear_rows), bool(layout.nonlinear_objective)),
         b" 0 0",
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
@@ -318,7 +319,7 @@ def _entries(family: PlacedFamily) -> list[tuple[sp.Symbol, Floats | float]]:
 def _gradient(layout: Layout) -> tuple[Ints, Floats]:
     """Places and coefficients of G: costs of linear terms, and 0 for columns of nonlinear ones."""
     problem = layout.problem
-    costs = np.zeros(problem.columns)
+    costs = np.zeros(problem.n_columns)
     for family in problem.objective:
         if family.degree <= 1:
             for term in family.of_degree(1):
@@ -332,15 +333,15 @@ def _jacobian(layout: Layout, code: Encoder) -> Iterator[bytes]:
     problem = layout.problem
     rows = [(family, _entries(family)) for family in layout.rows]
     if rows:
-        count = np.zeros(problem.columns, dtype=np.int32)
+        count = np.zeros(problem.n_columns, dtype=np.int32)
         for family, entries in rows:
             for symbol, _ in entries:
                 block, inside = family.block(symbol), family.inside(symbol)
-                count[block.columns] += 1 if inside is None else np.bincount(inside, minlength=block.count)
-        yield from _once(code, code.segment(b"k", problem.columns - 1))
+                count[block.slice] += 1 if inside is None else np.bincount(inside, minlength=block.count)
+        yield from _once(code, code.segment(b"k", problem.n_columns - 1))
         yield from render(
             code.integer(np.cumsum(count[layout.order])[:-1].astype(np.int32)),
-            problem.columns - 1,
+            problem.n_columns - 1,
             padded=code.padded,
         )
     first = 0

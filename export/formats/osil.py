@@ -32,7 +32,8 @@ from typing import Final
 import numpy as np
 import sympy as sp
 
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
@@ -69,12 +70,12 @@ def generate(form: Canonical, header: list[str]) -> Iterator[bytes]:
     problem, names, counts = form.problem, form.names, Counter[str]()
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
-    yield f'<variables numberOfVariables="{problem.columns}">\n'.encode()
+    yield f'<variables numberOfVariables="{problem.n_columns}">\n'.encode()
     for block in problem.blocks.values():
         yield from _variables(block, names, _LETTER[form.kind(block)], counts)
     yield b"</variables>\n"
     yield from _objective(problem, counts)
-    yield f'<constraints numberOfConstraints="{problem.row_count}">\n'.encode()
+    yield f'<constraints numberOfConstraints="{problem.n_rows}">\n'.encode()
     for family in problem.rows:
         yield from _constraints(family, names, counts)
     yield b"</constraints>\n"
@@ -213,7 +214,7 @@ def _tree(family: PlacedFamily, expression: sp.Expr, counts: Counter[str]) -> li
     if is_data(family, expression):
         return _constant(family, expression)
     if expression.is_Symbol:
-        column = Decimals(family.columns(expression))
+        column = Decimals(family.column_of(expression))
         return [Counted(counts, _PLACES, b'<variable idx="'), column, b'"/>']
     if expression.is_Add or expression.is_Mul:
         return _chain(family, expression, counts)

@@ -18,7 +18,8 @@ import pyomo.environ as pyo
 import sympy as sp
 
 from ...models.field.field import CrossField
-from ...models.formulations.problem import Block, PlacedFamily, Problem
+from ...models.formulations.families import Block, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet, pixel_of
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
@@ -72,7 +73,7 @@ def _domain(form: Canonical, block: Block) -> Any:
     """Pyomo's domain of a block; a binary column fixed at 0 or 1 stays binary: bounds are separate."""
     if not block.integer:
         return pyo.Reals
-    return pyo.Binary if form.layout.binary[block.columns].all() else pyo.Integers
+    return pyo.Binary if form.layout.binary[block.slice].all() else pyo.Integers
 
 
 def _variables(block: Block, index: list[Place], domain: Any, point: Floats | None) -> pyo.Var:
@@ -82,7 +83,7 @@ def _variables(block: Block, index: list[Place], domain: Any, point: Floats | No
         for bound in (block.lower, block.upper)
     )
     bounds = dict(zip(index, zip(*ends, strict=True), strict=True))
-    values = {} if point is None else dict(zip(index, point[block.columns].tolist(), strict=True))
+    values = {} if point is None else dict(zip(index, point[block.slice].tolist(), strict=True))
     return pyo.Var(index, domain=domain, bounds=lambda _, *place: bounds[place], initialize=values)
 
 
@@ -112,5 +113,5 @@ def _values(family: PlacedFamily, expression: sp.Expr, columns: list[Any]) -> It
 def _arguments(family: PlacedFamily, symbol: sp.Symbol, columns: list[Any]) -> list[Any]:
     """Arguments for a symbol at each element: a Pyomo variable or a number."""
     if symbol in family.variables:
-        return [columns[column] for column in family.columns(symbol).tolist()]
+        return [columns[column] for column in family.column_of(symbol).tolist()]
     return np.broadcast_to(family.data(symbol), (family.count,)).tolist()  # type: ignore[no-any-return]

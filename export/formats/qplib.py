@@ -37,7 +37,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.problem import PlacedFamily
+from ...models.formulations.families import PlacedFamily
 from ...models.instance.grid import Floats, Ints
 from ..writing.canonical import Canonical, coefficient
 from ..writing.counting import Expected, check
@@ -64,10 +64,10 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     yield from _vector(problem.upper, "upper bound")
     if problem.integer.any():
         yield from _vector(problem.integer.astype(np.float64), "type of a variable, 1 integer")
-    yield from _vector(np.zeros(problem.columns) if start is None else start, "start")
+    yield from _vector(np.zeros(problem.n_columns) if start is None else start, "start")
     if problem.rows:
-        yield from _vector(np.zeros(problem.row_count), "start of a row's dual")
-    yield from _vector(np.zeros(problem.columns), "start of a bound's dual")
+        yield from _vector(np.zeros(problem.n_rows), "start of a row's dual")
+    yield from _vector(np.zeros(problem.n_columns), "start of a bound's dual")
     yield from _names(form, counts)
     check(counts, Expected(problem).as_coefficients(products[1]))
 
@@ -78,8 +78,8 @@ def _line(value: str, comment: str) -> bytes:
 
 def _head(form: Canonical, header: list[str]) -> Iterator[bytes]:
     problem = form.problem
-    values = [problem.instance.name, probtype(problem) or "", "minimize", str(problem.columns)]
-    values += [str(problem.row_count)] * bool(problem.rows)
+    values = [problem.instance.name, probtype(problem) or "", "minimize", str(problem.n_columns)]
+    values += [str(problem.n_rows)] * bool(problem.rows)
     comments = [*header[:3], "number of variables", "number of rows"][: len(values)]
     if len(header) > 3:
         comments[-1] = "; ".join(header[3:])
@@ -147,11 +147,11 @@ def _row_terms(family: PlacedFamily, degree: int, first: int, counts: Counter[st
 
 def _names(form: Canonical, counts: Counter[str]) -> Iterator[bytes]:
     problem, names = form.problem, form.names
-    yield _line(str(problem.columns), "names of variables")
+    yield _line(str(problem.n_columns), "names of variables")
     for block in problem.blocks.values():
         place = Decimals(np.arange(block.offset + 1, block.offset + block.count + 1))
         yield from render([place, b" ", Counted(counts, "columns", names.of(block)), b"\n"], block.count)
-    yield _line(str(problem.row_count), "names of rows")
+    yield _line(str(problem.n_rows), "names of rows")
     first = 1
     for family in problem.rows:
         place = Decimals(np.arange(first, first + family.count))

@@ -16,12 +16,11 @@ from typing import Any, Final
 
 from ...models.errors import ConsistencyError, InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
+from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, lifted
 from ...models.instance.grid import Floats
 from ..writing.canonical import Canonical
 from ..writing.sink import is_packed, saving
-
-ANY_DEGREE: Final = 99
 
 
 def _nl(form: Canonical, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:

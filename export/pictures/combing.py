@@ -10,7 +10,6 @@ from ...models.field.field import CrossField
 from ...models.field.jumps import stepped
 from ...models.instance.angles import double_angle
 from ...models.instance.grid import Floats
-from ...models.instance.instance import HALF
 
 _Array = np.ndarray[Any, Any]
 
@@ -111,4 +110,4 @@ def _votes(field: CrossField, part: _Array) -> _Array:
 
 def towards_u(field: CrossField) -> Floats:
     """Vectors (n, 2) whose product with a line's double-angle vector is positive nearer to u than v."""
-    return double_angle(field.alpha + field.beta) - double_angle(field.alpha + HALF - field.beta)
+    return double_angle(field.u_angle) - double_angle(field.v_angle)

@@ -122,30 +122,53 @@ def draw(
     *,
     kind: str | None = None,
     sketch: Sequence[ArrayLike] | None = None,
-    over: str | Path | Drawing | None = None,
+    underlay: str | Path | Drawing | None = None,
     title: str | None = None,
 ) -> Path:
-    """The path of the picture that was written; its suffix, .png, .svg or .pdf, decides the format.
+    """Draw an instance, a field or a surface into a file.
 
-    kind: a name in KINDS, for a Surface in SURFACE_KINDS; for an Instance only `instance` makes sense. By
-    default `shaded` for a Surface, `instance` for an Instance, `layers` for a field as SVG or over a drawing,
-    else `field`. sketch: polylines (k, 2) in the
-    coordinates of the sketch (y down), drawn faintly below; the instance's origin and pixel_size map them to
-    the grid; not of `layers`. over: the drawing (SVG, bitmap, .scap) or sample that the instance was read
-    from, the bottom of `layers`: its strokes as they were found, nothing else of the file. title: above the
-    picture; of `layers` among the facts of the file.
-    Raises InputError for an unknown kind or suffix, a kind that needs a field, a malformed sketch, and a
-    drawing that cannot be read or lies elsewhere, and OutputError when the file cannot be written.
+    Parameters
+    ----------
+    what
+        An Instance, a CrossField or a Surface.
+    path
+        The file to write; its suffix, .png, .svg or .pdf, decides the format.
+    kind
+        A name in KINDS, for a Surface in SURFACE_KINDS; an Instance has only `instance`. The default is
+        `shaded` for a Surface, `instance` for an Instance, `layers` for a field as SVG or with an underlay,
+        and `field` otherwise.
+    sketch
+        Polylines (k, 2) in the coordinates of the sketch (y down), drawn faintly below the picture. The
+        instance's origin and pixel_size map them to the grid. Not for `layers`.
+    underlay
+        The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
+        bottom of `layers`; nothing else of the file is copied.
+    title
+        Title above the picture; for `layers` among the facts of the file.
+
+    Returns
+    -------
+    Path
+        The path of the picture.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind or suffix, a kind that needs a field, a malformed sketch, and a drawing that
+        cannot be read or has another position.
+    OutputError
+        When the file cannot be written.
+
     """
     path = Path(path)
     suffix = _suffix(path)
-    kind = kind or _fitting(what, suffix, over=over is not None)
+    kind = kind or _fitting(what, suffix, underlaid=underlay is not None)
     chosen = _kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
         if sketch:
-            raise InputError("layers lie over the drawing itself; give the drawing as over, no polylines")
-        return write_bytes(path, _layers(what, suffix, over, title))
-    if over is not None:
+            raise InputError("layers lie over the drawing itself; give the drawing as underlay, no polylines")
+        return write_bytes(path, _layers(what, suffix, underlay, title))
+    if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
     with own_settings():
         return write_bytes(path, _saved(_panels(what, chosen, sketch or (), title), suffix))
@@ -153,23 +176,26 @@ def draw(
 
 def preview(what: Subject) -> bytes:
     """A small picture for notebooks, as PNG."""
-    kind = _kind(_fitting(what, ".png", over=False), what)
+    kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
         return _saved(_panels(what, kind, (), None), ".png", dots=_PREVIEW_DOTS)
 
 
-def _fitting(what: Subject, suffix: str, *, over: bool) -> str:
+def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
     """The kind of picture where none is asked for."""
     if isinstance(what, Surface):
         return "shaded"
     if isinstance(what, Instance):
         return "instance"
-    return LAYERS if suffix == ".svg" or over else "field"
+    return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def _layers(field: CrossField, suffix: str, over: str | Path | Drawing | None, title: str | None) -> bytes:
-    below = over if over is None or isinstance(over, Drawing) else read_drawing(over, on=field.instance)
-    layers = sheet(field, below)
+def _layers(
+    field: CrossField, suffix: str, underlay: str | Path | Drawing | None, title: str | None
+) -> bytes:
+    if isinstance(underlay, str | Path):
+        underlay = read_drawing(underlay, on=field.instance)
+    layers = sheet(field, underlay)
     if suffix == ".svg":
         return svg_of(layers, title)
     with own_settings():

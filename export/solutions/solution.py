@@ -217,15 +217,15 @@ def _by_position(raw: RawSolution, form: Canonical) -> Floats:
     problem, order = form.problem, form.order(raw.order)
     point = np.append(np.clip(0.0, problem.lower, problem.upper), 1.0)  # and ONE
     point[order] = values_in_order(len(order), form.row_count(raw.order), raw)
-    return point[: problem.columns]
+    return point[: problem.n_columns]
 
 
 def _by_name(raw: RawSolution, form: Canonical) -> tuple[Floats, int]:
     problem, found = form.problem, values_for(form.column_names, raw)
     if found.missing:
         raise SolutionError(
-            f"{found.missing} of {problem.columns} columns of {problem.name} are missing and {found.unknown} "
-            "names are unknown; it is of another instance, formulation or option"
+            f"{found.missing} of {problem.n_columns} columns of {problem.name} are missing and "
+            f"{found.unknown} names are unknown; it is of another instance, formulation or option"
         )
     if found.unknown > len(raw.values) // 2:
         raise SolutionError(

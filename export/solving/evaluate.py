@@ -13,12 +13,13 @@ import numpy as np
 from ...models.errors import CrossfieldError, InputError
 from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
 from ...models.instance.instance import Instance
+from ...models.processes.deadline import Over, Stop, asked
 from ...models.processes.interruption import interruptible
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.sketch.choice import Choice
 from ...models.sketch.tracing import curves_of, has_curves
 from ..formats.registry import generator
-from .limits import Limits
 from .methods import METHODS, Request
 
 DEFAULT_METHODS: Final = ("greedy", "search")
@@ -78,7 +79,7 @@ class Evaluation:
                 "stroke_weight": self.instance.stroke_weight,
                 "skew_weight": self.instance.skew_weight,
             },
-            "seconds_per_field": self.limits.seconds,
+            "seconds_per_field": self.limits.time_limit,
             "curves_of": "sketch" if self.drawn else "chains",
             "methods": {method: _facts(self.summary(method)) for method in self.methods},
             "curves": [
@@ -102,22 +103,49 @@ def evaluate(
     curves: int = CURVES,
     limits: Limits | None = None,
     progress: Progress = silent,
+    stop: Stop | None = None,
     curvature: Iterable[str] = (),
     view: str | None = None,
 ) -> Evaluation:
-    """Measure how far the fields of methods are from curves that they were not shown.
+    """Measure how far the fields of methods are from curves that the methods do not see.
 
-    Each of the `curves` longest curves is hidden in turn: its stroke pixels are removed, except where another
-    curve passes through them; the mask and the other strokes stay. The measure is the mean angle between the
-    curve and the nearer line of the crosses on it; random crosses have 22.5 degrees.
+    Each of the `curves` longest curves is hidden in turn. Its stroke pixels are removed, as far as no other
+    curve runs through them; the mask and the other strokes stay. The measure is the mean angle between the
+    curve and the nearer line of the crosses on it; random crosses have 22.5 degrees. Ctrl-C ends it with the
+    curves done so far; before there is one, it raises KeyboardInterrupt.
 
-    sketch: the file that the instance was read from, or the name of its sample, which define its curves;
-    without one, chains of stroke pixels count as curves (`curves_of`). methods: names in the table of
-    methods. limits: of each field, 5 seconds by default. curvature, view: as given when the sketch was
-    read. Ctrl-C ends it with the curves done so far, or, before there is one, as KeyboardInterrupt.
-    Raises InputError for unknown methods, and when no curve can be hidden.
+    Parameters
+    ----------
+    instance
+        The instance.
+    sketch
+        The file from which the instance was read, or the name of its sample: it says what is a curve. None:
+        chains of stroke pixels count as curves (`curves_of`).
+    methods
+        Names in the table of methods.
+    curves
+        Number of curves to hide.
+    limits
+        Limits of each field; 5 seconds by default.
+    progress
+        Receives lines of text.
+    stop
+        A function or an event that says whether to stop, as Ctrl-C does.
+    curvature, view
+        The options with which the sketch was read.
+
+    Returns
+    -------
+    Evaluation
+        The angles, by curve and method.
+
+    Raises
+    ------
+    InputError
+        For unknown methods, and when no curve can be hidden.
+
     """
-    methods, limits = tuple(dict.fromkeys(methods)), limits or Limits(SECONDS)
+    methods, limits = tuple(dict.fromkeys(methods)), Limits.bounded(limits or Limits(SECONDS))
     for name in methods:
         if name not in METHODS:
             raise InputError(f"there is no method {name!r}; choose one of {', '.join(METHODS)}")
@@ -128,26 +156,26 @@ def evaluate(
             f"{instance.name} has no curve of {SHORTEST} pixels or more besides others that could be hidden; "
             "choose a larger size, or a drawing of more curves"
         )
-    done, interrupted = _in_turn(hidden, methods, limits, progress)
+    done, interrupted = _in_turn(hidden, methods, limits, progress, asked(stop))
     return Evaluation(instance, methods, limits, tuple(done), has_curves(sketch, choice), interrupted)
 
 
 def _in_turn(
-    hidden: list[HiddenCurve], methods: tuple[str, ...], limits: Limits, progress: Progress
+    hidden: list[HiddenCurve], methods: tuple[str, ...], limits: Limits, progress: Progress, stop: Over
 ) -> tuple[list[CurveDeviation], bool]:
-    """Deviations of the methods for one curve after the other, and whether Ctrl-C ended them."""
+    """Deviations of the methods for each curve in turn, and whether Ctrl-C or the caller ended them."""
     done: list[CurveDeviation] = []
     try:
-        with interruptible() as interrupted, TemporaryDirectory(prefix="crossfield-") as folder:
+        with interruptible() as pressed, TemporaryDirectory(prefix="crossfield-") as folder:
             for number, curve in enumerate(hidden, start=1):
 
                 def report(line: str, at: int = number) -> None:
                     progress(f"curve {at} of {len(hidden)}: {line}")
 
-                request = Request(curve.rest, Path(folder), limits, progress=report)
-                done.append(_measured(curve, methods, request, interrupted))
+                request = Request(curve.rest, Path(folder), limits, progress=report, stop=stop)
+                done.append(_measured(curve, methods, request, lambda: pressed() or stop()))
     except KeyboardInterrupt:
-        if not done:
+        if not done and not stop():
             raise
         return done, True
     return done, False

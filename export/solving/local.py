@@ -29,7 +29,8 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.child import Child, KilledError
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Deadline, Stop, asked
+from ...models.processes.limits import Limits
 from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, write_manifest
@@ -41,7 +42,6 @@ from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
 from ..writing.sink import save
-from .limits import Limits
 
 FEASIBLE: Final = 1e-6
 """Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
@@ -54,24 +54,56 @@ _NO_BETTER: Final = "nothing better than the start"
 def solve(
     problem: Problem,
     solver: str | None = None,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
+    stop: Stop | None = None,
 ) -> Solution:
     """Solve a problem with an installed solver, within the time limit, and check the answer.
 
-    solver: a name in the table of solvers; None: HiGHS, Ipopt or Bonmin, by the problem's class. folder:
-    keeps the written file, log and solution, with the manifest that reads the solution; None: they
-    are deleted. start: a field whose complete point is the incumbent or starting point. Ctrl-C ends the
-    solver and returns its best point so far.
+    Ctrl-C ends the solver and returns its best point so far.
 
-    Raises InputError for an unknown solver, UnsupportedBySolverError, MissingSolverError, SolverError,
-    SolutionError, OutputError.
+    Parameters
+    ----------
+    problem
+        The problem.
+    solver
+        A name in the table of solvers. None: HiGHS, Ipopt or Bonmin, by the problem's class.
+    folder
+        The folder that keeps the written file, the log and the solution, with the manifest that reads the
+        solution back. None: they are deleted.
+    limits
+        Time limit, gap and threads; `Limits()` by default.
+    start
+        A field whose complete point is the incumbent or starting point.
+    stop
+        A function or an event that says whether to stop. The best point so far is then returned.
+
+    Returns
+    -------
+    Solution
+        The answer, with everything recomputed from the instance.
+
+    Raises
+    ------
+    InputError
+        For an unknown solver, and for limits without a time limit.
+    UnsupportedBySolverError
+        When the solver does not take the problem.
+    MissingSolverError
+        When the program of the solver is not installed.
+    SolverError
+        When the solver fails.
+    SolutionError
+        When its answer cannot be read.
+    OutputError
+        When a file cannot be written.
+
     """
     chosen = solver_for(problem, solver)
     with Solvers() as solvers:
-        return solvers.solve(problem, chosen.name, folder, limits=limits, start=start)
+        return solvers.solve(problem, chosen.name, folder=folder, limits=limits, start=start, stop=stop)
 
 
 def solver_for(problem: Problem, name: str | None = None) -> Solver:
@@ -198,14 +230,15 @@ class Solvers:
         self,
         problem: Problem,
         solver: str,
-        folder: str | Path | None = None,
         *,
+        folder: str | Path | None = None,
         limits: Limits | None = None,
         start: CrossField | None = None,
+        stop: Stop | None = None,
     ) -> Solution:
         """Solve a problem; parameters, result and errors are those of the function `solve`."""
-        limits = limits or Limits()
-        deadline = Deadline.after(limits.seconds)
+        limits = Limits.bounded(limits)
+        deadline = Deadline.after(limits.time_limit)
         with _folder(folder) as place:
             taking = format_for(problem, solver)
             stem = f"{problem.instance.name}.{problem.name}"
@@ -214,8 +247,8 @@ class Solvers:
             if folder is not None and is_recordable(problem):
                 write_manifest(problem, written, place)
             # Reading the answer takes about as long as writing the problem did.
-            search = deadline.later(deadline.left() - limits.seconds)
-            return self.solve_file(written.problem, solver, files, limits, search, start=start)
+            search = deadline.later(deadline.left() - limits.time_limit)
+            return self.solve_file(written.problem, solver, files, limits, search, start=start, stop=stop)
 
     def solve_file(
         self,
@@ -226,6 +259,7 @@ class Solvers:
         deadline: Deadline,
         *,
         start: CrossField | None = None,
+        stop: Stop | None = None,
         precise: bool = False,
     ) -> Solution:
         """Solve a model file that was written for a solver, and read the answer.
@@ -243,7 +277,7 @@ class Solvers:
             files.model,
             files.solution,
             begins,
-            limits.seconds,
+            limits.time_limit,
             deadline,
             limits.gap,
             limits.threads,
@@ -254,11 +288,11 @@ class Solvers:
         begin = time.perf_counter()
         try:
             outcome, interrupted = self.child(entry.program).call(
-                call, entry.program, "solve", job, deadline=deadline, log=files.log
+                call, entry.program, "solve", job, deadline=deadline, log=files.log, stop=asked(stop)
             )
         except TooLargeError as error:
             raise UnsupportedBySolverError(
-                f"{entry.title}: {held.columns} columns and {held.row_count} rows are too many for its free "
+                f"{entry.title}: {held.n_columns} columns and {held.n_rows} rows are too many for its free "
                 f"edition, which takes {PROGRAMS[entry.program].free}"
             ) from error
         except (RefusedError, FailedError) as error:

@@ -12,12 +12,13 @@ import numpy as np
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Clock, Deadline
+from ...models.processes.deadline import Clock, Deadline, Over, never
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.processes.side_by_side import cores
 from ...models.proof.dual_start import search
 from ...models.search.box_qp import fitted
-from ...models.search.greedy import greedy
+from ...models.search.greedy import greedy_field
 from ...models.search.search import Search
 from ...models.search.starts import first_field, polyvector_start
 from ...models.smooth.bend import bend_field
@@ -25,7 +26,6 @@ from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.smooth.power_field import power_field
 from ..solutions.solution import Solution
 from .compiling import compile_proofs, is_compiled
-from .limits import Limits
 from .two_stage import find_jumps, fit_angles, jumps_until
 
 if TYPE_CHECKING:
@@ -111,8 +111,8 @@ def finite(value: Any) -> Any:
 class Request:
     """Input of a method: instance, folder for files of solvers, limits of the whole, and options.
 
-    start: a field for methods that start from one; None: their own, the greedy field. clock:
-    measures the time limit.
+    start: a field to go on from, for methods that start from one; None: their own, the greedy field. stop:
+    says whether to end early. clock: measures the time limit.
     """
 
     instance: Instance
@@ -121,11 +121,21 @@ class Request:
     options: dict[str, Any] = field(default_factory=dict)
     start: CrossField | None = None
     progress: Progress = silent
+    stop: Over = never
     clock: Clock = time.monotonic
+
+    def __post_init__(self) -> None:
+        """Refuse limits without a time limit. Raises InputError."""
+        Limits.bounded(self.limits)
 
     def deadline(self) -> Deadline:
         """Return the end of the time limit, counted from now."""
-        return Deadline.after(self.limits.seconds, self.clock)
+        return Deadline.after(self.limits.time_limit, self.clock)
+
+    def over(self) -> Over:
+        """Return what says whether the time limit, counted from now, or the caller ends the work."""
+        deadline = self.deadline()
+        return lambda: deadline.passed() or self.stop()
 
     def begin(self, deadline: Deadline) -> CrossField:
         """The field to start from; the greedy one is improved for no more than half of the time."""
@@ -147,13 +157,13 @@ class Method:
 
 def _greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
-    over = request.deadline().passed
-    yield _timed("greedy", lambda: greedy(request.instance, over=over))
+    over = request.over()
+    yield _timed("greedy", lambda: greedy_field(request.instance, stop=over))
 
 
 def _power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
-    over = request.deadline().passed
+    over = request.over()
     power = _timed("power", lambda: power_field(request.instance))
     yield power
     yield _timed("power + QP", lambda: fitted(power.field, over))
@@ -161,7 +171,7 @@ def _power(request: Request) -> Iterator[Candidate]:
 
 def _polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
-    over = request.deadline().passed
+    over = request.over()
     yield _timed("polyvector", lambda: polyvector_field(request.instance))
     if not over():
         yield _timed("polyvector + QP", lambda: polyvector_start(request.instance, over))
@@ -172,9 +182,15 @@ def _bend(request: Request) -> Iterator[Candidate]:
     deadline, start = request.deadline(), request.start
     own = deadline if start is None else deadline.share(_STARTING)
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _timed("bend", lambda: bend_field(hard, over=own.steps()))
+    yield _timed("bend", lambda: bend_field(hard, stop=_steps(request, own)))
     if start is not None:
-        yield _timed("start + bend", lambda: bend_field(start, over=deadline.steps()))
+        yield _timed("start + bend", lambda: bend_field(start, stop=_steps(request, deadline)))
+
+
+def _steps(request: Request, deadline: Deadline) -> Over:
+    """Return what says before a step whether the deadline would pass in it, or the caller ends the work."""
+    late = deadline.steps()
+    return lambda: late() or request.stop()
 
 
 def _search(request: Request) -> Iterator[Candidate]:
@@ -182,10 +198,11 @@ def _search(request: Request) -> Iterator[Candidate]:
     request.progress("search: starting fields")
     found = search(
         request.instance,
-        seconds=deadline,
+        limits=request.limits.until(deadline),
         jobs=_processes(request),
         start=request.start,
-        progress=_progress_line(request, deadline, "search", "rounds"),
+        progress=_progress_line(request, deadline, "search", "the best field so far"),
+        stop=request.stop,
     )
     yield _searched("search", found, begin, rounds=found.rounds)
 
@@ -200,16 +217,11 @@ def _processes(request: Request) -> int:
     return request.limits.threads or cores()
 
 
-def _progress_line(
-    request: Request, deadline: Deadline, method: str, things: str
-) -> Callable[[int, float], None]:
-    """A progress callback of a search: its count of things, the energy, and the time left."""
+def _progress_line(request: Request, deadline: Deadline, method: str, kept: str) -> Progress:
+    """A callback that passes on the lines of a method, with the time left and what Ctrl-C keeps."""
 
-    def report(count: int, energy: float) -> None:
-        request.progress(
-            f"{method}: energy {energy:.5g} after {count} {things}, at most {deadline.left():.0f} s more; "
-            "Ctrl-C keeps the best field so far"
-        )
+    def report(line: str) -> None:
+        request.progress(f"{method}: {line}, at most {deadline.left():.0f} s more; Ctrl-C keeps {kept}")
 
     return report
 
@@ -225,14 +237,11 @@ def _prove(request: Request) -> Iterator[Candidate]:
     proof = prove(
         request.instance,
         start=request.start,
-        seconds=deadline,
+        limits=request.limits.until(deadline),
         certified=True,
-        gap=request.limits.gap,
         jobs=_processes(request),
-        progress=lambda bound, energy, labels: request.progress(
-            f"prove: energy {energy:.5g}, bound {bound:.5g}, {labels} labels, "
-            f"at most {deadline.left():.0f} s more; Ctrl-C keeps them"
-        ),
+        progress=_progress_line(request, deadline, "prove", "them"),
+        stop=request.stop,
     )
     counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
     seconds, interrupted = time.perf_counter() - begin, proof.ended == "interrupted"
@@ -244,15 +253,23 @@ def _two_stage(request: Request) -> Iterator[Candidate]:
     start = request.begin(jumps_until(deadline))
     begin, limits = time.perf_counter(), request.limits.until(jumps_until(deadline))
     request.progress(
-        f"HiGHS: MILP for the jumps, at most {limits.seconds:.3g} s; Ctrl-C keeps the best point so far"
+        f"HiGHS: MILP for the jumps, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far"
     )
-    milp = find_jumps(request.instance, request.folder, limits=limits, start=start, **request.options)
+    milp = find_jumps(
+        request.instance,
+        folder=request.folder,
+        limits=limits,
+        start=start,
+        stop=request.stop,
+        **request.options,
+    )
     yield _of("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
-    if deadline.left() <= files:  # the files of the second stage take about as long
+    if deadline.left() <= files or request.stop():  # those of the second stage take about as long
         return
     request.progress("Ipopt: angles for the jumps of the MILP")
-    yield _of("two-stage", fit_angles(milp.field, request.folder, limits=request.limits.until(deadline)))
+    rest = request.limits.until(deadline)
+    yield _of("two-stage", fit_angles(milp.field, folder=request.folder, limits=rest, stop=request.stop))
 
 
 METHODS: Final = {

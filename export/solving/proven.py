@@ -27,12 +27,12 @@ class Proven:
     certificate: Path
 
     @classmethod
-    def by(cls, proof: Proof | None, path: Path, deadline: Deadline) -> Proven | None:
-        """Return the claim of a proof, with its certificate at `path`; None if it proves nothing.
+    def by(cls, proof: Proof | None, path: Path, deadline: Deadline, stop: Over = never) -> Proven | None:
+        """Return what a proof proves, with its certificate at `path`; None if that is nothing.
 
         Errors are those of `certified`.
         """
-        found = certified(proof, path, deadline)
+        found = certified(proof, path, deadline, stop)
         return None if found is None else cls(found.bound, path)
 
     def facts(self, energy: float) -> dict[str, Any]:
@@ -64,6 +64,6 @@ def certified(proof: Proof | None, path: Path, deadline: Deadline, stop: Over = 
 
     checking = deadline.share(_CHECKING)
     try:
-        return write_certificate(proof, path, lambda: checking.passed() or stop())
+        return write_certificate(proof, path, stop=lambda: checking.passed() or stop())
     except SolverError:
         return None

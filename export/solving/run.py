@@ -11,7 +11,8 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Deadline, Over, Stop, asked, never
+from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
 from ...models.storage import make_folder, write_bytes
@@ -25,7 +26,6 @@ from ..solutions.solution import Solution
 from ..surfaces.files import SHADED, write_shaded
 from ..surfaces.report import surface_facts
 from .compiling import compiling
-from .limits import Limits
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven
 from .stopwatch import Stopwatch
@@ -82,6 +82,11 @@ class Report:
     def kept(self) -> Candidate:
         """The field that is kept and drawn: the bend field, or the best one without it."""
         return next((each for each in self.candidates if each.method == KEPT), self.best)
+
+    @property
+    def field(self) -> CrossField:
+        """The field that is kept."""
+        return self.kept.field
 
     @property
     def shaded(self) -> bool:
@@ -149,8 +154,8 @@ class Report:
 def plan(limits: Limits) -> str:
     """A sentence on the time limit of a run's searches, in all and each."""
     timed = [method.name for method in METHODS.values() if method.timed]
-    each = ", ".join(f"{name} {limits.seconds:g}" for name in timed)
-    return f"at most {len(timed) * limits.seconds:g} s: {each}; files and pictures on top"
+    each = ", ".join(f"{name} {limits.time_limit:g}" for name in timed)
+    return f"at most {len(timed) * limits.time_limit:g} s: {each}; files and pictures on top"
 
 
 def run(
@@ -163,31 +168,64 @@ def run(
     drawing: str | Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
+    stop: Stop | None = None,
 ) -> Report:
-    """Run all methods on an instance, write files and pictures, and return the report.
+    """Do everything: files for solvers, every field that can be found here, pictures, and a report.
 
-    The folder then holds instance, solver files, fields, pictures and report.json. The field that is kept is
-    the bend field: its error on hidden curves is smaller than that of fields of less energy
-    (docs/fields.md).
-        DIR/models     every formulation in every format, starting points, manifests, the instance
-        DIR/solve      files read and written by the local solvers
-        DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
-        DIR/overview.png, ... pictures of it; overlay.svg, .png: over the drawing
-        DIR/shaded.png the surface over it, if it can be trusted; report.json states the reason if not
-        DIR/lowest.npz the field of least 2-norm energy
-        DIR/mask.png   the solved region, as read_sketch takes it; not for an instance from a file
-        DIR/certificate.npz   of the proven bound, with the field of the method `prove`
-        DIR/report.json   written last: if it exists, the run is complete, or it states what interrupted it
+    The field that is kept is the bend field: it is nearer to curves that were hidden from it than fields of
+    less energy (docs/fields.md). Afterwards the folder contains
 
-    options: as for `formulate`; dialects, jobs: as for `write_all`. drawing: file or sample that the instance
-    was read from, read first. limits: for each method that searches; `progress` first receives the total.
-    A method that fails is recorded in the report; the other fields stay. Ctrl-C ends the
-    present method with its best field and the run with it: no further method is tried and nothing drawn.
-    Before the solver files exist it is raised as KeyboardInterrupt. Raises OutputError, and InputError for
-    a drawing that is unreadable or does not match the instance.
+    - DIR/models: every formulation in every format, starting points, manifests, the instance
+    - DIR/solve: what the local solvers read and wrote
+    - DIR/field.npz, .json, .rawfield with .obj and .sings: the field that is kept
+    - DIR/overview.png and other pictures of it; overlay.svg, .png: the same on the drawing
+    - DIR/shaded.png: the surface over it, where that can be trusted; report.json says why not
+    - DIR/lowest.npz: the field of minimum 2-norm energy
+    - DIR/mask.png: the pixels that are solved for, as read_sketch takes them; not for an instance from a file
+    - DIR/certificate.npz: the certificate of the bound that is proven, with the field of the method `prove`
+    - DIR/report.json: written last. Where it is, the run is complete, or it says what interrupted the run
+
+    A method that fails is noted in the report; the fields that were found stand. Ctrl-C ends the present
+    method with its best field and the run with it: no further method is tried and nothing is drawn. Before
+    the solver files are written, Ctrl-C raises KeyboardInterrupt.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    folder
+        The folder to write to; it is made where it does not exist.
+    limits
+        Limits of each method that searches; `Limits()` by default. The first line of `progress` says what
+        they amount to.
+    options
+        Options as for `formulate`.
+    dialects, jobs
+        As for `write_all`.
+    drawing
+        The file or sample from which the instance was read; it is read first.
+    progress
+        Receives lines of text.
+    stop
+        A function or an event that says whether to stop, as Ctrl-C does. The solver files are always
+        written.
+
+    Returns
+    -------
+    Report
+        All fields, the one that is kept as `.field`, the manifests, and what is proven.
+
+    Raises
+    ------
+    InputError
+        For limits without a time limit, and for a drawing that is unreadable or has another position.
+    OutputError
+        When a file cannot be written.
+
     """
+    over = asked(stop)
     below = None if drawing is None else read_drawing(drawing, on=instance)
-    folder, limits = make_folder(folder), limits or Limits()
+    limits, folder = Limits.bounded(limits), make_folder(folder)
     _clear(folder)
     progress(plan(limits))
     watch = Stopwatch()
@@ -205,9 +243,11 @@ def run(
             progress=lambda name: progress(f"writing {name}"),
         )
         watch.lap("models")
-        request = Request(instance, folder / "solve", limits, options or {}, start, progress=progress)
+        request = Request(
+            instance, folder / "solve", limits, options or {}, start, progress=progress, stop=over
+        )
         found = _all_methods(request, start, watch)
-    proven = _certified(found, folder / CERTIFICATE, limits, progress)
+    proven = _certified(found, folder / CERTIFICATE, limits, progress, over)
     watch.lap("certificate")
     report = Report(instance, found.ranked, tuple(manifests), found.failures, found.interrupted, proven)
     for suffix in (".npz", ".json", ".rawfield"):
@@ -217,10 +257,10 @@ def run(
         write_mask(instance, folder / MASK)
     watch.lap("fields")
     if not report.interrupted:
-        report = _drawn(report, folder, below, progress)
+        report = _drawn(report, folder, below, progress, over)
         watch.lap("pictures")
     if not report.interrupted:
-        report = _shaded(report, folder, progress)
+        report = _shaded(report, folder, progress, over)
         watch.lap("surface")
     report = replace(report, stages=watch.stages)
     write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
@@ -259,23 +299,27 @@ def _all_methods(request: Request, start: CrossField, watch: Stopwatch) -> _Foun
             found.failures[method.name] = str(error)
         except KeyboardInterrupt:
             found.interrupted = method.name
+        if request.stop():
+            found.interrupted = found.interrupted or method.name
         watch.lap(method.name)
         if found.interrupted:
             break
     return found
 
 
-def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) -> Proven | None:
+def _certified(found: _Found, path: Path, limits: Limits, progress: Progress, stop: Over) -> Proven | None:
     """The proven bound, with its certificate at the path; a refusal or Ctrl-C is recorded.
 
-    It takes the time that its method has left.
+    It has the time that its method has left of its own. A request to stop that ended the proof does not end
+    the certificate.
     """
     by = next((each for each in found.candidates if each.proof is not None), None)
     if by is None:
         return None
     progress("writing and checking the certificate")
     try:
-        return Proven.by(by.proof, path, Deadline.after(limits.seconds - by.seconds))
+        late = never if stop() else stop
+        return Proven.by(by.proof, path, Deadline.after(limits.time_limit - by.seconds), late)
     except CrossfieldError as error:
         found.failures["certificate"] = str(error)
     except KeyboardInterrupt:
@@ -283,29 +327,32 @@ def _certified(found: _Found, path: Path, limits: Limits, progress: Progress) ->
     return None
 
 
-def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress) -> Report:
-    """The report, with its pictures drawn, or marked if Ctrl-C ended that."""
+def _drawn(report: Report, folder: Path, below: Drawing | None, progress: Progress, stop: Over) -> Report:
+    """The report, its pictures drawn, or marked where Ctrl-C or the caller ended that."""
     from ..pictures.draw import LAYERS, draw
 
     try:
         for kind in PICTURES:
+            if stop():
+                return replace(report, interrupted="drawing")
             progress(f"drawing {kind}")
             subject = report.instance if kind == "instance" else report.kept.field
             draw(subject, folder / _picture(kind), kind=kind)
         for name in OVERLAY:
             progress(f"drawing {name}")
-            draw(report.kept.field, folder / name, kind=LAYERS, over=below)
+            draw(report.kept.field, folder / name, kind=LAYERS, underlay=below)
     except KeyboardInterrupt:
         return replace(report, interrupted="drawing")
     return report
 
 
-def _shaded(report: Report, folder: Path, progress: Progress) -> Report:
-    """The report with the surface over its field, which is drawn if there are no doubts."""
-    over = Deadline.after(LONGEST_LIFT).passed
+def _shaded(report: Report, folder: Path, progress: Progress, stop: Over = never) -> Report:
+    """The report with the surface over its field, which is drawn if nothing speaks against it."""
+    deadline = Deadline.after(LONGEST_LIFT)
     try:
         progress("surface over the kept field")
-        report = replace(report, surface=surface(report.kept.field, over=over, progress=progress))
+        found = surface(report.kept.field, stop=lambda: deadline.passed() or stop(), progress=progress)
+        report = replace(report, surface=found, interrupted="surface" if stop() else "")
         if report.surface is not None and report.shaded:
             write_shaded(report.surface, folder / SHADED)
     except CrossfieldError as error:

@@ -10,10 +10,10 @@ from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Deadline
+from ...models.processes.deadline import Deadline, Stop
+from ...models.processes.limits import Limits
 from ...models.search.starts import first_field
 from ..solutions.solution import Solution
-from .limits import Limits
 from .local import solve
 
 _ANGLES: Final = 0.2
@@ -36,24 +36,46 @@ class TwoStage:
 
 
 def fit_angles(
-    field: CrossField, folder: str | Path | None = None, *, limits: Limits | None = None
+    field: CrossField,
+    *,
+    folder: str | Path | None = None,
+    limits: Limits | None = None,
+    stop: Stop | None = None,
 ) -> Solution:
-    """Solve `qp-fixed` by Ipopt for the jumps of a field, started at its angles: the second stage.
+    """Solve `qp-fixed` by Ipopt for the jumps of a field, from its angles: the second stage.
 
-    The result is the field of least 2-norm energy for these jumps within the windows (section 5 of the paper;
-    a convex QP). folder, limits and errors: as for `solve`.
+    The answer is the field of minimum 2-norm energy for these jumps within the windows (section 5 of the
+    paper; a convex QP).
+
+    Parameters
+    ----------
+    field
+        The field.
+    folder, limits, stop
+        As for `solve`.
+
+    Returns
+    -------
+    Solution
+        The answer.
+
+    Raises
+    ------
+    MissingSolverError, SolverError, SolutionError
+        As for `solve`.
+
     """
-    return solve(
-        formulate(field.instance, "qp-fixed", p=field.p), "ipopt", folder, limits=limits, start=field
-    )
+    problem = formulate(field.instance, "qp-fixed", p=field.p)
+    return solve(problem, "ipopt", folder=folder, limits=limits, start=field, stop=stop)
 
 
 def find_jumps(
     instance: Instance,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
+    stop: Stop | None = None,
     **options: Any,
 ) -> Solution:
     """Solve `milp-mccormick` by HiGHS: the first stage.
@@ -62,33 +84,60 @@ def find_jumps(
     beyond 10 x 10 pixels. limits: from now on. options: facet, stroke_norm, beta_norm. Raises SolverError,
     SolutionError.
     """
-    limits = limits or Limits()
-    deadline = Deadline.after(limits.seconds)
+    limits = Limits.bounded(limits)
+    deadline = Deadline.after(limits.time_limit)
     start = start or first_field(instance, deadline.share(_STARTING).passed)
     chosen = {key: value for key, value in options.items() if key in FORMULATIONS["milp-mccormick"].settable}
     problem = formulate(instance, "milp-mccormick", **chosen)
-    return solve(problem, None, folder, limits=limits.until(deadline), start=start)
+    return solve(problem, None, folder=folder, limits=limits.until(deadline), start=start, stop=stop)
 
 
 def two_stage(
     instance: Instance,
-    folder: str | Path | None = None,
     *,
+    folder: str | Path | None = None,
     limits: Limits | None = None,
     start: CrossField | None = None,
+    stop: Stop | None = None,
     **options: Any,
 ) -> TwoStage:
-    """Solve `milp-mccormick` by HiGHS and, with its jumps fixed, `qp-fixed` by Ipopt.
+    """Solve `milp-mccormick` by HiGHS and then, with its jumps fixed, `qp-fixed` by Ipopt.
 
-    The result's `.milp` and `.qp` are the two solutions, `.field` has the jumps of the first and the angles
-    of the second (section 5 of the paper). folder: as for `solve`. start: the first incumbent, the first
-    field when None. limits: for both stages together. options: facet, stroke_norm, beta_norm. Raises
-    MissingSolverError, SolverError, SolutionError.
+    This is section 5 of the paper.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    folder
+        As for `solve`.
+    limits
+        Limits of both stages together; `Limits()` by default.
+    start
+        The first incumbent. None: the first field.
+    stop
+        A function or an event that says whether to stop. The second stage then starts with the best point of
+        the first.
+    options
+        Options of `milp-mccormick`: facet, stroke_norm, beta_norm.
+
+    Returns
+    -------
+    TwoStage
+        `.milp` and `.qp`, the two solutions, and `.field`, with the jumps of the first and the angles of the
+        second.
+
+    Raises
+    ------
+    MissingSolverError, SolverError, SolutionError
+        As for `solve`.
+
     """
-    limits = limits or Limits()
-    deadline = Deadline.after(limits.seconds)
-    milp = find_jumps(instance, folder, limits=limits.until(jumps_until(deadline)), start=start, **options)
-    return TwoStage(milp, fit_angles(milp.field, folder, limits=limits.until(deadline)))
+    limits = Limits.bounded(limits)
+    deadline = Deadline.after(limits.time_limit)
+    first = limits.until(jumps_until(deadline))
+    milp = find_jumps(instance, folder=folder, limits=first, start=start, stop=stop, **options)
+    return TwoStage(milp, fit_angles(milp.field, folder=folder, limits=limits.until(deadline), stop=stop))
 
 
 def jumps_until(deadline: Deadline) -> Deadline:

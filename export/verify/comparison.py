@@ -7,11 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.formulations.arrays import row_terms
+from ...models.formulations.names import column_names, row_names
 from ...models.formulations.problem import Problem
-from ...models.instance.grid import Bools, Floats, Ints
+from ...models.instance.grid import Bools, Floats
 from ..programs.reading import Evaluation, Meaning, Points, places
 from ..writing.canonical import Canonical
-from ..writing.names import ONE, column_names, row_names
+from ..writing.names import ONE
 from ..writing.terms import terms
 
 VALUES: Final = 1e-9
@@ -32,9 +34,9 @@ def of_problem(problem: Problem) -> Meaning:
     """The intended content of an LP or MPS file of the problem, from its arrays: ONE is the last column."""
     form = Canonical(problem)
     one = [ONE.decode()] * form.has_one
-    n, ones = problem.columns, np.ones(len(one))
-    at, value = _of_degree(problem, 1)
-    products, product = _of_degree(problem, 2)
+    n, ones = problem.n_columns, np.ones(len(one))
+    at, value = row_terms(problem.rows, 1)
+    products, product = row_terms(problem.rows, 2)
     return Meaning.of(
         names_of(column_names(problem)) + one,
         names_of_rows(problem) or ["c_ONE"],
@@ -50,20 +52,6 @@ def of_problem(problem: Problem) -> Meaning:
     )
 
 
-def _of_degree(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """Entries (row, columns...) and coefficients of the rows' terms of a degree."""
-    at: list[Ints] = [np.zeros((0, degree + 1), np.int64)]
-    values: list[Floats] = [np.zeros(0)]
-    start = 0
-    for family in problem.rows:
-        row = np.arange(start, start + family.count)
-        for term in family.of_degree(degree):
-            at.append(np.stack([row, *term.factors], axis=1).astype(np.int64))
-            values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
-        start += family.count
-    return np.concatenate(at), np.concatenate(values)
-
-
 def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
     """Objective (k,) and rows (k, rows), their constants on the right side, at points (k, columns)."""
     objective = np.array([problem.objective_value(point) for point in points])
@@ -71,7 +59,7 @@ def values_at(problem: Problem, points: Floats) -> tuple[Floats, Floats]:
         np.concatenate([np.zeros(0), *(family.values(point) + family.limit for family in problem.rows)])
         for point in points
     ]
-    return objective, np.array(rows).reshape(len(points), problem.row_count)
+    return objective, np.array(rows).reshape(len(points), problem.n_rows)
 
 
 def difference(found: Meaning, problem: Problem, tolerance: float, points: Floats) -> str:
@@ -90,7 +78,7 @@ def difference(found: Meaning, problem: Problem, tolerance: float, points: Float
     wrong = next(filter(None, checks), "")
     if wrong:
         return wrong
-    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.columns))])
+    given = np.hstack([points, np.ones((len(points), len(expected.columns) - problem.n_columns))])
     objective, rows = values_at(problem, points)
     accuracy = max(VALUES, 100 * tolerance)
     return _value_difference("the objective", found.objective(given), objective, accuracy) or (
@@ -172,9 +160,9 @@ def evaluation_difference(found: Evaluation, problem: Problem, points: Points) -
 
 
 def _unused(problem: Problem, columns: list[str]) -> set[str]:
-    """Names of columns that occur in no term."""
-    used = np.zeros(problem.columns, dtype=bool)
+    """Names of columns that stand in no term."""
+    used = np.zeros(problem.n_columns, dtype=bool)
     for family in (*problem.objective, *problem.rows):
         for symbol in family.variables:
-            used[family.columns(symbol)] = True
+            used[family.column_of(symbol)] = True
     return {columns[place] for place in np.nonzero(~used)[0].tolist()}

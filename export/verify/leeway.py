@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 
 _CHOSEN: Final = frozenset({"alpha", "beta", "p", "p1", "p2"})

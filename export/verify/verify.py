@@ -24,8 +24,10 @@ import numpy as np
 
 from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError
 from ...models.field.field import CrossField
+from ...models.formulations.names import column_names
 from ...models.formulations.problem import Problem
 from ...models.processes.deadline import Deadline
+from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, carried, generator
@@ -34,9 +36,7 @@ from ..programs.reading import Points
 from ..solutions.readers.text import Status
 from ..solutions.solution import Solution
 from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
-from ..solving.limits import Limits
 from ..solving.local import Files, Solvers
-from ..writing.names import column_names
 from .comparison import difference, evaluation_difference, names_of
 from .leeway import saved
 
@@ -233,7 +233,7 @@ def _unpacked(source: Path, folder: Path) -> Path:
 def _points(problem: Problem) -> Points:
     """Arbitrary points, then complete points of random fields, which respect bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
-    anywhere = rng.normal(size=(RANDOM, problem.columns))
+    anywhere = rng.normal(size=(RANDOM, problem.n_columns))
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
@@ -299,7 +299,7 @@ class _Bench:
 
     def _too_large(self, subject: _Subject) -> str:
         held = subject.held
-        return f"{held.columns} columns and {held.row_count} rows; the free edition takes {self.program.free}"
+        return f"{held.n_columns} columns and {held.n_rows} rows; the free edition takes {self.program.free}"
 
     def _solve(self, subject: _Subject, solver: str, seconds: float) -> Check:
         def ended(verdict: Verdict, words: str) -> Check:

@@ -13,7 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from ...models.formulations.problem import Block, Coefficient, Monomial, Problem
+from ...models.formulations.arrays import row_sides
+from ...models.formulations.families import Block, Coefficient, Monomial
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
 from .glpk_order import glpk_order
 from .names import Names
@@ -60,13 +62,13 @@ class Canonical:
     @property
     def column_count(self) -> int:
         """Number of columns of LP and MPS."""
-        return self.problem.columns + self.has_one
+        return self.problem.n_columns + self.has_one
 
     @cached_property
     def costs(self) -> Floats:
         """Cost of every column (columns,). Raises UnsupportedByFormatError for an extreme one."""
         index, coefficient = self.problem.merged_objective(1)
-        costs = np.zeros(self.problem.columns)
+        costs = np.zeros(self.problem.n_columns)
         costs[index[:, 0]] = coefficient
         check_coefficients(coefficient, "the objective")
         return costs
@@ -97,20 +99,17 @@ class Canonical:
 
     @cached_property
     def row_lower(self) -> Floats:
-        """Left sides of all rows with constants moved there, -inf without one, shape (rows,)."""
-        return self._sides("<=", -np.inf)
+        """Left sides of all rows, constants moved there, -inf where there is none, shape (rows,)."""
+        return self._sides[0]
 
     @cached_property
     def row_upper(self) -> Floats:
-        """Right sides of all rows, inf without one, shape (rows,)."""
-        return self._sides(">=", np.inf)
+        """Right sides of all rows, inf where there is none, shape (rows,)."""
+        return self._sides[1]
 
-    def _sides(self, without: str, infinity: float) -> Floats:
-        sides = [
-            np.full(family.count, infinity) if family.family.sense == without else family.limit
-            for family in self.problem.rows
-        ]
-        return np.concatenate([np.zeros(0), *sides]) + 0.0
+    @cached_property
+    def _sides(self) -> tuple[Floats, Floats]:
+        return row_sides(self.problem.rows)
 
     @cached_property
     def layout(self) -> Layout:
@@ -123,12 +122,12 @@ class Canonical:
             return self.layout.order
         if file == "mod":
             return glpk_order(self.problem)
-        own, one = np.arange(self.problem.columns, dtype=np.int32), [self.problem.columns] * self.has_one
+        own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns] * self.has_one
         return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
 
     def row_count(self, file: Order) -> int:
         """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
-        return self.problem.row_count + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
+        return self.problem.n_rows + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
 
 
 def _zero_to_one(block: Block) -> Bools:

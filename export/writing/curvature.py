@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from ...models.formulations.problem import PlacedFamily, Problem
+from ...models.formulations.families import PlacedFamily
+from ...models.formulations.problem import Problem
 from .canonical import Canonical
 
 NEGLIGIBLE: Final = 1e-9

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from ...models.formulations.problem import PlacedFamily
+from ...models.formulations.families import PlacedFamily
 from ...models.formulations.symbols import SCALARS, VARIABLES
 from .records import Piece, Pieces
 

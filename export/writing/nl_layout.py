@@ -17,7 +17,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...models.formulations.problem import Block, Monomial, PlacedFamily, Problem
+from ...models.formulations.families import Block, Monomial, PlacedFamily
+from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Ints
 from .counting import Expected, check
 from .names import OBJECTIVE, Names
@@ -51,16 +52,16 @@ class Layout:
     @cached_property
     def in_objective(self) -> Bools:
         """True for columns in nonlinear terms of the objective."""
-        found = np.zeros(self.problem.columns, dtype=bool)
+        found = np.zeros(self.problem.n_columns, dtype=bool)
         for family in self.nonlinear_objective:
             for symbol in family.variables:
-                found[family.columns(symbol)] = True
+                found[family.column_of(symbol)] = True
         return found
 
     @cached_property
     def in_rows(self) -> Bools:
         """True for columns in nonlinear terms of rows."""
-        found = np.zeros(self.problem.columns, dtype=bool)
+        found = np.zeros(self.problem.n_columns, dtype=bool)
         for family in self.nonlinear_rows:
             for term in nonlinear_terms(family):
                 for factor in term.factors:
@@ -103,7 +104,7 @@ class Layout:
 
     def places(self, family: PlacedFamily, symbol: sp.Symbol) -> Ints:
         """Place in the file of the symbol's column at each element of a family."""
-        places, inside = self.place[family.block(symbol).columns], family.inside(symbol)
+        places, inside = self.place[family.block(symbol).slice], family.inside(symbol)
         return places if inside is None else places[inside]
 
     def column_file(self) -> Iterator[bytes]:

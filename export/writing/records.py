@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.monomials import ranked
+from ...models.formulations.names import Bytes, digits
 from ...models.instance.grid import Bools, Floats
 
-Bytes = NDArray[np.uint8]
 Cells = NDArray[Any]
 """Words of equal length, one item each."""
 Texts = NDArray[np.bytes_]
@@ -339,23 +339,6 @@ def as_cells(matrix: Bytes) -> Cells:
     width = matrix.shape[1]
     kind = f"u{width}" if width in {1, 2, 4, 8} else f"V{width}"
     return matrix.view(kind)[:, 0]
-
-
-_FOUR: Final = np.array([b"%04d" % value for value in range(10_000)]).view(np.uint32)
-"""The decimals 0000 to 9999, four bytes each."""
-
-
-def digits(values: NDArray[Any], width: int) -> Bytes:
-    """Decimal digits with leading zeros, shape (len(values), width): four at a time from a table."""
-    groups = -(-width // 4)
-    out = np.empty((len(values), groups), dtype=np.uint32)
-    rest = values
-    for place in range(groups - 1, 0, -1):
-        high = rest // 10_000
-        out[:, place] = _FOUR.take(rest - high * 10_000)
-        rest = high
-    out[:, 0] = _FOUR.take(rest)
-    return out.view(np.uint8)[:, 4 * groups - width :]
 
 
 def table(words: Sequence[bytes]) -> Bytes:

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ..errors import InstanceError
+from ..errors import InputError, InstanceError
 from ..instance.angles import MOST_ANGLE, line_difference
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER, Instance, whole_numbers
@@ -118,17 +118,35 @@ class CrossField(Pictured):
         )
 
     @classmethod
-    def from_lines(cls, instance: Instance, u: Floats, v: Floats) -> CrossField:
-        """The field of the crosses with lines at angles u and v, with the best jumps.
+    def from_lines(cls, instance: Instance, u_angle: Floats, v_angle: Floats) -> CrossField:
+        """Field of the crosses whose lines have given angles, with the best jumps.
 
-        u, v: shape (n,), the pixels in the order of `instance.grid`, radians counter-clockwise from +x with y
-        up. They need not be at right angles. Turns by pi and the order of the two lines do not matter: the
-        label is the one in the window of the instance's gauge. Under `strokes`, its u is the line nearer the
-        stroke. Under `box` it may be the other line, whose distance the energy then counts
-        (docs/mathematics.md, 4). The crosses do not change; both lines may coincide, with |beta| = pi/4.
-        Raises InstanceError for another shape and for values that are no angles: not finite, or beyond 1e6.
+        The lines need not be at right angles. Turns by pi and the order of the two lines do not matter: the
+        label is the one in the window of the instance's gauge. Under `strokes` its u is the line nearer to
+        the stroke. Under `box` it may be the other line, whose distance the energy then counts
+        (docs/mathematics.md, 4). Crosses stay as they are; both lines may coincide, with |beta| = pi/4.
+
+        Parameters
+        ----------
+        instance
+            The instance.
+        u_angle, v_angle
+            Angles of the two lines, shape (n,), the pixels in the order of `instance.grid`. Radians
+            counter-clockwise from +x, with y up.
+
+        Returns
+        -------
+        CrossField
+            The field.
+
+        Raises
+        ------
+        InputError
+            For another shape, as that of the vectors `u` and `v`, and for values that are no angles: not
+            finite, or beyond 1e6.
+
         """
-        alpha, beta = label_of(_angles(instance, u, "u"), _angles(instance, v, "v"))
+        alpha, beta = label_of(_angles(instance, u_angle, "u_angle"), _angles(instance, v_angle, "v_angle"))
         steps = _window_steps(instance, alpha)
         steps[instance.stroke_index] = _nearer_steps(instance, alpha, beta, steps)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
@@ -143,15 +161,25 @@ class CrossField(Pictured):
                 f"({instance.summary}); give a field of the same sketch, size, gauge and weights"
             )
 
+    @property
+    def u_angle(self) -> Floats:
+        """Angle of line u, alpha + beta, in radians; shape (n,)."""
+        return self.alpha + self.beta
+
+    @property
+    def v_angle(self) -> Floats:
+        """Angle of line v, alpha + pi/2 - beta, in radians; shape (n,)."""
+        return self.alpha + HALF - self.beta
+
     @cached_property
     def u(self) -> Floats:
         """Unit vectors (x, y), y up, of line u; shape (n, 2)."""
-        return _unit(self.alpha + self.beta)
+        return _unit(self.u_angle)
 
     @cached_property
     def v(self) -> Floats:
         """Unit vectors (x, y), y up, of line v; shape (n, 2)."""
-        return _unit(self.alpha + HALF - self.beta)
+        return _unit(self.v_angle)
 
     @property
     def residual_a(self) -> Floats:
@@ -213,7 +241,7 @@ class CrossField(Pictured):
     @property
     def angle_between(self) -> Floats:
         """Angle between the two lines, in [0, pi/2] radians; shape (n,)."""
-        return line_difference(self.alpha + self.beta, self.alpha + HALF - self.beta)
+        return line_difference(self.u_angle, self.v_angle)
 
     @property
     def stroke_deviation(self) -> Floats:
@@ -221,9 +249,9 @@ class CrossField(Pictured):
         return self.deviation(self.instance.stroke_index, self.instance.theta)
 
     def deviation(self, pixels: Ints, theta: Floats) -> Floats:
-        """Angle between theta and the nearer line at some pixels, in [0, pi/2] radians; shape (k,)."""
-        to_u = line_difference((self.alpha + self.beta)[pixels], theta)
-        return np.minimum(to_u, line_difference((self.alpha + HALF - self.beta)[pixels], theta))
+        """Angle between theta and the nearer line at each of some pixels, in [0, pi/2] radians: (k,)."""
+        to_u = line_difference(self.u_angle[pixels], theta)
+        return np.minimum(to_u, line_difference(self.v_angle[pixels], theta))
 
     @property
     def shape(self) -> Shape:
@@ -236,20 +264,35 @@ class CrossField(Pictured):
             narrow_pixels=float(np.mean(self.angle_between < NARROW - _EQUAL)),
         )
 
-    def cross_error(self, u: Floats, v: Floats) -> Floats:
-        """Angle to the crosses with line angles u and v, (n,) or one for all pixels, in radians; shape (n,).
+    def cross_error(self, u_angle: Floats, v_angle: Floats) -> Floats:
+        """Angle between the crosses of the field and others.
 
         The mean of the two line differences, for the better of the two assignments of lines
-        (docs/mathematics.md, 9). Raises InstanceError for the same u and v as `from_lines`.
+        (docs/mathematics.md, 9).
+
+        Parameters
+        ----------
+        u_angle, v_angle
+            Angles of the lines of the others, shape (n,), or one for all pixels; radians.
+
+        Returns
+        -------
+        Floats
+            The angle at each pixel, shape (n,), in radians.
+
+        Raises
+        ------
+        InputError
+            For the same angles as `from_lines`.
+
         """
         size = self.instance.grid.size
         u, v = (
             _angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
-            for name, line in (("u", u), ("v", v))
+            for name, line in (("u_angle", u_angle), ("v_angle", v_angle))
         )
-        mine, other = self.alpha + self.beta, self.alpha + HALF - self.beta
-        straight = line_difference(mine, u) + line_difference(other, v)
-        crossed = line_difference(mine, v) + line_difference(other, u)
+        straight = line_difference(self.u_angle, u) + line_difference(self.v_angle, v)
+        crossed = line_difference(self.u_angle, v) + line_difference(self.v_angle, u)
         return np.minimum(straight, crossed) / 2
 
     def with_best_jumps(self) -> CrossField:
@@ -331,20 +374,20 @@ def _cheapest(candidates: Ints, cost: Floats) -> Ints:
 
 
 def _angles(instance: Instance, given: Any, name: str) -> Floats:
-    """The angles as an array (n,). Raises InstanceError."""
+    """The angles (n,). Raises InputError."""
     try:
         angles = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InstanceError(f"{name} holds something other than numbers; give angles in radians") from error
+        raise InputError(f"{name} holds something other than numbers; give angles in radians") from error
     size = instance.grid.size
     if angles.shape != (size,):
-        raise InstanceError(
+        raise InputError(
             f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"
         )
     wrong = ~(np.abs(angles) <= MOST_ANGLE)
     if wrong.any():
-        raise InstanceError(
-            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is not an angle; "
+        raise InputError(
+            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
             f"give radians up to {MOST_ANGLE:g}"
         )
     return angles

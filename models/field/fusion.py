@@ -32,7 +32,7 @@ def fused(one: CrossField, other: CrossField) -> CrossField:
     choice that is lower by 1e-6 of 1 + energy. Deterministic.
     """
     grid, energy = one.instance.grid, one.energy().total
-    far = one.cross_error(other.alpha + other.beta, other.alpha + HALF - other.beta) > _APART
+    far = one.cross_error(other.u_angle, other.v_angle) > _APART
     if not far.any():
         return one
     fields = (one, other)

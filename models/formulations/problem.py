@@ -21,158 +21,15 @@ from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import QUARTER, Instance, whole_numbers
 from ..previews import table_of
+from .arrays import ProblemArrays, arrays_of
 from .catalogue import AT_JUMPS, TWO_NORM, declare
 from .declaration import FORMULATIONS, Family, Formulation
+from .families import ANY_DEGREE, Block, Monomial, PlacedFamily, block_costs, symbol_name
+from .highs_model import check_highs, highs_of
 from .lifting import lift_products
-from .monomials import beyond_noise, merged, monomials, ordered
-from .symbols import NARROWED, SCALARS, SLOTS, VARIABLES, IndexSet, Variable, elements, numeric, way
+from .monomials import merged, ordered
+from .symbols import NARROWED, SLOTS, VARIABLES, Variable, elements, numeric, way
 from .windows import Windows
-
-Coefficient = float | Floats
-
-
-@dataclass(frozen=True)
-class Block:
-    """A block of columns: offset of the first one, bounds (count,), and whether they are integer."""
-
-    name: str
-    over: IndexSet
-    offset: int
-    lower: Floats
-    upper: Floats
-    integer: bool
-
-    @property
-    def count(self) -> int:
-        """Number of columns."""
-        return len(self.lower)
-
-    @property
-    def columns(self) -> slice:
-        """The columns as a slice of a point."""
-        return slice(self.offset, self.offset + self.count)
-
-
-@dataclass(frozen=True, eq=False)
-class Monomial:
-    """A monomial of a family: symbols, each repeated by its power, and coefficient (one or (count,))."""
-
-    family: PlacedFamily
-    symbols: tuple[sp.Symbol, ...]
-    coefficient: Coefficient
-
-    @property
-    def factors(self) -> tuple[Ints, ...]:
-        """Columns of its symbols, one array (count,) each; computed at every call to save memory."""
-        return tuple(map(self.family.columns, self.symbols))
-
-    @property
-    def degree(self) -> int:
-        """Number of factors."""
-        return len(self.symbols)
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedFamily:
-    """A family placed on an instance: the positions of its elements and the columns of its symbols.
-
-    elements: indices into the family's index set, shape (count,). `terms` is None if it is not a polynomial.
-    """
-
-    family: Family
-    problem: Problem
-    elements: Ints
-
-    @property
-    def count(self) -> int:
-        """Number of rows, or of summands of the objective."""
-        return len(self.elements)
-
-    @cached_property
-    def variables(self) -> tuple[sp.Symbol, ...]:
-        """Symbols that denote columns."""
-        slots = SLOTS[self.family.over]
-        return tuple(symbol for symbol in self.family.symbols if slots[symbol][0] in self.problem.blocks)
-
-    def columns(self, symbol: sp.Symbol) -> Ints:
-        """Column of the symbol at each element, shape (count,)."""
-        block, inside = self.block(symbol), self.inside(symbol)
-        own = np.arange(block.count, dtype=np.int32) if inside is None else inside
-        return own + np.int32(block.offset)
-
-    def block(self, symbol: sp.Symbol) -> Block:
-        """The block of columns that a symbol denotes."""
-        return self.problem.blocks[SLOTS[self.family.over][symbol][0]]
-
-    def inside(self, symbol: sp.Symbol) -> Ints | None:
-        """The symbol's place in its block at each element, (count,); None: the element's own place."""
-        index = way(self.problem.instance, SLOTS[self.family.over][symbol][1])
-        if isinstance(index, slice):
-            return None if self.everywhere else self.elements
-        return index if self.everywhere else index[self.elements]
-
-    @property
-    def everywhere(self) -> bool:
-        """Whether its elements are the whole index set."""
-        return self.family.only is None
-
-    def data(self, expression: sp.Expr) -> Coefficient:
-        """Value of an expression free of columns: a number, or an array (count,)."""
-        symbols = sorted(expression.free_symbols, key=_name)
-        if not symbols:
-            return float(expression)
-        value = numeric(symbols, expression)(*(self._datum(symbol) for symbol in symbols))
-        return value if np.ndim(value) else float(value)
-
-    def _datum(self, symbol: sp.Symbol) -> Any:
-        if symbol in SCALARS:
-            return getattr(self.problem.instance, SCALARS[symbol])
-        name, kind = SLOTS[self.family.over][symbol]
-        return self.problem.data[name][way(self.problem.instance, kind)][self.elements]
-
-    @cached_property
-    def terms(self) -> tuple[Monomial, ...] | None:
-        """Its monomials, the constant included, or None if it is not a polynomial."""
-        split = monomials(self.family, self.variables)
-        if split is None:
-            return None
-        return tuple(Monomial(self, symbols, self.data(c)) for symbols, c in split)
-
-    @property
-    def degree(self) -> int:
-        """Degree of the polynomial; 99 for another expression."""
-        return 99 if self.terms is None else max((term.degree for term in self.terms), default=0)
-
-    def of_degree(self, degree: int) -> tuple[Monomial, ...]:
-        """Its monomials of that degree."""
-        return tuple(term for term in self.terms or () if term.degree == degree)
-
-    @cached_property
-    def scale(self) -> Floats:
-        """The largest coefficient of each element's monomials, (count,): the scale of rounding errors."""
-        scale = np.zeros(self.count)
-        for term in self.terms or ():
-            scale = np.maximum(scale, np.abs(term.coefficient))
-        return scale
-
-    @cached_property
-    def limit(self) -> Floats:
-        """Right side of each row once its constant has moved there, shape (count,)."""
-        constant = sum((np.asarray(term.coefficient) for term in self.of_degree(0)), np.zeros(()))
-        return np.broadcast_to(0.0 - constant, (self.count,))
-
-    def values(self, point: Floats) -> Floats:
-        """The expression (of a row: left minus right side) at a point, shape (count,)."""
-        symbols = sorted(self.family.body.free_symbols, key=_name)
-        evaluate = numeric(symbols, self.family.body)
-        given = (point[self.columns(s)] if s in self.variables else self._datum(s) for s in symbols)
-        return np.broadcast_to(np.asarray(evaluate(*given), dtype=float), (self.count,))
-
-    def excess(self, point: Floats) -> Floats:
-        """Amount by which a point breaks each row, shape (count,): 0 or less where the row holds."""
-        values = self.values(point)
-        by_sense: dict[str, Floats] = {"==": np.abs(values), "<=": values, ">=": -values}
-        return by_sense[self.family.sense]
 
 
 @dataclass(frozen=True)
@@ -256,8 +113,8 @@ class Problem:
         """Formulation, class, instance, and how many columns and rows."""
         whole = f" ({count} integer)" if (count := int(self.integer.sum())) else ""
         return (
-            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.columns} columns{whole}, "
-            f"{self.row_count} rows"
+            f"{self.name}, {self.problem_class} on {self.instance.name}: {self.n_columns} columns{whole}, "
+            f"{self.n_rows} rows"
         )
 
     @property
@@ -318,12 +175,14 @@ class Problem:
         return blocks
 
     def _value(self, bound: sp.Expr) -> Floats:
-        """Values of a bound: one per element, or one for all."""
-        symbols = sorted(bound.free_symbols, key=_name)
-        return np.asarray(numeric(symbols, bound)(*(self.data[_name(each)] for each in symbols)), np.float64)
+        """Values of a bound: one for each element, or one for all."""
+        symbols = sorted(bound.free_symbols, key=symbol_name)
+        return np.asarray(
+            numeric(symbols, bound)(*(self.data[symbol_name(each)] for each in symbols)), np.float64
+        )
 
     @property
-    def columns(self) -> int:
+    def n_columns(self) -> int:
         """Number of columns."""
         return sum(block.count for block in self.blocks.values())
 
@@ -363,7 +222,7 @@ class Problem:
         return np.nonzero(self.data[name] & 1 == parity)[0].astype(np.int32)
 
     @property
-    def row_count(self) -> int:
+    def n_rows(self) -> int:
         """Number of rows."""
         return sum(family.count for family in self.rows)
 
@@ -394,12 +253,26 @@ class Problem:
         """Whether its continuous relaxation is known to be convex."""
         return self.formulation.convex
 
-    def merged_objective(self, degree: int) -> tuple[Ints, Floats]:
-        """The monomials of that degree, equal ones merged, sorted: columns (k, degree), coefficients (k,).
+    def merged_objective(self, degree: int, *, up_to: int = ANY_DEGREE) -> tuple[Ints, Floats]:
+        """Monomials of that degree, each set of columns once, sorted.
 
-        Coefficients that cancel are left out. Shape (1, 0) for the constant.
+        Coefficients that cancel are left out.
+
+        Parameters
+        ----------
+        degree
+            Number of columns of each monomial; 0 for the constant.
+        up_to
+            Greatest degree of the terms of the objective that are counted.
+
+        Returns
+        -------
+        tuple of arrays
+            Columns, shape (k, degree), and coefficients, shape (k,). For the constant k is 1.
+
         """
-        terms = [(term, family) for family in self.objective for term in family.of_degree(degree)]
+        chosen = [family for family in self.objective if family.degree <= up_to]
+        terms = [(term, family) for family in chosen for term in family.of_degree(degree)]
         coefficients = [np.broadcast_to(term.coefficient, (family.count,)) for term, family in terms]
         if degree == 0:
             total = sum(float(np.sum(values)) for values in coefficients)
@@ -410,16 +283,46 @@ class Problem:
             return self._merged_costs([term for term, _ in terms])
         index = np.concatenate([ordered(term.factors) for term, _ in terms])
         scale = np.concatenate([family.scale for _, family in terms])
-        return merged(index, np.concatenate(coefficients), scale, self.columns)
+        return merged(index, np.concatenate(coefficients), scale, self.n_columns)
 
     def _merged_costs(self, terms: list[Monomial]) -> tuple[Ints, Floats]:
         reached = [(term.family.block(term.symbols[0]).name, term) for term in terms]
         costs = [
-            _costs([term for name, term in reached if name == block.name], block)
+            block_costs([term for name, term in reached if name == block.name], block)
             for block in self.blocks.values()
         ]
         index, cost = zip(*costs, strict=True)
         return np.concatenate(index), np.concatenate(cost)
+
+    def to_arrays(self, *, names: bool = True) -> ProblemArrays:
+        """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
+
+        Parameters
+        ----------
+        names
+            Whether to make the names of columns and rows.
+
+        Returns
+        -------
+        ProblemArrays
+            Costs, matrices, bounds and names. `nonlinear` lists what is not in the arrays.
+
+        """
+        return arrays_of(self, names=names)
+
+    def to_highs(self) -> Any:
+        """Return a `highspy.Highs` with the problem, passed by arrays; its output is switched off.
+
+        Names and order are those of the files. There is no column ONE.
+
+        Raises
+        ------
+        UnsupportedBySolverError
+            When the problem is neither an LP or MILP nor a convex QP.
+
+        """
+        check_highs(self.problem_class, convex=self.convex)
+        return highs_of(self.to_arrays(), self.instance.name)
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,)."""
@@ -452,12 +355,12 @@ class Problem:
         if self.jumps is not None:
             jumps = self.jumps
         elif "p" in self.blocks:
-            jumps = whole_numbers(np.round(point[self.blocks["p"].columns]), "p")
+            jumps = whole_numbers(np.round(point[self.blocks["p"].slice]), "p")
         else:
-            halves = np.round(point[self.blocks["p2"].columns])
-            jumps = whole_numbers(np.round(point[self.blocks["p1"].columns] + 2 * halves), "p")
+            halves = np.round(point[self.blocks["p2"].slice])
+            jumps = whole_numbers(np.round(point[self.blocks["p1"].slice] + 2 * halves), "p")
         return CrossField(
-            self.instance, point[self.blocks["alpha"].columns], point[self.blocks["beta"].columns], jumps
+            self.instance, point[self.blocks["alpha"].slice], point[self.blocks["beta"].slice], jumps
         )
 
     @cached_property
@@ -494,34 +397,10 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
         return np.asarray(given[name], dtype=np.float64)
     variable = VARIABLES[name]
     sources = problem.data | given
-    symbols = sorted(variable.value.free_symbols, key=_name)
+    symbols = sorted(variable.value.free_symbols, key=symbol_name)
     slots = (SLOTS[variable.over][symbol] for symbol in symbols)
     arguments = (sources[quantity][way(problem.instance, kind)] for quantity, kind in slots)
     return np.asarray(numeric(symbols, variable.value)(*arguments), dtype=np.float64)
-
-
-def _costs(terms: list[Monomial], block: Block) -> tuple[Ints, Floats]:
-    """Coefficients of a block's single columns, added as in `merged`: terms in turn, one per column."""
-    if not terms:
-        return np.zeros((0, 1), np.int32), np.zeros(0)
-    total, scale = np.zeros(block.count), np.zeros(block.count)
-    for term in terms:
-        inside = term.family.inside(term.symbols[0])
-        _add(total, inside, term.coefficient)
-        _add(scale, inside, term.family.scale)
-    kept = np.nonzero(beyond_noise(total, scale))[0]
-    return (block.offset + kept).astype(np.int32)[:, None], total[kept]
-
-
-def _add(sums: Floats, inside: Ints | None, values: Coefficient) -> None:
-    if inside is None:
-        sums += values
-    else:
-        np.add.at(sums, inside, values)
-
-
-def _name(symbol: sp.Symbol) -> str:
-    return str(symbol.name)
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
@@ -559,9 +438,6 @@ def lifted(problem: Problem) -> Problem:
 
 __all__ = [
     "FORMULATIONS",
-    "Block",
-    "Monomial",
-    "PlacedFamily",
     "Problem",
     "Violation",
     "formulate",

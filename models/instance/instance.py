@@ -275,8 +275,10 @@ class Instance(Pictured):
         """The same instance under another gauge."""
         return replace(self, gauge=gauge)
 
-    def with_weights(self, stroke_weight: float | None = None, skew_weight: float | None = None) -> Instance:
-        """The same instance with other weights, which mean the same on every grid (docs/weights.md).
+    def with_weights(
+        self, *, stroke_weight: float | None = None, skew_weight: float | None = None
+    ) -> Instance:
+        """The same instance under other weights, which mean the same on every grid (docs/weights.md).
 
         stroke_weight, skew_weight: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On
         another grid the coefficients are stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from .deadline import Deadline
+from .deadline import Deadline, Over, never
 from .groups import KILLED, ending, kill, start
 from .messages import Stop, Task, WorkerError, reason, send
 
@@ -48,7 +48,7 @@ class KilledError(WorkerError):
 
 
 class Returned(NamedTuple):
-    """The result of a call, and whether the user interrupted it."""
+    """The result of a call, and whether the user or the caller interrupted it."""
 
     value: Any
     interrupted: bool
@@ -84,17 +84,19 @@ class Child:
         *arguments: Any,
         deadline: Deadline | None = None,
         log: Path | None = None,
+        stop: Over = never,
     ) -> Returned:
         """Call `work(*arguments)` in the child and return its result.
 
-        work: a function of an importable module. deadline: time of the request to stop; deadlines among the
-        arguments arrive with the seconds that are left. log: file for the output of the work. The first
-        Ctrl-C also requests the stop; the second kills the work and is raised.
+        work: a function of an importable module. deadline: when the work is asked to stop; deadlines among
+        the arguments arrive with the seconds that are left. log: file for what the work prints. stop: says
+        whether to interrupt the work. The first Ctrl-C interrupts it as well, the second kills it and is
+        raised.
 
         Raises the exceptions of the work, KilledError for work that does not stop in time, and WorkerError,
         with the reason, when the process dies or a value cannot be sent.
         """
-        watch = _Watch(deadline or Deadline(), self._ask_to_stop)
+        watch = _Watch(deadline or Deadline(), self._ask_to_stop, stop)
         if watch.deadline.passed():
             raise KilledError("no time was left to start the work")
         try:
@@ -240,10 +242,11 @@ def _listen(process: subprocess.Popen[bytes], answers: queue.SimpleQueue[Any]) -
 
 @dataclass
 class _Watch:
-    """Times at which a call is requested to stop and is killed, from its deadline and from Ctrl-C."""
+    """When a call is asked to stop and when it is killed: by its deadline, by the caller and by Ctrl-C."""
 
     deadline: Deadline
     ask: Callable[[], None]
+    stop: Over = never
     asked: int = 0
     patience: Deadline | None = None
 
@@ -262,9 +265,11 @@ class _Watch:
         self.look()
 
     def look(self) -> None:
-        """Request the stop when it is due; raise KilledError when the time for it is over."""
+        """Ask the work to stop when it is due; raise KilledError when it had its time."""
+        if self.patience is None and self.stop():
+            self.patience = Deadline.after(PATIENCE)
         if self.patience is not None and self.patience.passed():
-            raise KilledError("did not stop after Ctrl-C and was killed", interrupted=True)
+            raise KilledError("did not stop when it was interrupted and was killed", interrupted=True)
         if self.kill.passed():
             raise KilledError("did not stop at its time limit and was killed", interrupted=self.interrupted)
         if self.asked < self._reasons():

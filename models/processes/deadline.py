@@ -9,11 +9,43 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
+
+from ..errors import InputError
 
 Clock = Callable[[], float]
 
 Over = Callable[[], bool]
 """Returns whether work has to end now. Work calls it at every good place, then returns its present result."""
+
+
+class Event(Protocol):
+    """Interface of `threading.Event` and `multiprocessing.Event`."""
+
+    def is_set(self) -> bool:
+        """Return whether the event has happened."""
+
+
+Stop = Callable[[], bool] | Event
+"""A request to end work early: a function that returns whether to stop, or an event."""
+
+
+def asked(stop: Stop | None) -> Over:
+    """Return the function that says whether a caller asks to stop; for None it never does.
+
+    Raises
+    ------
+    InputError
+        When `stop` is neither a function nor an event.
+
+    """
+    if stop is None:
+        return never
+    if callable(stop):
+        return stop
+    if callable(getattr(stop, "is_set", None)):
+        return stop.is_set
+    raise InputError(f"stop is {type(stop).__name__}; give a function without arguments, or an event")
 
 
 def never() -> bool:

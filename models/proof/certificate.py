@@ -35,7 +35,7 @@ from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField
 from ..instance.file import arrays_of, of_arrays
 from ..instance.instance import Instance
-from ..processes.deadline import Over, never
+from ..processes.deadline import Over, Stop, asked
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
@@ -75,14 +75,35 @@ class Certificate:
         return self.verdict.forced
 
 
-def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Certificate:
-    """Write the certificate of a proof to `path` and return it.
+def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = None) -> Certificate:
+    """Write the certificate of a proof, as far as the checker confirms it.
 
-    It claims what the checker confirms, which may be less than the proof states. Equal proofs give equal
-    bytes. over: returns whether to end; then the certificate has only the levels that were checked by then.
-    Raises InputError for a proof that the checker refuses or that is in the 1-norm. Raises SolverError for a
-    proof without levels and when time ends before the coarsest level is checked. Raises OutputError when the
-    file cannot be written.
+    The certificate may claim less than the proof. The same proof gives the same bytes.
+
+    Parameters
+    ----------
+    proof
+        A proof in the 2-norm.
+    path
+        The file to write.
+    stop
+        A function or an event that says whether to stop. The certificate then has only the levels that were
+        checked before.
+
+    Returns
+    -------
+    Certificate
+        What the file claims.
+
+    Raises
+    ------
+    InputError
+        For a proof that the checker refuses or that is in the 1-norm.
+    SolverError
+        For a proof without levels, and when `stop` ends the check before the coarsest level is checked.
+    OutputError
+        When the file cannot be written.
+
     """
     path = Path(path)
     if proof.norm != 2:
@@ -90,7 +111,7 @@ def write_certificate(proof: Proof, path: str | Path, over: Over = never) -> Cer
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
     arrays = certificate_arrays(proof, "gap", 0.0)
-    verdict = _confirmed(arrays, path, over)
+    verdict = _confirmed(arrays, path, asked(stop))
     status, bound = _claim(verdict)
     kept = len(verdict.levels)
     confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])

@@ -6,6 +6,7 @@ of a whole drawing, which a search patch by patch does not reach from the greedy
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Final
@@ -13,9 +14,10 @@ from typing import Final
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.deadline import Deadline, Over, never
-from ..search.search import RoundProgress, Search
-from ..search.search import search as search_patches
+from ..processes.deadline import Over, Stop, asked, never
+from ..processes.limits import Limits
+from ..processes.progress import Progress, silent
+from ..search.search import Search, search_patches
 
 _FEWEST: Final = 64  # pixels up to which a search alone finds the optimum
 _MOST: Final = 1000  # beyond, the field comes from the grid of half the resolution
@@ -29,44 +31,79 @@ _COMPILING: Final = 60.0  # seconds; with less, compiling would
 def search(
     instance: Instance,
     *,
-    seconds: float | Deadline | None = None,
+    limits: Limits | None = None,
     rounds: int | None = None,
     seed: int = 0,
     jobs: int = 2,
     start: CrossField | None = None,
-    progress: RoundProgress = lambda *_: None,
+    progress: Progress = silent,
+    stop: Stop | None = None,
 ) -> Search:
-    """Search for the field of least 2-norm energy, never above `start`.
+    """Search for a field of low 2-norm energy, from the greedy field on.
 
-    The result is also not above the first field, unless time cuts that off, and not above the result of a
-    short proof. The search begins at the best of them (grids of 65 to 1000 pixels, or that many at lower
-    resolution; with 5 s or more, or 60 s while code is not compiled yet).
+    The result is no higher than `start` or, unless time cuts that off, than the first field. On grids of 65
+    to 1000 pixels, or that many at lower resolution, it is also no higher than what a short proof finds. That
+    needs 5 s or more, or 60 s where compiled code is not in the cache yet.
 
-    seconds, rounds: when to end, whichever comes first; with neither, after 200 perturbations per pixel
-    without success. All work respects the seconds, the start too. One step may exceed them (on a grid of 100
-    x 100 a second), and so may the last solve, by 5 % and half a second. Without seconds the same instance,
-    seed and rounds give the same field on the same kind of processor. jobs: number of processes; start: a
-    field that is used if, improved, it is better than the others; seed: of all random choices. Ctrl-C ends
-    the search with the best field so far. Raises InputError for a limit that is not positive and too many
-    jobs, InstanceError for a start on another instance.
+    Without a time limit the same instance, seed and rounds give the same field on the same kind of processor,
+    for any number of jobs and threads. Ctrl-C ends the search with the best field so far.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    limits
+        Time limit, and threads of the short proof (0: as many as `jobs`). All work keeps to the time limit,
+        the start too. One step of it may exceed the limit (on a grid of 100 x 100 one second), and the last
+        solve by 5 % and half a second. None: no time limit.
+    rounds
+        Number of rounds after which to end. With neither rounds nor a time limit the search ends after 200
+        kicks per pixel without success.
+    seed
+        Seed of all random choices.
+    jobs
+        Number of processes.
+    start
+        A field to begin with where, improved, it is lower than the other starts.
+    progress
+        Receives a line of text after every round.
+    stop
+        A function or an event that says whether to stop. The best field so far is then returned.
+
+    Returns
+    -------
+    Search
+        The field, the number of rounds, the improvements, and why the search ended.
+
+    Raises
+    ------
+    InputError
+        For a negative number of rounds, and for too few or too many jobs.
+    InstanceError
+        For a start on another instance.
+
     """
+    limits = limits or Limits(math.inf)
     return search_patches(
         instance,
-        seconds=seconds,
+        deadline=limits.deadline(),
         rounds=rounds,
         seed=seed,
         jobs=jobs,
         start=start,
         progress=progress,
-        suggest=partial(suggested, jobs=jobs),
+        stop=asked(stop),
+        suggest=partial(suggested, threads=limits.threads or jobs),
     )
 
 
-def suggested(field: CrossField, left: Callable[[], float], over: Over = never, *, jobs: int) -> CrossField:
-    """A field of no more energy: the given one, or one rounded from the dual of the coarsest lattice.
+def suggested(
+    field: CrossField, left: Callable[[], float], over: Over = never, *, threads: int
+) -> CrossField:
+    """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
 
-    left: seconds that are left; with few of them, and for very small and large grids, the given field
-    returns. over: whether the time is over. jobs: threads; any number of them gives the same field.
+    left: seconds that are left; with few of them, and for very small and large grids, it is the field itself.
+    over: whether the time is over. Any number of threads gives the same field.
     """
     if not _FEWEST < field.instance.grid.size <= _MOST:
         return field
@@ -81,7 +118,7 @@ def suggested(field: CrossField, left: Callable[[], float], over: Over = never, 
 
     if left() < _COMPILING and not all_compiled():
         return field
-    with crew(jobs) as hands:
+    with crew(threads) as hands:
         instance, (jumps, _) = field.instance, free_jumps(field.instance.grid, field.alpha, field.beta)
         centre = relabelled(instance.with_gauge("strokes"), field.alpha, field.beta, jumps)
         dual = Dual(Lattice.whole(centre, _STEPS), hands)

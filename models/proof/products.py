@@ -14,15 +14,13 @@ of the cache: after renaming them, old files cannot be read.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from ..instance.grid import Floats
 from ..processes.compiled import compiled
-
-if TYPE_CHECKING:
-    from .sweep import State
+from .state import State
 
 _HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)

@@ -1,7 +1,7 @@
-"""Proofs in the 1-norm: the method of models/proof/prove.py, on the lattices of common_lattice.py.
+"""The work of a proof in the 1-norm: that of models/proof/work.py, on the lattices of common_lattice.py.
 
-Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes at
-the edges of their windows. Its multipliers prove its least value.
+Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes
+at the edges of their windows. Its multipliers prove its least value.
 
 Jumps. With s = (-1)^p, let g = min(|beta_i|, |beta_j|), negative where s beta_i beta_j >= 0: |B| grows by
 -2 g with the other parity. One step further |A| is at least pi/2 - |A|. So p is a best jump where |A| + g
@@ -26,8 +26,8 @@ from ..processes.deadline import Over, never
 from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
 from .common_lattice import CommonLattice
 from .forced import Forced
-from .prove import COARSEST, Work, first_of
 from .pruning import RemainingCells
+from .work import COARSEST, Work, first_of
 
 
 class WorkIn1Norm(Work):

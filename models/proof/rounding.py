@@ -19,9 +19,10 @@ from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
 from ..search.energy import LinearSolver
 from ..search.free_field import FreeField
-from ..search.improvement import improved, settle
+from ..search.improvement import improved_field, settle
 from .products import add, share_of, sized
-from .sweep import Dual, Indices, State
+from .state import Indices, State
+from .sweep import Dual
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 _HALF: Final = float(np.pi / 2)
@@ -69,7 +70,7 @@ def improve(found: CrossField, best: CrossField, over: Over) -> CrossField:
     settle(state, LinearSolver(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
-    return min(best, improved(state.bounded(over), over), key=lambda field: field.energy().total)
+    return min(best, improved_field(state.bounded(over), stop=over), key=lambda field: field.energy().total)
 
 
 def decoded(dual: Dual, *, forwards: bool) -> tuple[Floats, Floats]:

@@ -24,18 +24,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.grid import Floats, Grid, Ints
+from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled
 from ..processes.crew import Crew
 from ..processes.deadline import Over, never
 from .costs import unary_costs
-from .lattice import Lattice, Starts
+from .lattice import Lattice
 from .products import add, pair_minimum, pixel_pass, share_of
+from .state import Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 _ROUNDING: Final = 32 * 2.0**-53
@@ -44,33 +45,6 @@ _ROUNDING: Final = 32 * 2.0**-53
 It is the sum of at most eight numbers. An angle among them is right to four units in the last place, and a
 square doubles that.
 """
-
-
-Indices = NDArray[np.int64]
-"""Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
-
-
-class State(NamedTuple):
-    """A lattice and the shares on it as arrays, which the compiled passes read and change."""
-
-    h: float
-    alpha: Floats  # of each pixel's first label
-    beta: Floats
-    alpha_count: Ints
-    beta_count: Ints
-    start: Starts
-    unary: Floats
-    first: Indices
-    second: Indices
-    odd: Ints
-    start_first: Starts
-    start_second: Starts
-    around: Indices  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
-    shares_first: Floats
-    shares_second: Floats
-    theta: Floats  # at each pixel, from the last pass
-    least: Floats  # of each pixel's theta
-    norm: int  # 1 or 2
 
 
 class Momentum:

@@ -19,7 +19,7 @@ from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
 from .energy import LinearSolver
 from .free_field import FreeField
-from .improvement import improved, settle
+from .improvement import improved_field, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
 CREEP: Final = 1e-3
@@ -55,8 +55,8 @@ def halved(instance: Instance) -> Instance | None:
 
 
 def prolonged(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:
-    """The improved field on the fine grid of `instance` that grows from a field on `halved(instance)`."""
-    return improved(grown(coarse, instance, over), over)
+    """The improved field that grows on the fine grid of `instance` out of a field on `halved(instance)`."""
+    return improved_field(grown(coarse, instance, over), stop=over)
 
 
 def grown(coarse: CrossField, instance: Instance, over: Over = never) -> CrossField:

@@ -7,7 +7,6 @@ that of mixed-integer quadrangulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,14 +16,12 @@ from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
-from ..processes.deadline import Over, never
+from ..processes.deadline import Over, Stop, asked, never
+from ..processes.progress import Progress, silent
 from ..smooth.systems import locally, one_thread
 from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
-
-JumpProgress = Callable[[int, int], object]
-"""Receives how many jumps are known, and how many there are."""
 
 _CLOSE_UP_TO: Final = (
     8192  # pixels: beyond, solves take most of the time, and local updates rank jumps equally well
@@ -50,24 +47,39 @@ _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
 @one_thread()
-def greedy(instance: Instance, *, progress: JumpProgress | None = None, over: Over = never) -> CrossField:
-    """The field of the greedy strategy: least 2-norm energy for its jumps, within all bounds.
+def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop | None = None) -> CrossField:
+    """Greedy field of BendFields: the minimum 2-norm energy for its jumps, within all bounds.
 
-    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), which solves for
-    all angles again each time (docs/mathematics.md, 10). Only the last solve respects the windows, because
-    BendFields has none. Deterministic. progress: called as progress(jumps known, jumps in all) after every
-    batch. over: returns whether the time is over; then all remaining jumps are decided at once.
+    The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where all angles
+    are solved for again each time (docs/mathematics.md, 10). Only the last solve keeps the windows, because
+    BendFields has none. Deterministic unless `stop` ends it.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    progress
+        Receives a line of text after every batch: the number of jumps that are decided.
+    stop
+        A function or an event that says whether to stop. All remaining jumps are then decided at once.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
     """
     state, nearest = _cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
+    over = asked(stop)
     _stitch(state, nearest, pace, over, progress)
     return state.bounded(over)
 
 
 def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
-    """As `greedy`, in a tenth of its time: some 60 batches, angles updated locally, no bounds.
+    """As `greedy_field`, in a tenth of its time: 60 batches, angles updated locally, no bounds.
 
-    The jumps differ but are equally good; which strategy finds the better ones is random.
+    The jumps differ, and are as good on average.
     """
     state, nearest = _cells(instance)
     _stitch(state, nearest, _ROUGH, over)
@@ -82,9 +94,7 @@ def _cells(instance: Instance) -> tuple[FreeField, Ints]:
     return FreeField(instance, angle, np.zeros(len(angle)), jumps), nearest
 
 
-def _stitch(
-    state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: JumpProgress | None = None
-) -> None:
+def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: Progress = silent) -> None:
     """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, LinearSolver()
     known = nearest[grid.first] == nearest[grid.second]
@@ -103,8 +113,7 @@ def _stitch(
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
         _settle(state, known, solver, _LARGE.local if late else pace.local)
-        if progress is not None:
-            progress(int(known.sum()), len(known))
+        progress(f"{int(known.sum())} of {len(known)} jumps")
 
 
 def _settle(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:

@@ -18,7 +18,7 @@ from ..field.jumps import free_jumps, parity_sign, stepped
 from ..instance.angles import line_difference
 from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
-from ..processes.deadline import Over, never
+from ..processes.deadline import Over, Stop, asked, never
 from ..smooth.systems import one_thread
 from .box_qp import least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
@@ -35,16 +35,26 @@ _SAME_CURVE: Final = QUARTER / 4  # neighbouring stroke pixels that turn by less
 
 
 @one_thread()
-def improved(field: CrossField, over: Over = never) -> CrossField:
-    """A field whose energy neither best jumps, nor best angles, nor the turn of a curve lower.
+def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField:
+    """Field that neither best jumps, nor best angles, nor the turn of a curve improve further.
 
-    Its 2-norm energy is at most the given field's.
+    At most 40 curves are turned, the worst first. Under the gauge `box` none is turned: there u must carry
+    every stroke at the price of the box, and turning seldom pays. Deterministic unless `stop` ends it.
 
-    Under the gauge `box` curves are not turned: there u must carry every stroke at the price of the box, and
-    turning seldom pays. At most 40 curves are tried, the worst first. over: returns whether the time is over;
-    then the best field so far is returned. The energy is that of docs/mathematics.md, 5; deterministic.
+    Parameters
+    ----------
+    field
+        The field to begin with.
+    stop
+        A function or an event that says whether to stop. The best field so far is then returned.
+
+    Returns
+    -------
+    CrossField
+        A field whose 2-norm energy (docs/mathematics.md, 5) is at most that of `field`.
+
     """
-    state, solver = FreeField.of(field), LinearSolver()
+    state, solver, over = FreeField.of(field), LinearSolver(), asked(stop)
     settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)

@@ -108,7 +108,7 @@ class Landscape:
         self.patch = patch
         self.p = p.copy()
         self._around = x
-        self._defined = PatchEnergy(patch, x, p)
+        self._defined = PatchEnergy(patch.instance, patch.pixels, x, p)
         soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
         self._lower, self._upper = _bounds(patch)

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..field.field import CrossField
 from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
-from ..instance.instance import HALF
-
-if TYPE_CHECKING:
-    from .landscape import Patch
+from ..instance.instance import HALF, Instance
 
 
 class PatchEnergy:
     """The field's 2-norm energy where only angles and jumps within a patch change."""
 
-    def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
-        """Store angles x (2n,) and jumps p (m,) of the whole field; values outside the patch stay."""
-        instance, grid, free = patch.instance, patch.instance.grid, np.zeros(len(x) // 2, dtype=bool)
-        free[patch.pixels] = True
+    def __init__(self, instance: Instance, pixels: Ints, x: Floats, p: Ints) -> None:
+        """Take over angles x (2n,) and jumps p (m,) of the whole field; those outside the patch stay.
+
+        pixels: the numbers of the patch's pixels, shape (k,).
+        """
+        grid, free = instance.grid, np.zeros(len(x) // 2, dtype=bool)
+        free[pixels] = True
         self._instance = instance
         self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
         ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
-        # Local numbers: the pixels of the patch, then their neighbours outside, whose angles stay.
-        beside = np.setdiff1d(ends, patch.pixels)
+        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        beside = np.setdiff1d(ends, pixels)
         number = np.zeros(grid.size, dtype=np.int32)
-        number[np.concatenate([patch.pixels, beside])] = np.arange(len(patch.pixels) + len(beside))
+        number[np.concatenate([pixels, beside])] = np.arange(len(pixels) + len(beside))
         self._first, self._second = np.split(number[ends], 2)
         alpha, beta = np.split(x, 2)
         self._alpha, self._beta = alpha[beside], beta[beside]

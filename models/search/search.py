@@ -1,10 +1,10 @@
 """A search for a field of low 2-norm energy: from the greedy field downwards, patch by patch, on all cores.
 
-Every round explores some patches of the grid (models/search/walk.py) while the rest stays fixed. Lower points
-are adopted, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
-one kind of processor the field at the end of a round depends only on instance and seed, not on the number of
-processes, unless seconds are given and run out. Then the clock decides when the start, the grids of lower
-resolution and the last round are cut off. Results of a round that was cut off are adopted if they are lower.
+Every round some patches of the grid are explored (models/search/walk.py) with all else fixed; what is lower
+is taken over, and angles and jumps of the whole grid follow from time to time. A small grid is one patch. On
+one kind of processor the field at the end of a round depends on instance and seed alone, not on the number of
+processes, unless a time limit runs out. The clock then decides where the start, the grids of lower resolution
+and the last round are cut off. What a round that was cut off has found is taken over if it is lower.
 """
 
 from __future__ import annotations
@@ -21,20 +21,18 @@ from ..instance.grid import Bools
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over, never
 from ..processes.interruption import interruptible
+from ..processes.progress import Progress, silent
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
 from ..smooth.systems import one_thread
 from .coarse import halved, prolonged
 from .energy import LinearSolver
 from .free_field import FreeField, free_bounds
-from .improvement import improved, settle, stroke_curves
+from .improvement import improved_field, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
 from .starts import first_field, polyvector_start
 from .walk import LOWER, Explored, Task, explore
-
-RoundProgress = Callable[[int, float], object]
-"""Receives the number of finished rounds, and the least energy so far."""
 
 Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
 """Returns a field of no more energy, given the field, a function for the seconds left, and when to end."""
@@ -70,39 +68,41 @@ class Search:
 
 
 @one_thread()
-def search(
+def search_patches(
     instance: Instance,
     *,
-    seconds: float | Deadline | None = None,
+    deadline: Deadline | None = None,
     rounds: int | None = None,
     seed: int = 0,
     jobs: int = 2,
     start: CrossField | None = None,
-    progress: RoundProgress = lambda *_: None,
+    progress: Progress = silent,
+    stop: Over = never,
     suggest: Suggest = lambda field, *_: field,
 ) -> Search:
-    """Search for the field of least 2-norm energy, never above `start`.
+    """Search patch by patch, from the best of several fields and of what `suggest` makes of it.
 
-    The result is also not above the first field (models/search/starts.py), unless time cuts that off, and not
-    above the result of `suggest` for the best of the starting fields, here and on grids of lower resolution.
+    `crossfield.search` documents the parameters. The field is no higher than the first field
+    (models/search/starts.py), unless time cuts that off. Nor is it higher than what `suggest` makes of the
+    best of the starts, here and on grids of lower resolution.
 
-    seconds, rounds: when to end, whichever comes first; with neither, after 200 perturbations per pixel
-    without success. All work respects the seconds, the start too. One step may exceed them (on a grid of 100
-    x 100 a second), and so may the last solve, by 5 % and half a second. Without seconds the same instance,
-    seed and rounds give the same field on the same kind of processor. jobs: number of processes; start: a
-    field that is used if, improved, it is better than the first, PolyVector and power fields; seed: of all
-    random choices. Ctrl-C ends the search with the best field so far. Raises InputError for a limit that is
-    not positive and too many jobs, InstanceError for a start on another instance.
+    Raises
+    ------
+    InputError
+        For a negative number of rounds, and for too few or too many jobs.
+    InstanceError
+        For a start on another instance.
+
     """
-    spent = isinstance(seconds, int | float) and not seconds > 0
-    if spent or (rounds is not None and rounds < 0) or jobs < 1:
-        raise InputError("a search needs a positive number of seconds, of rounds and of jobs")
+    if (rounds is not None and rounds < 0) or jobs < 1:
+        raise InputError("a search needs a positive number of rounds and of jobs")
     checked(jobs)
     if start is not None:
         start.check_instance(instance)
-    with interruptible() as interrupted:
-        deadline = Deadline.of(seconds)
-        limits, closing = _Limits(deadline, rounds, interrupted, suggest), _closing(deadline)
+    with interruptible() as pressed:
+        deadline = deadline or Deadline()
+        limits = _Limits(deadline, rounds, lambda: pressed() or stop(), suggest)
+        closing = _closing(deadline)
         hunt = _Hunt(instance, seed, _start(instance, start, limits))
         alone = instance.grid.size <= _ALONE or limits.deadline.left() < _HURRY
         try:
@@ -125,7 +125,7 @@ def _closing(deadline: Deadline) -> Callable[[], Over]:
 
 @dataclass(frozen=True)
 class _Limits:
-    """When to end: a deadline, rounds, or a request of the user; and the function that suggests starts."""
+    """When to end: a deadline, rounds, and whether user or caller ask for it; and what suggests starts."""
 
     deadline: Deadline
     rounds: int | None
@@ -162,7 +162,7 @@ def _from_coarse(
     if hunt.large:
         for field in _from_coarse(coarse, seed, sooner, explorers):
             hunt.offer(field)
-    hunt.run(explorers, sooner, lambda *_: None)
+    hunt.run(explorers, sooner, silent)
     for field in hunt.latest(limits.over):
         if limits.over():
             return
@@ -176,11 +176,11 @@ def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> Cro
     """
     fields = [first_field(instance, limits.over)]
     if given is not None:
-        fields.append(improved(given, limits.over))
+        fields.append(improved_field(given, stop=limits.over))
     if not limits.over():
-        fields.append(improved(polyvector_start(instance, limits.over), limits.over))
+        fields.append(improved_field(polyvector_start(instance, limits.over), stop=limits.over))
     if not limits.over():
-        fields.append(improved(power_field(instance), limits.over))
+        fields.append(improved_field(power_field(instance), stop=limits.over))
     best = min(fields, key=_energy)
     return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
 
@@ -229,8 +229,8 @@ class _Hunt:
             self._start, self._state, self._unsettled = field, FreeField.of(field), False
             self.energies.append((self.round, field.energy().total))
 
-    def run(self, explorers: Explorers, limits: _Limits, progress: RoundProgress) -> str:
-        """Continue until a limit is met; return the limit."""
+    def run(self, explorers: Explorers, limits: _Limits, progress: Progress) -> str:
+        """Go on until a limit is met; which one."""
         while not (ended := limits.met(self.round)):
             if self.fruitless > _PATIENCE * self._instance.grid.size:
                 return "patience"
@@ -239,7 +239,7 @@ class _Hunt:
             self._take(tasks, [each.better for each in found], limits.over)
             if all(each.whole for each in found) and not limits.over():
                 self.round += 1
-            progress(self.round, self.energies[-1][1])
+            progress(f"energy {self.energies[-1][1]:.5g} after {self.round} rounds")
         return ended
 
     def tasks(self, deadline: Deadline) -> list[Task]:
@@ -274,7 +274,7 @@ class _Hunt:
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.large):
             self._settle(over)
         if self.large and (self.round + 1) % _IMPROVE == 0:
-            self.offer(improved(self.best(over), over))
+            self.offer(improved_field(self.best(over), stop=over))
 
     def _adopt(self, task: Task, better: Point, over: Over) -> None:
         """Adopt a patch's angles and jumps if they lower the energy together with other adopted patches."""

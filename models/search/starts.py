@@ -25,8 +25,8 @@ from .box_qp import fitted
 from .coarse import CREEP, halved, lifted
 from .energy import LinearSolver, energy_at
 from .free_field import FreeField, free_bounds
-from .greedy import greedy, rough_greedy
-from .improvement import improved, settle
+from .greedy import greedy_field, rough_greedy
+from .improvement import improved_field, settle
 
 _Strategy = Callable[[Instance, Over], FreeField]
 
@@ -47,7 +47,7 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     Deterministic if time does not cut it off.
     """
     if instance.grid.size <= _SMALL:
-        return improved(greedy(instance, over=over), over)
+        return improved_field(greedy_field(instance, stop=over), stop=over)
     return _best_of_many(instance, over)[0].bounded(over)
 
 

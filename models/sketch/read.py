@@ -130,7 +130,7 @@ def read_sketch(
             )
     except MemoryError as error:
         raise InputError("needs more memory than there is; choose a smaller size", file=path) from error
-    return read.with_weights(stroke_weight, skew_weight)
+    return read.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
 def instance_of(
@@ -170,7 +170,7 @@ def instance_of(
         pixel_size=frame.pixel,
         origin=(frame.x, frame.y),
         reading=found,
-    ).with_weights(STROKE_WEIGHT, SKEW_WEIGHT)
+    ).with_weights(stroke_weight=STROKE_WEIGHT, skew_weight=SKEW_WEIGHT)
 
 
 def name_from(text: str) -> str:

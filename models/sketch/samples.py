@@ -74,8 +74,8 @@ def samples() -> list[Sample]:
 def sample(
     name: str,
     size: int = DEFAULT_SIZE,
-    gauge: Gauge = "strokes",
     *,
+    gauge: Gauge = "strokes",
     stroke_weight: float = STROKE_WEIGHT,
     skew_weight: float = SKEW_WEIGHT,
     silhouette: Silhouette = "none",
@@ -92,11 +92,11 @@ def sample(
     if _known(name).kind == "analytic":
         if choice != AS_DRAWN:
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
-        found = analytic(name, size, gauge).instance
+        found = analytic(name, size, gauge=gauge).instance
     else:
         svg = sample_svg(name).encode()
         found = instance_of(svg, size=size, name=name, source=f"{name}.svg", gauge=gauge, choice=choice)
-    return found.with_weights(stroke_weight, skew_weight)
+    return found.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight)
 
 
 def sample_svg(name: str) -> str:

@@ -207,8 +207,8 @@ SURFACES: Final[dict[str, CurvaturePatch]] = {
 def analytic(
     name: str,
     size: int = DEFAULT_SIZE,
-    gauge: Gauge = "strokes",
     *,
+    gauge: Gauge = "strokes",
     stroke_weight: float = STROKE_WEIGHT,
     skew_weight: float = SKEW_WEIGHT,
 ) -> AnalyticInstance:
@@ -243,7 +243,7 @@ def analytic(
         origin=(frame.x, frame.y),
     )
     return AnalyticInstance(
-        instance.with_weights(stroke_weight, skew_weight),
+        instance.with_weights(stroke_weight=stroke_weight, skew_weight=skew_weight),
         u_angle,
         v_angle,
         normals=_towards_viewer(*tangents),

@@ -19,7 +19,7 @@ from ..field.field import CrossField
 from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
-from ..processes.deadline import Over, never
+from ..processes.deadline import Over, Stop, asked
 from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
@@ -42,27 +42,46 @@ _FALL: Final = 1e-4  # least share of the energy that a round has to remove befo
 
 @one_thread()
 def bend_field(
-    start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, over: Over = never
+    start: CrossField, *, harmonic: float | None = None, hold: float = HOLD, stop: Stop | None = None
 ) -> CrossField:
-    """The crosses of little bend that the lines of `start` lead to, as a field with the best jumps.
+    """Field of little bend to which the lines of `start` lead, with the best jumps.
 
-    With line angles u, v in radians the energy is the sum of (v . grad u)^2 + (u . grad v)^2 over pixels, of
-    2 `harmonic` (du^2 + dv^2) over pairs, of hold w_strokes w (line - theta)^2 over strokes, and of
-    w_beta beta^2 over pixels (docs/mathematics.md, 10). In the brackets u and v stand for unit vectors. The
-    jumps of `start` determine which lines of neighbours belong together, and its nearer line carries a
-    stroke; both stay. So the start decides where singularities are. The method `bend` starts from the
+    With line angles u, v in radians the energy is the sum of
+
+    - (v . grad u)^2 + (u . grad v)^2 over pixels, where u and v in front of the dots are unit vectors,
+    - 2 `harmonic` (du^2 + dv^2) over pairs,
+    - `hold` w_strokes w (line - theta)^2 over strokes, and
+    - w_beta beta^2 over pixels (docs/mathematics.md, 10).
+
+    The jumps of `start` say which lines of neighbours belong together, and the nearer line of `start` carries
+    a stroke; both stay. So the start decides where singularities are. The method `bend` starts from the
     PolyVector field with the hardest hold.
 
     Each round keeps the unit vectors and minimises over the angles: one sparse system. The energy is then
-    computed anew. Rounds end when it has hardly fallen, at the latest after 20; a round in which it rises is
-    discarded.
-    Labels are then moved into the windows of the instance, as by `CrossField.from_lines`. Deterministic.
+    computed anew. Rounds end when it has hardly fallen, after 20 rounds at the latest; a round in which it
+    rises is left out. Labels are then moved into the windows of the instance, as by `CrossField.from_lines`.
+    Deterministic unless `stop` ends it.
 
-    harmonic: weight of plain smoothness, above 0; None: adapted to the strokes' tremble in the field of
-    `HARMONIC`, this weight times (tremble / TREMBLE)^2, from 0.01 to 0.05. hold: factor of the stroke
-    weights, above 0. over: called before each round, returns whether to end. If so, the function returns the
-    field of the rounds so far, or `start` before the first round.
+    Parameters
+    ----------
+    start
+        The field to begin with.
+    harmonic
+        Weight of plain smoothness, above 0. None measures the tremble of the strokes in the field of
+        `HARMONIC` and takes that weight times (tremble / TREMBLE)^2, from 0.01 to 0.05.
+    hold
+        Factor of the stroke weights, above 0.
+    stop
+        A function or an event, asked before each round whether to stop. The field of the rounds so far is
+        then returned, and `start` before the first round.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
     """
+    over = asked(stop)
     if over():
         return start
     if harmonic is not None:
@@ -153,7 +172,7 @@ class _Bend:
 
 def _lines(field: CrossField) -> tuple[Floats, Floats]:
     """The angles of u and v, shape (n,) each."""
-    return field.alpha + field.beta, field.alpha + HALF - field.beta
+    return field.u_angle, field.v_angle
 
 
 def _differences(field: CrossField) -> tuple[Any, Floats]:

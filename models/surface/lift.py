@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid
-from ..processes.deadline import Over, never
+from ..processes.deadline import Over, Stop, asked
 from ..processes.progress import Progress, silent
 from ..smooth.systems import one_thread
 from .crosses import Crosses
@@ -42,25 +42,46 @@ def surface(
     hints: Iterable[Hint] = (),
     *,
     flip: bool = False,
-    over: Over = never,
+    stop: Stop | None = None,
     progress: Progress = silent,
 ) -> Surface:
-    """The surface whose curvature lines fit the crosses of a field best, seen from the front.
+    """Surface whose curvature lines look most like the crosses of a field, seen from the front.
 
     One height at each corner of a pixel, found by minimising the energy of `Equations` from three starts on
     a coarse grid, and then on finer ones. Neither the order of the two lines nor jumps matter. Parts of the
-    mask that share no corner are independent; the mean height of each is 0. Deterministic.
+    mask that share no corner are independent; the mean height of each is 0. Deterministic unless `stop` ends
+    it. See docs/surface.md.
 
-    Turned inside out, z to -z, a surface has the same crosses. So each part leans outward at its border on
-    the whole, or, if that is undecided, upward, as a floor seen from above. hints: known normals at some
-    pixels; a part with a hint that is slanted by 10 degrees or more takes its side from it. flip: turns all
-    other parts inside out. Hints also choose among surfaces of different depth with the same crosses. over:
-    returns whether the time is over; then the best heights so far are returned, with a doubt that states
-    this.
+    A surface that is turned inside out, z to -z, has the same crosses. So each part leans outward at its
+    border on the whole. Where that is undecided, it leans upward, as a floor seen from above.
 
-    Raises InputError for a hint outside the mask, or with angles that no normal has. See docs/surface.md.
+    Parameters
+    ----------
+    field
+        The field.
+    hints
+        Normals that are known at some pixels. A part with a hint of 10 degrees slant or more takes its side
+        from there. Hints also choose among surfaces of different depth with the same crosses.
+    flip
+        Whether to turn all other parts inside out.
+    stop
+        A function or an event that says whether to stop. The best heights so far are then returned, and a
+        doubt says so.
+    progress
+        Receives a line of text when a part begins.
+
+    Returns
+    -------
+    Surface
+        The surface, with its doubts.
+
+    Raises
+    ------
+    InputError
+        For a hint outside the mask, or with angles that no normal has.
+
     """
-    instance, given, cut = field.instance, tuple(hints), TimeLimit(over)
+    instance, given, cut = field.instance, tuple(hints), TimeLimit(asked(stop))
     check_hints(given, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from crossfield.export.cli.solve_command import _by_method
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.limits import Limits
 from crossfield.models.sketch.samples import sample
 
 HERE = Path(__file__).resolve().parent

@@ -132,12 +132,12 @@ def highs(instance: Instance, formulation: str, suffix: str, path: Path) -> Meas
             high.append(family.limit if family.family.sense != ">=" else np.full(family.count, np.inf))
             start += family.count
         triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        matrix = sparse.coo_matrix(triplets, shape=(start, problem.columns)).tocsc()
+        matrix = sparse.coo_matrix(triplets, shape=(start, problem.n_columns)).tocsc()
         lp = highspy.HighsLp()
-        lp.num_col_, lp.num_row_ = problem.columns, start
-        lp.col_cost_ = np.zeros(problem.columns)
+        lp.num_col_, lp.num_row_ = problem.n_columns, start
+        lp.col_cost_ = np.zeros(problem.n_columns)
         index, cost = problem.merged_objective(1)
-        costs = np.zeros(problem.columns)
+        costs = np.zeros(problem.n_columns)
         costs[index[:, 0]] = cost
         lp.col_cost_, lp.col_lower_, lp.col_upper_ = costs, problem.lower, problem.upper
         lp.row_lower_, lp.row_upper_ = np.concatenate(low), np.concatenate(high)
@@ -185,7 +185,7 @@ def pyoptinterface(instance: Instance, formulation: str, suffix: str, path: Path
                 left = poi.ScalarAffineFunction(coefficients, row)
                 model.add_linear_constraint(left, sense, limit)
         index, cost = problem.merged_objective(1)
-        assert len(variables) == problem.columns
+        assert len(variables) == problem.n_columns
         model.set_objective(poi.ScalarAffineFunction(cost.tolist(), index[:, 0].tolist()))
         model.write(str(path))
 
@@ -214,7 +214,9 @@ def everything(instance: Instance, formulation: str, suffix: str, path: Path, jo
 
     names = [formulation] if formulation != "all" else list(FORMULATIONS)
     dialects = {"gms": suffix} if suffix in {"scalar", "indexed"} else {}
-    return lambda: write_all(instance, path.with_name("set"), names, dialects=dialects, jobs=jobs)
+    return lambda: write_all(
+        instance, path.with_name("set"), formulations=names, dialects=dialects, jobs=jobs
+    )
 
 
 TITLES = {
@@ -275,7 +277,7 @@ def solution(instance: Instance, formulation: str, suffix: str, path: Path) -> M
     from crossfield.export.solutions.solution import read_solution
 
     problem = formulated(formulation, instance)
-    point = np.random.default_rng(1).normal(size=problem.columns)
+    point = np.random.default_rng(1).normal(size=problem.n_columns)
     point[problem.integer] = np.round(point[problem.integer])
     (write_highs if suffix == "highs" else write_ampl)(path, problem, point)
     return lambda: read_solution(path, formulated(formulation, instance)).field
@@ -293,7 +295,7 @@ def write_highs(path: Path, problem: Problem, point: Any) -> None:
     with path.open("wb") as stream:
         stream.write(head.encode())
         for block in problem.blocks.values():
-            parts = [names.of(block), b" ", words(point[block.columns]), b"\n"]
+            parts = [names.of(block), b" ", words(point[block.slice]), b"\n"]
             stream.writelines(render(parts, block.count))
         stream.write(b"# Rows 0\n")
 
@@ -303,7 +305,7 @@ def write_ampl(path: Path, problem: Problem, point: Any) -> None:
     from crossfield.export.formats.nl import Layout
     from crossfield.export.writing.records import render, words
 
-    counts = (3, 1, 1, 0, problem.row_count, 0, len(point), len(point))
+    counts = (3, 1, 1, 0, problem.n_rows, 0, len(point), len(point))
     with path.open("wb") as stream:
         stream.write(b"optimal solution found\n\nOptions\n" + b"".join(b"%d\n" % count for count in counts))
         stream.writelines(render([words(point[Layout(problem).order]), b"\n"], len(point)))

@@ -7,11 +7,11 @@ from crossfield.models.errors import InstanceError
 from crossfield.models.field.file import read_field, write_field
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
-from crossfield.models.search.greedy import greedy
+from crossfield.models.search.greedy import greedy_field
 
 INSTANCE = Instance("tiny", np.ones((2, 2), bool), [[0, 0], [1, 1]], [0.3, 1.2], [1.0, 0.5])
 KINDS = {
-    "field": ("alpha", read_field, lambda path: write_field(greedy(INSTANCE), path)),
+    "field": ("alpha", read_field, lambda path: write_field(greedy_field(INSTANCE), path)),
     "instance": ("theta", read_instance, lambda path: write_instance(INSTANCE, path)),
 }
 

@@ -31,8 +31,8 @@ def settled():
 
 methods = {
     "power": lambda: cf.power_field(instance), "polyvector": lambda: cf.polyvector_field(instance),
-    "bend": lambda: cf.bend_field(power), "greedy": lambda: cf.greedy(instance),
-    "improved": lambda: cf.improved(power), "fitted": lambda: fitted(power), "settled": settled,
+    "bend": lambda: cf.bend_field(power), "greedy": lambda: cf.greedy_field(instance),
+    "improved": lambda: cf.improved_field(power), "fitted": lambda: fitted(power), "settled": settled,
     "fitted_1norm": lambda: fitted_1norm(power)[0], "first": lambda: first_field(instance),
     "surface": lambda: cf.surface(power),
 }

@@ -10,6 +10,7 @@ from types import FunctionType
 
 import crossfield
 import pytest
+from crossfield.models import errors
 
 ROOT = Path(crossfield.__file__).parent
 MODULES = [
@@ -50,9 +51,55 @@ def test_the_public_names_are_sorted_and_there():
 def test_all_steps_from_a_sketch_to_a_picture_are_public():
     wanted = (
         "read_sketch Instance formulate write to_pyomo solve read_solution CrossField draw "
-        "two_stage run greedy sample"
+        "two_stage run greedy_field sample"
     )
     assert set(wanted.split()) <= set(crossfield.__all__)
+
+
+def test_every_error_that_is_raised_on_purpose_is_public():
+    family = {name for name, thing in vars(errors).items() if is_error(thing)}
+    assert len(family) > 10
+    assert family <= set(crossfield.__all__)
+
+
+def is_error(thing):
+    return inspect.isclass(thing) and issubclass(thing, crossfield.CrossfieldError)
+
+
+def test_results_have_the_field_that_was_found():
+    for name in ("Proof", "Report", "Search", "Solution", "TwoStage"):
+        result = getattr(crossfield, name)
+        assert hasattr(result, "field") or "field" in result.__dataclass_fields__, name
+
+
+WORDS = {
+    "limits": {"Limits | None"},
+    "progress": {"Progress"},
+    "stop": {"Stop | None"},
+    "jobs": {"int"},
+    "start": {"CrossField", "CrossField | None"},
+}
+"""What a parameter of a public function is by its name."""
+POSITIONAL = {"hints", "size", "solver"}
+"""Parameters with a default that may be given by position."""
+
+
+def test_one_word_has_one_meaning_and_options_are_keywords():
+    faults = []
+    for name in crossfield.__all__:
+        thing = getattr(crossfield, name)
+        if not inspect.isfunction(thing):
+            continue
+        for number, each in enumerate(inspect.signature(thing).parameters.values()):
+            if each.name in WORDS and each.annotation not in WORDS[each.name]:
+                faults.append((name, each.name, each.annotation))
+            if each.name in {"seconds", "time_limit", "gap", "threads", "over", "deadline"}:
+                faults.append((name, each.name))
+            is_keyword = each.kind in {each.KEYWORD_ONLY, each.VAR_KEYWORD}
+            optional = number > 0 and each.default is not each.empty
+            if optional and not is_keyword and each.name not in POSITIONAL:
+                faults.append((name, each.name, "by position"))
+    assert faults == []
 
 
 def test_type_checkers_see_the_same_names():
@@ -141,7 +188,7 @@ def test_the_models_know_no_solver_and_no_template():
 
 
 def test_a_sketch_becomes_a_field_without_solvers_or_pictures():
-    loaded = loaded_after("import crossfield as cf\ncf.greedy(cf.sample('skew', 6))")
+    loaded = loaded_after("import crossfield as cf\ncf.greedy_field(cf.sample('skew', 6))")
     assert not loaded & SOLVERS_AND_LAYOUT
 
 

@@ -110,7 +110,7 @@ def problem_of(label: str) -> Problem:
 
 def points_of(problem: Problem, count: int = 20, seed: int = 3) -> Floats:
     """Random points (count, columns), with no regard to bounds, rows and integrality."""
-    return np.random.default_rng(seed).normal(size=(count, problem.columns))
+    return np.random.default_rng(seed).normal(size=(count, problem.n_columns))
 
 
 def names_of(matrix: np.ndarray[Any, Any]) -> list[str]:

@@ -144,7 +144,7 @@ def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict
         path = folder / f"{task.name}.nl.sol"
         message = f"{best.known.provenance.solver}: objective {number(best.objective)}"
         code = _SOLVED if proven else _NOT_PROVEN
-        write_ampl_sol(path, message, best.point[layout.order], best.problem.row_count, code)
+        write_ampl_sol(path, message, best.point[layout.order], best.problem.n_rows, code)
         listed.append(_listed(path, "ampl", ["columns in the order of the .nl and its .col"]))
     return listed
 

@@ -23,12 +23,12 @@ from ....models.errors import (
 )
 from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
+from ....models.processes.limits import Limits
 from ....models.processes.progress import Progress, silent
 from ...solutions.logs.registry import read_log
 from ...solutions.readers.text import Status
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
-from ...solving.limits import Limits
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
 from ..documents.documents import Library, problem_of, read_library
@@ -210,7 +210,7 @@ class _Solving:
         entry, limits = SOLVERS[solver], Limits(self.limit, GAP, 1)
         start = _start(self.library, document, problem) if entry.bundled else None
         with tempfile.TemporaryDirectory(dir=self.folder) as folder:
-            found = self.solvers.solve(problem, solver, folder, limits=limits, start=start)
+            found = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
             log = next(Path(folder).glob("*.log"), None)
             if log is None and not found.interrupted:
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")

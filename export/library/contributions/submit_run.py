@@ -194,7 +194,7 @@ def _is_of_size(said: RunLog, problem: Problem) -> bool:
             held = carried(problem, each)
         except UnsupportedByFormatError:
             continue
-        if 0 <= said.columns - held.columns <= _ADDED and (said.rows or 0) <= held.row_count + 1:
+        if 0 <= said.columns - held.n_columns <= _ADDED and (said.rows or 0) <= held.n_rows + 1:
             return True
     return False
 

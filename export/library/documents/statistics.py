@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ....models.formulations.problem import PlacedFamily, Problem
+from ....models.formulations.families import PlacedFamily
+from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import Instance
 from ...writing.canonical import Canonical
@@ -44,7 +45,7 @@ def _columns(problem: Problem) -> dict[str, int]:
     binary, integer = form.binary, problem.integer
     nonlinear = form.layout.in_objective | form.layout.in_rows
     return {
-        "variables": problem.columns,
+        "variables": problem.n_columns,
         "continuous": int((~integer).sum()),
         "binary": int(binary.sum()),
         "integer": int((integer & ~binary).sum()),
@@ -59,7 +60,7 @@ def _rows(problem: Problem) -> dict[str, int]:
         degree: sum(f.count for f in problem.rows if _kind(f.degree) == degree) for degree in range(4)
     }
     return {
-        "constraints": problem.row_count,
+        "constraints": problem.n_rows,
         "equalities": sum(f.count for f in problem.rows if f.family.sense == "=="),
         "linear_constraints": by_degree[0],
         "quadratic_constraints": by_degree[1],
@@ -119,7 +120,7 @@ def _eigenvalue_signs(problem: Problem) -> dict[str, int] | None:
     values = np.linalg.eigvalsh(hessian)
     slack = NEGLIGIBLE * float(np.abs(values).max(initial=0.0))
     negative, positive = int((values < -slack).sum()), int((values > slack).sum())
-    return {"negative": negative, "zero": problem.columns - negative - positive, "positive": positive}
+    return {"negative": negative, "zero": problem.n_columns - negative - positive, "positive": positive}
 
 
 def ranges(problem: Problem) -> dict[str, list[float] | None]:
@@ -153,7 +154,7 @@ def tangent_bound(problem: Problem, point: Floats) -> float | None:
     """
     if problem.rows or problem.integer.any() or of_objective(problem)[0] != "convex":
         return None
-    slope = np.zeros(problem.columns)
+    slope = np.zeros(problem.n_columns)
     index, cost = problem.merged_objective(1)
     slope[index[:, 0]] += cost
     index, value = problem.merged_objective(2)

@@ -27,28 +27,12 @@ class Certified:
     facts: dict[str, Any]
 
 
-@dataclass
-class _Effort:
-    """The work of a proof so far."""
-
-    labels: int = 0
-
-    def tell(self, _bound: float, _energy: float, labels: int) -> None:
-        """Count what was done between two roundings."""
-        self.labels += labels
-
-    def spent(self) -> bool:
-        """Whether that is enough."""
-        return self.labels > _MOST_WORK
-
-
 def certified(start: CrossField) -> Certified | None:
     """A proof that begins at a field, as a certificate; None where that would be large."""
     from ....models.proof.certificate import write_certificate
     from ....models.proof.prove import prove  # it loads what is compiled
 
-    effort = _Effort()
-    found = prove(start.instance, start=start, jobs=1, progress=effort.tell, stop=effort.spent)
+    found = prove(start.instance, start=start, work=_MOST_WORK, jobs=1)
     field = pinned(found.field)
     proof = replace(found, field=field, energy=field.energy().total)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:

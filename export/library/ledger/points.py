@@ -17,7 +17,7 @@ from ....models.formulations.problem import Problem
 from ....models.instance.grid import Floats
 from ....models.instance.instance import QUARTER, Instance
 from ....models.proof.dual_start import search
-from ....models.search.greedy import greedy
+from ....models.search.greedy import greedy_field
 from ....models.search.pinned import pinned
 from ...formats.registry import generator
 
@@ -55,7 +55,7 @@ def ours(method: str) -> Provenance:
 
 def baseline_field(instance: Instance) -> Known:
     """The greedy field: its jumps are the data of `qp-fixed`, so that no search may change them."""
-    return Known(pinned(greedy(instance)), ours("greedy"))
+    return Known(pinned(greedy_field(instance)), ours("greedy"))
 
 
 def searched_field(instance: Instance) -> Known:
@@ -81,8 +81,8 @@ def complete_point(problem: Problem, found: CrossField) -> Floats:
         lower = np.maximum(-QUARTER, first + QUARTER * odd - QUARTER)
         upper = np.minimum(first - QUARTER * odd + QUARTER, QUARTER * odd)
         z = np.where(odd > 0, first, np.clip((first - second) / 2, lower, upper))
-        point[problem.blocks["z"].columns] = z
-        point[problem.blocks["t"].columns] = np.abs(first - 2 * z - second)
+        point[problem.blocks["z"].slice] = z
+        point[problem.blocks["t"].slice] = np.abs(first - 2 * z - second)
     return point
 
 

@@ -47,7 +47,7 @@ def kind_of(recipe: InstanceRecipe) -> str:
 
 
 def _of_sample(recipe: InstanceRecipe) -> Instance:
-    return sample(recipe.sketch.what, recipe.size, cast("Gauge", recipe.gauge))
+    return sample(recipe.sketch.what, recipe.size, gauge=cast("Gauge", recipe.gauge))
 
 
 def _of_file(recipe: InstanceRecipe) -> Instance:

@@ -15,7 +15,8 @@ import sympy as sp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ....models.formulations.problem import PlacedFamily, Problem
+from ....models.formulations.families import PlacedFamily
+from ....models.formulations.problem import Problem
 from ...pictures.sparsity import Parts, Pattern, Places
 
 _HIGHEST: Final = 4
@@ -39,7 +40,7 @@ def matrix(problem: Problem) -> Pattern:
         nonlinear = _nonlinear(family)
         for symbol in family.variables:
             rows.append(np.arange(family.count, dtype=np.int64) + offset)
-            columns.append(family.columns(symbol))
+            columns.append(family.column_of(symbol))
             curved.append(np.full(family.count, symbol in nonlinear))
         offset += family.count
     down = Parts(
@@ -58,9 +59,11 @@ def hessian(problem: Problem) -> Pattern:
     """Where the Hessian of the Lagrangian has entries, both triangles."""
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
     both = np.concatenate([pairs, pairs[:, ::-1]])
-    keys = np.unique(both[:, 0] * problem.columns + both[:, 1])
+    keys = np.unique(both[:, 0] * problem.n_columns + both[:, 1])
     parts = _columns(problem)
-    return Pattern(parts, parts, keys // problem.columns, keys % problem.columns, np.ones(len(keys), bool))
+    return Pattern(
+        parts, parts, keys // problem.n_columns, keys % problem.n_columns, np.ones(len(keys), bool)
+    )
 
 
 def blocks(pattern: Pattern) -> Blocks:
@@ -107,4 +110,4 @@ def _general(family: PlacedFamily) -> Iterator[Places]:
     """The same of what is no polynomial: what the second derivative of the expression says."""
     for one, other in combinations_with_replacement(family.variables, 2):
         if sp.diff(family.family.body, one, other) != 0:
-            yield np.stack([family.columns(one), family.columns(other)], axis=1).astype(np.int64)
+            yield np.stack([family.column_of(one), family.column_of(other)], axis=1).astype(np.int64)

@@ -59,7 +59,7 @@ def test_contents(tmp_path):
     grid = problem.instance.grid
     pairs, strokes = len(grid.first), len(problem.instance.theta)
     assert document["counts"] == {
-        "columns": problem.columns, "binary": pairs, "integer": pairs, "rows": problem.row_count,
+        "columns": problem.n_columns, "binary": pairs, "integer": pairs, "rows": problem.n_rows,
         "pixels": grid.size, "pairs": pairs, "stroke_pixels": strokes,
     }  # fmt: skip
     assert (document["class"], document["convex"], document["jumps"], document["refused"]) == (
@@ -68,11 +68,11 @@ def test_contents(tmp_path):
         None,
         {},
     )
-    assert sum(block["count"] for block in document["columns"]) == problem.columns
+    assert sum(block["count"] for block in document["columns"]) == problem.n_columns
     assert [block["first"] for block in document["columns"]] == [
         block.offset for block in problem.blocks.values()
     ]
-    assert sum(family["count"] for family in document["rows"]) == problem.row_count
+    assert sum(family["count"] for family in document["rows"]) == problem.n_rows
     names = [entry["name"] for entry in document["files"]]
     assert names == [f"tiny.milp-mccormick.{suffix}" for suffix in ("nl", "row", "col", "gms", "lp", "mps")]
     for entry in document["files"]:
@@ -85,7 +85,7 @@ def test_contents(tmp_path):
 
 def test_refused_and_lifted_formats_are_listed(tmp_path):
     instance = make_instance()
-    parity, quartic = write_all(instance, tmp_path, ["minlp-parity", "minlp-quartic"])
+    parity, quartic = write_all(instance, tmp_path, formulations=["minlp-parity", "minlp-quartic"])
     assert set(parity.document["refused"]) == {"lp", "mps"}
     assert all("minlp-quartic" in reason for reason in parity.document["refused"].values())
     assert {entry["format"] for entry in parity.document["files"]} == {"nl", "gms"}
@@ -110,11 +110,11 @@ def test_compressed_files_hold_the_same_bytes(tmp_path):
 def test_jumps_come_from_the_start_or_the_baseline(tmp_path):
     instance = make_instance("full")
     field = make_field(instance)
-    (given,) = write_all(instance, tmp_path, ["qp-fixed"], ["mps"], start=field)
+    (given,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"], start=field)
     np.testing.assert_array_equal(given.problem().jumps, field.p)
     listed = dict(given.document["jumps"])
     assert listed == {pair: jump for pair, jump in enumerate(field.p.tolist()) if jump}
-    (baseline,) = write_all(instance, tmp_path, ["qp-fixed"], ["mps"])
+    (baseline,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"])
     assert baseline.problem().jumps.shape == field.p.shape
 
 
@@ -135,22 +135,22 @@ def test_options_apply_where_a_formulation_has_them(tmp_path):
 
 
 def test_the_instance_is_written_once_and_replaced_when_it_is_another(tmp_path):
-    write_all(make_instance(), tmp_path, ["qp-fixed"], ["lp"])
+    write_all(make_instance(), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     path = tmp_path / "tiny.instance.json"
     before = path.stat().st_mtime_ns, path.stat().st_ino
-    write_all(make_instance(), tmp_path, ["milp-mccormick"], ["lp"])
+    write_all(make_instance(), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
     assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
-    write_all(make_instance(seed=8), tmp_path, ["milp-mccormick"], ["lp"])
+    write_all(make_instance(seed=8), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
     assert read_instance(path).sha256 == make_instance(seed=8).sha256
     path.write_text("rubbish")
-    write_all(make_instance(), tmp_path, ["milp-mccormick"], ["lp"])
+    write_all(make_instance(), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
     assert read_instance(path).sha256 == make_instance().sha256
 
 
 def test_large_instances_are_written_as_arrays(tmp_path):
     instance = Instance("large", np.ones((257, 256), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1))
     problem = formulate(instance, "qp-fixed", p=np.zeros(len(instance.grid.first)))
-    manifest = write_problem(problem, tmp_path, ["mps"])
+    manifest = write_problem(problem, tmp_path, formats=["mps"])
     assert manifest.document["instance"]["file"] == "large.instance.npz"
     assert read_manifest(manifest.path).problem().sha256 == problem.sha256
 
@@ -195,8 +195,8 @@ def test_the_whole_set_is_the_same_under_another_hash_seed(tmp_path):
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """A manifest of qp-fixed and its instance."""
-    return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, ["nl"]).path
+    """A manifest of qp-fixed with its instance beside it."""
+    return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, formats=["nl"]).path
 
 
 def changed(path: Path, *keys: str, value: object) -> Path:
@@ -323,7 +323,7 @@ def test_problems_that_no_manifest_records(tmp_path):
 def test_unknown_formats_dialects_and_folders(tmp_path):
     problem = make_problem("qp-fixed", make_instance())
     with pytest.raises(InputError, match="no format 'ps'; choose one of nl, gms, lp, mps"):
-        write_problem(problem, tmp_path, ["ps"])
+        write_problem(problem, tmp_path, formats=["ps"])
     with pytest.raises(InputError, match=r"model\.ps: no format has the suffix 'ps'"):
         write(problem, tmp_path / "model.ps")
     with pytest.raises(InputError, match="nl has no dialect 'indexed'; choose one of text, binary"):
@@ -334,8 +334,8 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
         write(problem, tmp_path / "absent" / "model.lp")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be created"):
-        write_problem(problem, tmp_path / "file", ["lp"])
+    with pytest.raises(OutputError, match="cannot be made"):
+        write_problem(problem, tmp_path / "file", formats=["lp"])
     assert format_of("a.b.mps.gz").name == "mps"
     with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):
         format_of("MODEL.PS.GZ")
@@ -358,6 +358,10 @@ def test_an_option_that_no_formulation_has_is_refused(tmp_path):
     with pytest.raises(FormulationError, match="there is no option 'nonsense'; the options are facet"):
         write_all(instance, tmp_path, options={"nonsense": 1})
     manifests = write_all(
-        instance, tmp_path, ["miqp-exact", "milp-mccormick"], ["nl"], options={"facet": "printed"}
+        instance,
+        tmp_path,
+        formulations=["miqp-exact", "milp-mccormick"],
+        formats=["nl"],
+        options={"facet": "printed"},
     )
     assert [manifest.document["options"]["facet"] for manifest in manifests] == ["hull", "printed"]

@@ -15,7 +15,8 @@ import pytest
 from cases import make_instance, make_problem
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.writing.canonical import Canonical
-from crossfield.models.formulations.problem import PlacedFamily, Problem
+from crossfield.models.formulations.families import PlacedFamily
+from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.grid import Grid
 from crossfield.models.instance.instance import Instance
 from loops import for_each

@@ -59,8 +59,8 @@ def instance():
 
 @pytest.fixture
 def exported(tmp_path, instance):
-    """Folder with an instance, `milp-mccormick` as .nl and .mps, and the manifest."""
-    cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", ["nl", "mps"])
+    """A folder with the instance, `milp-mccormick` in .nl and .mps, its manifest; the instance elsewhere."""
+    cf.write_problem(cf.formulate(instance, "milp-mccormick"), tmp_path / "set", formats=["nl", "mps"])
     return tmp_path / "set"
 
 
@@ -341,7 +341,7 @@ def test_an_instance_has_no_crosses_to_draw(tmp_path, refused, instance):
 
 def test_a_start_on_another_instance_is_refused(tmp_path, refused, instance):
     cf.write_instance(instance, tmp_path / "tiny.json")
-    cf.write_field(cf.greedy(instance.turned()), tmp_path / "other.npz")
+    cf.write_field(cf.greedy_field(instance.turned()), tmp_path / "other.npz")
     for command in (
         ["solve", tmp_path / "tiny.json", "-f", "milp-mccormick"],
         ["export", tmp_path / "tiny.json"],
@@ -392,8 +392,8 @@ def test_truncated_solutions_are_refused(tmp_path, refused, good_solution, manif
 def test_truncated_sol_files_are_refused(tmp_path, refused, instance, manifest, binary):
     problem = cf.formulate(instance, "milp-mccormick")
     whole = tmp_path / "whole.sol"
-    point = problem.point(cf.greedy(instance))[Layout(problem).order]
-    write_ampl_sol(whole, "solved", point, problem.row_count, 0, binary=binary)
+    point = problem.point(cf.greedy_field(instance))[Layout(problem).order]
+    write_ampl_sol(whole, "solved", point, problem.n_rows, 0, binary=binary)
     content = whole.read_bytes()
     end = content.index(b"objno") if not binary else len(content)
     for length in np.linspace(1, end - 3, 12).astype(int):
@@ -416,10 +416,10 @@ def test_unknown_and_missing_names_in_a_solution_are_refused(tmp_path, refused, 
 def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, good_solution, manifest):
     other = cf.sample("skew", 8)
     problem = cf.formulate(other, "milp-mccormick")
-    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy(other)), problem.row_count, 0)
+    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
     line = refused(*read(tmp_path / "other.sol", manifest, tmp_path / "field.npz"))
     assert line.startswith(f"{tmp_path / 'other.sol'}: ")
-    cf.write_problem(problem, tmp_path / "skew", ["nl"])
+    cf.write_problem(problem, tmp_path / "skew", formats=["nl"])
     other_manifest = tmp_path / "skew" / "skew.milp-mccormick.manifest.json"
     assert "another instance" in refused(*read(good_solution, other_manifest, tmp_path / "field.npz"))
 
@@ -472,7 +472,7 @@ def test_solutions_without_a_point_are_refused(tmp_path, refused, manifest, word
 def test_an_infeasible_sol_file_is_refused(tmp_path, refused, instance, manifest):
     problem = cf.formulate(instance, "milp-mccormick")
     path = tmp_path / "none.sol"
-    write_ampl_sol(path, "no solution", np.zeros(0), problem.row_count, 220, columns=problem.columns)
+    write_ampl_sol(path, "no solution", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
     assert "holds no point: infeasible; no solution" in refused(*read(path, manifest, tmp_path / "field.npz"))
 
 
@@ -562,7 +562,7 @@ def test_a_run_without_solvers_still_computes_a_field(tmp_path, instance):
 @pytest.mark.parametrize("where", ["file", "proc"])
 def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, where):
     cf.write_instance(instance, tmp_path / "tiny.json")
-    cf.write_field(cf.greedy(instance), tmp_path / "field.npz")
+    cf.write_field(cf.greedy_field(instance), tmp_path / "field.npz")
     (tmp_path / "regular").write_text("a file")
     if where == "proc" and not Path("/proc/sys").is_dir():
         pytest.skip("there is no /proc")
@@ -604,7 +604,7 @@ SLOW = ("solve", "run", "draw pdf", "draw", "export")
 def test_only_complete_files_remain_on_a_full_disk(tmp_path, monkeypatch, case):
     arguments, output, limit = DISK[case]
     monkeypatch.chdir(tmp_path)
-    cf.write_field(cf.greedy(cf.sample("mouse", 8)), "field.npz")
+    cf.write_field(cf.greedy_field(cf.sample("mouse", 8)), "field.npz")
     done = in_child(*arguments, "-o", output, prelude=FULL.format(limit))
     assert (done.returncode, PLAN.sub("", done.stdout)) == (1, "")
     assert complaints(done.stderr).count("\n") == 1

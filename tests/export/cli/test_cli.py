@@ -232,7 +232,7 @@ def test_a_search_without_a_point_removes_the_field_of_an_earlier_call(tmp_path,
     stale = tmp_path / "tiny.minlp-cubic.field.npz"
     mask = np.ones((1, 2), dtype=bool)
     instance = cf.Instance("tiny", mask, np.array([[0, 0]]), np.array([1.0]), np.array([1.0]))
-    cf.write_field(cf.greedy(instance), stale)
+    cf.write_field(cf.greedy_field(instance), stale)
     cf.write_instance(instance, tmp_path / "tiny.json")
     broken = tmp_path / "broken"
     broken.mkdir()
@@ -480,7 +480,7 @@ def test_exports_are_the_same_bytes_twice(tmp_path):
             capture_output=True,
             env=environment,
         )
-        field = cf.greedy(cf.read_instance(tmp_path / number / "i.npz"))
+        field = cf.greedy_field(cf.read_instance(tmp_path / number / "i.npz"))
         for suffix in (".npz", ".json", ".rawfield"):
             cf.write_field(field, tmp_path / number / f"field{suffix}")
     first, second = ({path.name: path.read_bytes() for path in (tmp_path / n).iterdir()} for n in ("1", "2"))

@@ -438,7 +438,7 @@ def test_the_error_for_a_damaged_archive_is_short(tmp_path):
 
 
 def test_fields_of_numbers_that_are_no_angles_are_refused(tmp_path):
-    field = cf.greedy(instance())
+    field = cf.greedy_field(instance())
     cf.write_field(field, tmp_path / "a.json")
     document = json.loads((tmp_path / "a.json").read_text())
     for column, value in ((2, 1e308), (3, -1e308), (0, 1e400), (4, 1e400), (2, float("nan"))):

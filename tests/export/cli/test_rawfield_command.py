@@ -10,7 +10,7 @@ def theirs(tmp_path):
     """Files of a raw field, the greedy field, and of its instance."""
     instance = cf.sample("bottle", 10)
     cf.write_instance(instance, tmp_path / "bottle.json")
-    return cf.write_field(cf.greedy(instance), tmp_path / "theirs.rawfield"), tmp_path / "bottle.json"
+    return cf.write_field(cf.greedy_field(instance), tmp_path / "theirs.rawfield"), tmp_path / "bottle.json"
 
 
 def test_a_raw_field_is_drawn_on_its_instance(theirs, tmp_path):
@@ -26,7 +26,7 @@ def test_a_raw_field_alone_is_refused_with_the_remedy(theirs, tmp_path, capsys):
 
 
 def test_a_field_of_another_instance_is_refused(theirs, tmp_path, capsys):
-    other = cf.write_field(cf.greedy(cf.sample("mouse", 10)), tmp_path / "mouse.npz")
+    other = cf.write_field(cf.greedy_field(cf.sample("mouse", 10)), tmp_path / "mouse.npz")
     assert invoke(["draw", str(other), "--on", str(theirs[1]), "-o", str(tmp_path / "field.svg")]) == 1
     assert "the field is on another instance" in capsys.readouterr().err
 

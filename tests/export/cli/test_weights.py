@@ -85,7 +85,10 @@ def test_a_weight_means_the_same_on_every_grid():
         np.ones(10),
     )
     energies = []
-    for instance in (coarse.with_weights(3.0, 1e-2), fine.with_weights(3.0, 1e-2)):
+    for instance in (
+        coarse.with_weights(stroke_weight=3.0, skew_weight=1e-2),
+        fine.with_weights(stroke_weight=3.0, skew_weight=1e-2),
+    ):
         scale = 24 / max(instance.mask.shape)
         assert (instance.stroke_coefficient, instance.skew_coefficient) == pytest.approx(
             (3 * scale, 1e-2 * scale**2)
@@ -107,7 +110,7 @@ def test_an_instance_of_its_own_has_the_coefficients_of_the_paper():
 
 
 def test_a_start_under_other_weights_is_refused_with_both(tmp_path, capsys):
-    cf.write_field(cf.greedy(cf.sample("skew", 4)), tmp_path / "field.npz")
+    cf.write_field(cf.greedy_field(cf.sample("skew", 4)), tmp_path / "field.npz")
     start = ["--start", str(tmp_path / "field.npz"), "-o", str(tmp_path / "out")]
     assert invoke(["solve", "skew", "--size", "4", "--stroke-weight", "10", "-m", "search", *start]) == 1
     printed = capsys.readouterr().err

@@ -87,7 +87,7 @@ def refused(problem: Problem, suffix: str, dialect: str, folder, what: str, *, k
 @for_each("suffix, dialect", LAYOUTS)
 def test_a_lost_row_is_an_error_and_leaves_no_file(suffix, dialect, tmp_path):
     whole = make_problem("milp-mccormick", make_instance())
-    found = rf"model\.{suffix}(\.gz)?: holds {whole.row_count - 1} rows.*the problem has {whole.row_count};"
+    found = rf"model\.{suffix}(\.gz)?: holds {whole.n_rows - 1} rows.*the problem has {whole.n_rows};"
     refused(damaged(FewerRows), suffix, dialect, tmp_path, found, kept=whole)
 
 

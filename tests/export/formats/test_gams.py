@@ -19,10 +19,10 @@ from crossfield.export.formats import gams_indexed, lp
 from crossfield.export.formats import gams_scalar as gams
 from crossfield.export.writing import records
 from crossfield.export.writing.canonical import Canonical
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.field.field import CrossField, relabelled
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -157,7 +157,7 @@ def readings(
     for case in CASES:
         problem = problem_of(case)
         start = problem.point(make_field(problem.instance))
-        points = rng.normal(size=(20, problem.columns))
+        points = rng.normal(size=(20, problem.n_columns))
         number = {name: index for index, name in enumerate(names_of(column_names(problem)))}
         for layout in LAYOUTS:
             folder = tmp_path_factory.mktemp("convert")
@@ -229,7 +229,7 @@ def test_read_columns(readings: dict[tuple[str, str], Reading], case: str, layou
         column
         for family in families
         for symbol in family.variables
-        for column in family.columns(symbol).tolist()
+        for column in family.column_of(symbol).tolist()
     }
     assert sorted(read.columns) == sorted(names[column] for column in used)
     at = [names.index(name) for name in read.columns]

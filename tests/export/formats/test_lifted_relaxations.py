@@ -26,7 +26,11 @@ def two():
 def written(two, tmp_path_factory):
     folder = tmp_path_factory.mktemp("relaxed")
     manifests = write_all(
-        two, folder, [*LIFTED, "minlp-parity"], ["nl", "lp", "mps", "qplib"], options={"relax": True}
+        two,
+        folder,
+        formulations=[*LIFTED, "minlp-parity"],
+        formats=["nl", "lp", "mps", "qplib"],
+        options={"relax": True},
     )
     return {manifest.formulation: manifest for manifest in manifests}
 
@@ -66,7 +70,7 @@ def test_the_hull_is_larger(two):
     lifted = cf.solve(problem, "highs")
     assert lifted.violation.worst < 1e-6
     assert lifted.objective == pytest.approx(0.198, abs=1e-3)
-    z, p1, beta = (lifted.point[lifted.problem.blocks[name].columns] for name in ("z", "p1", "beta"))
+    z, p1, beta = (lifted.point[lifted.problem.blocks[name].slice] for name in ("z", "p1", "beta"))
     assert abs(z - p1 * beta[:1]).max() > 0.01
     best = min(cf.solve(problem, "ipopt", start=start).objective for start in starts(two))
     assert best == pytest.approx(0.247, abs=1e-3)
@@ -91,7 +95,7 @@ def test_a_solver_is_chosen_that_reads_the_products(two):
 @pytest.mark.needs("scip")
 def test_verify_compares_optima_across_formats(written, two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
-    write_all(two, tmp_path, ["minlp-quartic"], ["nl", "mps"], options={"relax": True})
+    write_all(two, tmp_path, formulations=["minlp-quartic"], formats=["nl", "mps"], options={"relax": True})
     found = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
     assert found.bad == []
     solves = {f.file.rpartition(".")[2]: f for f in found.checks if f.step == "solve" and f.objective}
@@ -107,7 +111,9 @@ def test_verify_compares_optima_across_formats(written, two, tmp_path):
 
 @pytest.mark.oracles
 def test_verify_reads_what_a_manifest_says_of_lifting(two, tmp_path):
-    (manifest,) = write_all(two, tmp_path, ["minlp-quartic"], ["mps"], options={"relax": True})
+    (manifest,) = write_all(
+        two, tmp_path, formulations=["minlp-quartic"], formats=["mps"], options={"relax": True}
+    )
     document = json.loads(manifest.path.read_text())
     document["files"][0]["lifted"] = "z = p1 beta_i with the hull facets (26)-(29), exact"
     manifest.path.write_text(json.dumps(document))

@@ -14,9 +14,9 @@ from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, carried, header, write
 from crossfield.export.solving.local import solve
 from crossfield.export.writing.canonical import Canonical
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -64,7 +64,7 @@ def test_readers_see_the_problem(label: str, reader: str, suffix: str, tmp_path:
     assert_same(model, expected)
 
     points = points_of(problem)
-    ones = np.ones((len(points), len(expected.columns) - problem.columns))
+    ones = np.ones((len(points), len(expected.columns) - problem.n_columns))
     given = np.hstack([points, ones])
     values = [problem.objective_value(point) for point in points]
     np.testing.assert_allclose(model.objective(given), values, rtol=1e-9, atol=1e-9)
@@ -148,7 +148,7 @@ def test_names_suit_every_reader(label: str):
         names = names_of(column_names(each)) + (names_of(row_names(each)) if each.rows else [])
         assert (
             len({name.lower() for name in [*names, "one", "obj", "c_one"]})
-            == each.columns + each.row_count + 3
+            == each.n_columns + each.n_rows + 3
         )
         assert all(re.fullmatch(r"[a-df-hj-mo-z][a-z0-9_]{0,14}", name) for name in names)
 

@@ -35,10 +35,10 @@ from crossfield.export.verify.comparison import evaluation_difference, of_proble
 from crossfield.export.verify.verify import Verdict, verify
 from crossfield.export.writing import records
 from crossfield.export.writing.curvature import probtype
-from crossfield.export.writing.names import column_names, row_names
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem, with_integers_fixed
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
@@ -67,7 +67,7 @@ def names(problem: Problem) -> tuple[list[str], list[str]]:
 def limits(problem: Problem) -> tuple[Any, Any]:
     """Left and right sides of all rows, the row `c_ONE` of LP and MPS left out."""
     model = of_problem(problem)
-    return model.row_lower[: problem.row_count], model.row_upper[: problem.row_count]
+    return model.row_lower[: problem.n_rows], model.row_upper[: problem.n_rows]
 
 
 def assert_values(found: list[float], expected: Any) -> None:
@@ -112,7 +112,9 @@ def test_they_are_written_only_when_asked_for(tmp_path: Path):
     assert DEFAULTS == ("nl", "gms", "lp", "mps")
     problem = make_problem("milp-mccormick", make_instance())
     assert {entry["format"] for entry in write_problem(problem, tmp_path).document["files"]} == set(DEFAULTS)
-    (manifest,) = write_all(problem.instance, tmp_path / "more", ["milp-mccormick"], MORE)
+    (manifest,) = write_all(
+        problem.instance, tmp_path / "more", formulations=["milp-mccormick"], formats=MORE
+    )
     listed = [entry["name"] for entry in manifest.document["files"]]
     assert listed == [f"tiny.milp-mccormick.{suffix}" for suffix in ("mod", "dat", "osil", "qplib", "bar")]
     for entry in read_manifest(manifest.path).document["files"]:
@@ -153,7 +155,7 @@ def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
         f"write_all(sample('skew', 6), sys.argv[1], {chosen!r}, {MORE!r})"
     )
     here = tmp_path / "here"
-    write_all(sample("skew", 6), here, chosen, MORE)
+    write_all(sample("skew", 6), here, formulations=chosen, formats=MORE)
     environment = os.environ | {"PYTHONHASHSEED": "7"}
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "there")], check=True, env=environment)
     files = sorted(path.name for path in here.iterdir())
@@ -203,7 +205,7 @@ def glpsol(*arguments: str | Path) -> str:
 def indexed(problem: Problem) -> Iterator[tuple[str, str, Any]]:
     """Each block that is not empty: its name, its indices as data, and its columns."""
     for block in filter(lambda block: block.count, problem.blocks.values()):
-        labels = names(problem)[0][block.columns]
+        labels = names(problem)[0][block.slice]
         places = [
             re.sub(r"_0*(\d)", r" \1", label.removeprefix(block.name)).replace("_", " ") for label in labels
         ]
@@ -411,7 +413,7 @@ def osil_model(path: Path) -> tuple[Meaning, Any, float]:
 def assert_means(model: Meaning, problem: Problem) -> None:
     """Names, bounds, types and rows are the problem's to the bit; ONE and its row are missing."""
     expected = of_problem(problem)
-    n, m = problem.columns, problem.row_count
+    n, m = problem.n_columns, problem.n_rows
     assert (model.columns, model.rows) == (expected.columns[:n], expected.rows[:m])
     for name in ("lower", "upper", "integer"):
         np.testing.assert_array_equal(getattr(model, name), getattr(expected, name)[:n], err_msg=name)
@@ -549,7 +551,7 @@ def test_qplib_says_what_the_problem_is(label: str, tmp_path: Path):
     assert (letters[1] == "C") == (not problem.integer.any())
     assert letters[2] == ("B" if not problem.rows else "Q" if problem.row_degree == 2 else "L")
     if letters[0] in "DC":  # what is called convex is so
-        hessian = np.zeros((problem.columns, problem.columns))
+        hessian = np.zeros((problem.n_columns, problem.n_columns))
         np.add.at(hessian, tuple(model.quadratic_at.T), model.quadratic)
         assert np.linalg.eigvalsh(hessian + hessian.T).min() > -1e-9
 
@@ -605,7 +607,7 @@ def test_a_start_has_its_place(name: str, tmp_path: Path):
         return
     usual, count, *rest = text[: text.index("start of a row's dual")].split("# start, where not listed")
     lines = (usual.rsplit("\n", 1)[1] + count).split("\n")
-    values = np.full(problem.columns, float(lines[0]))
+    values = np.full(problem.n_columns, float(lines[0]))
     for line in lines[2:-1]:
         values[int(line.split()[0]) - 1] = float(line.split()[1])
     assert rest == []

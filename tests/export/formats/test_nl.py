@@ -76,8 +76,8 @@ def test_the_solver_library_sees_the_problem(label: str, tmp_path: Path):
         expected = values_at(problem, point)
         assert objective == pytest.approx(expected[0], rel=1e-9, abs=1e-9)
         np.testing.assert_allclose(rows, expected[1], rtol=1e-9, atol=1e-9)
-        assert statistics["total no. of variables"] == problem.columns
-        assert statistics["total no. of constraints"] == problem.row_count
+        assert statistics["total no. of variables"] == problem.n_columns
+        assert statistics["total no. of constraints"] == problem.n_rows
         if main and turn == 0:
             differences = [difference(problem, point, column) for column in order]
             np.testing.assert_allclose(gradient, [goal for goal, _ in differences], rtol=1e-5, atol=1e-5)
@@ -86,7 +86,7 @@ def test_the_solver_library_sees_the_problem(label: str, tmp_path: Path):
 
 def difference(problem: Problem, point: np.ndarray, column: int) -> tuple[float, np.ndarray]:
     """Derivatives by a column, as central differences."""
-    step = 1e-5 * (np.arange(problem.columns) == column)
+    step = 1e-5 * (np.arange(problem.n_columns) == column)
     (high, high_rows), (low, low_rows) = values_at(problem, point + step), values_at(problem, point - step)
     return (high - low) / 2e-5, (high_rows - low_rows) / 2e-5
 
@@ -176,8 +176,8 @@ def test_names_stand_in_file_order_and_the_objective_comes_last(tmp_path: Path):
     write(problem, tmp_path / "model.nl")
     columns = (tmp_path / "model.col").read_text().splitlines()
     rows = (tmp_path / "model.row").read_text().splitlines()
-    assert len(columns) == problem.columns
-    assert len(rows) == problem.row_count + 1
+    assert len(columns) == problem.n_columns
+    assert len(rows) == problem.n_rows + 1
     assert rows[-1] == "obj"
     assert rows[0].startswith("c16")  # nonlinear rows first
     header = (tmp_path / "model.nl").read_text().splitlines()
@@ -193,9 +193,9 @@ def test_binary_holds_the_numbers_themselves():
     assert head[0] == b"b3 1 1 0"
     assert head[5].split() == [b"0", b"0", b"1", b"1"]
     assert head[10].startswith(b"C" + struct.pack("<i", 0))
-    place = data.index(b"x" + struct.pack("<i", problem.columns)) + 5
-    entries = np.frombuffer(data[place : place + 12 * problem.columns], dtype="<i4, <f8")
-    np.testing.assert_array_equal(entries["f0"], np.arange(problem.columns))
+    place = data.index(b"x" + struct.pack("<i", problem.n_columns)) + 5
+    entries = np.frombuffer(data[place : place + 12 * problem.n_columns], dtype="<i4, <f8")
+    np.testing.assert_array_equal(entries["f0"], np.arange(problem.n_columns))
     np.testing.assert_array_equal(entries["f1"], point[nl.Layout(problem).order])
 
 

@@ -56,7 +56,7 @@ def test_messages_about_numbers_of_numpy_are_plain():
     """Values from arrays, passed to every function that prints them."""
     mask, one = np.ones((1, 2), bool), np.float64(1.0)
     instance = one_stroke()
-    field = cf.greedy(instance)
+    field = cf.greedy_field(instance)
     wrong = [
         lambda: one_stroke(skew_coefficient=np.float64(-1.0)),
         lambda: one_stroke(stroke_coefficient=np.float64("nan")),

@@ -14,9 +14,9 @@ import pytest
 from cases import CASES, LOW_DEGREE, make_field, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import FORMATS, carried
-from crossfield.export.writing.names import column_names
 from crossfield.models.errors import InstanceError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from loops import for_each
 from oracles import by_casadi, by_highs, by_scip
@@ -53,7 +53,7 @@ def test_model_is_the_problem(label: str):
     )
     assert all(v.value is None for v in columns)
     rows = list(model.component_data_objects(pyo.Constraint))
-    assert len(rows) == problem.row_count
+    assert len(rows) == problem.n_rows
     for point in points_of(problem, 3):
         for variable, value in zip(columns, point, strict=True):
             variable.set_value(value, skip_validation=True)
@@ -167,7 +167,7 @@ def test_values_of_pyomos_lp_are_ours(label: str, tmp_path: Path):
 def test_one_pixel_has_empty_components(name: str):
     problem = make_problem(name, make_instance("pixel"))
     model = to_pyomo(problem)
-    assert len(columns_of(model, problem)) == problem.columns
+    assert len(columns_of(model, problem)) == problem.n_columns
 
 
 def test_pyomo_is_imported_for_this_alone():

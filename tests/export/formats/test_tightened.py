@@ -126,7 +126,9 @@ def test_every_format_carries_them(proof, tmp_path):
 
 def test_files_without_a_certificate_say_nothing_of_it(proof, tmp_path):
     certificate, _ = proof
-    (manifest,) = write_all(certificate.field.instance, tmp_path, ["milp-mccormick"], ["lp"])
+    (manifest,) = write_all(
+        certificate.field.instance, tmp_path, formulations=["milp-mccormick"], formats=["lp"]
+    )
     assert not {"windows", "tightened"} & set(manifest.document)
     assert SAID not in (tmp_path / "random.milp-mccormick.lp").read_text()
 
@@ -152,7 +154,11 @@ def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
     assert "field.npz: " in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
     manifest = write_all(
-        certificate.field.instance, tmp_path / "m", ["milp-mccormick"], ["lp"], windows=windows
+        certificate.field.instance,
+        tmp_path / "m",
+        formulations=["milp-mccormick"],
+        formats=["lp"],
+        windows=windows,
     )[0]
     broken = manifest.document | {"windows": manifest.document["windows"] | {"p_max": [64]}}
     manifest.path.write_text(json.dumps(broken))

@@ -19,8 +19,8 @@ from cases import LOW_DEGREE, make_field, make_instance, names_of, points_of, pr
 from crossfield.export.formats.registry import FORMATS, carried, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import BadInputError, check
-from crossfield.export.writing.names import column_names
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
@@ -134,7 +134,7 @@ def test_integers_that_are_not_quite_whole_count_as_they_are_or_rounded(tmp_path
     assert rounded.worst < 1e-14
     assert float(label(rounded, "objective")) == pytest.approx(problem.objective_value(exact), rel=1e-14)
     quartic = formulate(field.instance, "minlp-quartic")
-    changed = np.concatenate([point[problem.blocks[name].columns] for name in quartic.blocks])
+    changed = np.concatenate([point[problem.blocks[name].slice] for name in quartic.blocks])
     found = check(str(tmp_path / "i.json"), file)
     given, whole = (
         float(text.split()[0])
@@ -567,7 +567,7 @@ def test_an_instance_of_an_earlier_version_with_crossings_is_refused(tmp_path):
     document = json.loads(write_instance(instance, path).read_text())
     path.write_text(json.dumps(document | {"crossings": document["strokes"][:1]}))
     problem = formulate(instance, "milp-mccormick")
-    point = save_point(tmp_path / "a.sol", problem, np.zeros(problem.columns))
+    point = save_point(tmp_path / "a.sol", problem, np.zeros(problem.n_columns))
     with pytest.raises(BadInputError, match="holds crossings"):
         check(str(path), point)
 

@@ -35,7 +35,6 @@ from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.field import CrossField
@@ -43,7 +42,8 @@ from crossfield.models.field.file import read_field
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.file import read_instance
-from crossfield.models.search.greedy import greedy
+from crossfield.models.processes.limits import Limits
+from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.published import redrawn
 from crossfield.models.sketch.samples import sample, sample_svg
 from crossfield.models.sketch.svg import read_svg
@@ -355,7 +355,7 @@ def test_every_problem_can_be_had_from_instance_and_sidecar(built):
     for document in built.entries:
         problem = problem_of(built, document)
         assert problem.problem_class == document["class"]
-        assert problem.columns == document["counts"]["variables"]
+        assert problem.n_columns == document["counts"]["variables"]
 
 
 # Points, checked with readers that nobody here wrote
@@ -479,7 +479,7 @@ def test_the_free_z_of_the_printed_facet_is_the_best_for_its_field(built):
     )
     point = complete_point(problem, field)
     assert problem.violation(point).worst < 1e-12
-    z, t = (problem.blocks[name].columns for name in ("z", "t"))
+    z, t = (problem.blocks[name].slice for name in ("z", "t"))
     first, second = field.beta[instance.grid.first], field.beta[instance.grid.second]
     for share in np.linspace(-np.pi / 4, np.pi / 4, 101):
         trial = point.copy()
@@ -499,7 +499,7 @@ def test_eigenvalue_counts_are_those_of_differences_of_the_objective(built):
     """The Hessian once more, from values of the objective alone."""
     document = by_formulation(built, "cf_own_n004")["qp-fixed"]
     problem = problem_of(built, document)
-    n = problem.columns
+    n = problem.n_columns
     unit, zero = np.eye(n), problem.objective_value(np.zeros(n))
     single = np.array([problem.objective_value(row) for row in unit])
     hessian = np.array(
@@ -583,7 +583,7 @@ def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_byte
 @pytest.mark.slow
 def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
     """Its threads stay in the process, and their number used to make the next run fail in silence."""
-    instance = sample("mouse", 4, "box", stroke_weight=0.2)
+    instance = sample("mouse", 4, gauge="box", stroke_weight=0.2)
     found = []
     for threads in (1, 2):
         highs = highspy.Highs()
@@ -592,7 +592,7 @@ def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
         highs.setOptionValue("threads", threads)
         highs.addConstr(highs.addVariable(ub=5, obj=-1, type=highspy.HighsVarType.kInteger) <= 2.5)
         assert highs.run() == highspy.HighsStatus.kOk
-        found.append([each.field.energy(1).total for each in better_in_1norm(greedy(instance), "tiny")])
+        found.append([each.field.energy(1).total for each in better_in_1norm(greedy_field(instance), "tiny")])
     assert len(found[0]) == 2
     assert found[0] == found[1]
 

@@ -112,7 +112,7 @@ def test_a_forged_certificate_is_found(lib):
     good, name = (lib / CERTIFICATE).read_bytes(), f"{STEM}.about.json"
     shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
     assert found(lib)[CERTIFICATE] == f"is not a certificate of {STEM}"
-    worse = cf.greedy(cf.read_instance(lib / f"{STEM}.instance.json"))
+    worse = cf.greedy_field(cf.read_instance(lib / f"{STEM}.instance.json"))
     proof = cf.prove(worse.instance, jobs=1)
     weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
     assert write_certificate(weak, lib / CERTIFICATE).status == "gap"

@@ -187,7 +187,7 @@ def test_auxiliary_variables_are_computed_again(built, tmp_path):
     lib = shutil.copytree(built, tmp_path / "lib")
     problem, point = point_of(lib)
     for name in ("s", "t", "gamma", "psi"):
-        point[problem.blocks[name].columns] -= 1e-6
+        point[problem.blocks[name].slice] -= 1e-6
     assert problem.violation(point).worst > 1e-7
     told = submit_point(written(problem, point, tmp_path), lib, entry=MILP)
     assert told.objective == pytest.approx(told.known, abs=1e-8)
@@ -199,7 +199,7 @@ def test_angles_and_jumps_are_not_mended(block, built, tmp_path):
     """What the answer is about has to be feasible as it stands."""
     lib = shutil.copytree(built, tmp_path / "lib")
     problem, point = point_of(lib)
-    at = problem.blocks[block].columns
+    at = problem.blocks[block].slice
     point[at] = problem.blocks[block].upper + (1.0 if block.startswith("p") else 1e-6)
     with pytest.raises(SolutionError, match="not a feasible point"):
         submit_point(written(problem, point, tmp_path), lib, entry=MILP)
@@ -208,7 +208,7 @@ def test_angles_and_jumps_are_not_mended(block, built, tmp_path):
 def test_fractional_jumps_are_refused(built, tmp_path):
     lib = shutil.copytree(built, tmp_path / "lib")
     problem, point = point_of(lib)
-    point[problem.blocks["p1"].columns] = 0.4
+    point[problem.blocks["p1"].slice] = 0.4
     with pytest.raises(SolutionError, match=r"integrality 0\.4"):
         submit_point(written(problem, point, tmp_path), lib, entry=MILP)
 
@@ -223,7 +223,7 @@ def point_of(lib):
 def written(problem, point, folder):
     """The point as a list of names and values."""
     from crossfield.export.verify.comparison import names_of
-    from crossfield.export.writing.names import column_names
+    from crossfield.models.formulations.names import column_names
 
     lines = [
         f"{name} {value!r}"

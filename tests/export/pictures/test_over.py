@@ -47,7 +47,7 @@ def field_of(path):
 
 def test_the_drawing_is_the_lowest_layer_on_its_own_page(tmp_path):
     drawing = svg(tmp_path / "a.svg")
-    root, layers = layers_of(draw(field_of(drawing), tmp_path / "over.svg", over=drawing))
+    root, layers = layers_of(draw(field_of(drawing), tmp_path / "over.svg", underlay=drawing))
     assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
     assert next(iter(layers)) == "drawing"
     assert layers["strokes"].get("style") == "display:none"
@@ -75,7 +75,7 @@ def test_the_drawing_is_the_lowest_layer_on_its_own_page(tmp_path):
 def test_the_page_has_the_size_that_the_drawing_declares(tmp_path, size, expected):
     drawing = svg(tmp_path / "a.svg")
     (tmp_path / "b.svg").write_text(drawing.read_text().replace("viewBox", f"{size} viewBox"))
-    root, _ = layers_of(draw(field_of(drawing), tmp_path / "over.svg", over=tmp_path / "b.svg"))
+    root, _ = layers_of(draw(field_of(drawing), tmp_path / "over.svg", underlay=tmp_path / "b.svg"))
     assert [root.get("width"), root.get("height")] == expected
 
 
@@ -87,7 +87,7 @@ def test_a_page_that_the_field_reaches_beyond_grows_in_the_unit_that_the_drawing
         .replace("<svg", '<svg width="5in" height="4in"')
     )
     (tmp_path / "b.svg").write_text(beyond)
-    root, _ = layers_of(draw(field_of(drawing), tmp_path / "over.svg", over=tmp_path / "b.svg"))
+    root, _ = layers_of(draw(field_of(drawing), tmp_path / "over.svg", underlay=tmp_path / "b.svg"))
     assert root.get("viewBox") == "0 0 120 90"
     assert [root.get("width"), root.get("height")] == ["6in", "4.5in"]
 
@@ -95,7 +95,7 @@ def test_a_page_that_the_field_reaches_beyond_grows_in_the_unit_that_the_drawing
 def test_nothing_of_a_hostile_drawing_but_its_strokes_comes_out(tmp_path):
     (tmp_path / "evil.svg").write_text(HOSTILE)
     field = field_of(tmp_path / "evil.svg")
-    path = draw(field, tmp_path / "over.svg", over=tmp_path / "evil.svg")
+    path = draw(field, tmp_path / "over.svg", underlay=tmp_path / "evil.svg")
     text = path.read_text().lower()
     for word in ("evil", "script", "alert", "secret", "onload", "onclick", "image", "use", "iframe", "style>",
                  "url(", "href=", "<text", "animate", "entity", "doctype"):  # fmt: skip
@@ -105,7 +105,7 @@ def test_nothing_of_a_hostile_drawing_but_its_strokes_comes_out(tmp_path):
     entity = '<!DOCTYPE svg [<!ENTITY x SYSTEM "file:///etc/passwd">]>' + svg(tmp_path / "b.svg").read_text()
     (tmp_path / "entity.svg").write_text(entity.replace("</svg>", "<text>&x;</text></svg>"))
     with pytest.raises(InputError, match="entities"):
-        draw(field, tmp_path / "never.svg", over=tmp_path / "entity.svg")
+        draw(field, tmp_path / "never.svg", underlay=tmp_path / "entity.svg")
     assert not (tmp_path / "never.svg").exists()
 
 
@@ -116,7 +116,7 @@ def test_a_bitmap_is_embedded_as_its_ink_alone(tmp_path):
     ImageDraw.Draw(image).line((20, 60, 120, 60), fill="#d00000", width=3)
     image.save(tmp_path / "a.jpg", comment=b"secret", quality=95)
     field = field_of(tmp_path / "a.jpg")
-    root, layers = layers_of(draw(field, tmp_path / "over.svg", over=tmp_path / "a.jpg"))
+    root, layers = layers_of(draw(field, tmp_path / "over.svg", underlay=tmp_path / "a.jpg"))
     assert numbers(root.get("viewBox")).tolist() == [0, 0, 150, 110]
     (element,) = layers["drawing"]
     assert (element.get("width"), element.get("height")) == ("150", "110")
@@ -128,7 +128,7 @@ def test_a_bitmap_is_embedded_as_its_ink_alone(tmp_path):
     assert pixels[5, 5, 3] == 0
     assert pixels[60, 70].tolist() == [*bytes.fromhex(INK["red"][1:]), 255]
     assert pixels[30, 70].tolist() == [*bytes.fromhex(INK["black"][1:]), 255]
-    picture = Image.open(draw(field, tmp_path / "over.png", over=tmp_path / "a.jpg")).convert("L")
+    picture = Image.open(draw(field, tmp_path / "over.png", underlay=tmp_path / "a.jpg")).convert("L")
     dark = np.asarray(picture.resize((150, 110), Image.Resampling.BOX)) < 140
     assert dark[30, 25:115].mean() > 0.9
     assert not dark[:25].any()
@@ -141,7 +141,7 @@ def test_pen_strokes_may_lie_beyond_their_page(tmp_path):
     path.write_text("#80 30\n@1\n" + "\n".join(rows) + "\n")
     field = field_of(path)
     assert read_drawing(path, on=field.instance).page == (0, -20, 80, 50)
-    root, layers = layers_of(draw(field, tmp_path / "over.svg", over=path))
+    root, layers = layers_of(draw(field, tmp_path / "over.svg", underlay=path))
     assert numbers(root.get("viewBox")).tolist() == [0, -20, 80, 50]
     assert lines_in(layers["drawing"])[0].tolist() == [[0, -20], [60, -20], [60, 20]]
 
@@ -166,15 +166,15 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
     field = field_of(svg(tmp_path / "a.svg"))
     far = BOXES.replace("<g ", '<g transform="translate(900 900)" ')
     with pytest.raises(InputError, match="lies elsewhere") as caught:
-        draw(field, tmp_path / "over.svg", over=svg(tmp_path / "far.svg", far))
+        draw(field, tmp_path / "over.svg", underlay=svg(tmp_path / "far.svg", far))
     assert "give the one that its instance was read from" in str(caught.value)
     with pytest.raises(InputError, match="use kind layers"):
-        draw(field, tmp_path / "over.png", kind="crosses", over=tmp_path / "a.svg")
+        draw(field, tmp_path / "over.png", kind="crosses", underlay=tmp_path / "a.svg")
     with pytest.raises(InputError, match="lies elsewhere"):  # before anything is searched for
         run(field.instance, tmp_path / "run", drawing=tmp_path / "far.svg")
     assert not (tmp_path / "run").exists()
     with pytest.raises(InputError, match="computed, not drawn"):
-        draw(field, tmp_path / "over.png", over="wave_sheet")
+        draw(field, tmp_path / "over.png", underlay="wave_sheet")
 
 
 @pytest.mark.parametrize(

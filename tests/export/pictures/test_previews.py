@@ -40,8 +40,8 @@ def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, 
         assert len(line) < 130
     assert instance.summary in lines[0]
     assert f"{field.energy().total:.6g}" in lines[1]
-    assert f"{problem.columns} columns" in lines[2]
-    assert f"{problem.row_count} rows" in lines[2]
+    assert f"{problem.n_columns} columns" in lines[2]
+    assert f"{problem.n_rows} rows" in lines[2]
     assert f"objective {solution.objective:.6g}" in lines[3]
     assert "optimal" in lines[3]
 

@@ -18,7 +18,7 @@ from crossfield.models.processes import control
 def relaxed(tmp_path):
     """A relaxed problem with rows, its model with the greedy field as start, and the order of its columns."""
     problem = cf.formulate(cf.sample("skew", 6), "miqcp-bilinear", relax=True)
-    cf.write(problem, tmp_path / "model.nl", start=cf.greedy(problem.instance))
+    cf.write(problem, tmp_path / "model.nl", start=cf.greedy_field(problem.instance))
     return problem, read_nl(tmp_path / "model.nl"), Layout(problem).order
 
 
@@ -33,7 +33,9 @@ def own_interrupt():
 def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     problem, model, order = relaxed
     watch = Watch(model)
-    assert watch.value == pytest.approx(problem.objective_value(problem.point(cf.greedy(problem.instance))))
+    assert watch.value == pytest.approx(
+        problem.objective_value(problem.point(cf.greedy_field(problem.instance)))
+    )
 
     def seen(point):
         value, rows = model.evaluate(point)
@@ -43,9 +45,9 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
         return watch.value
 
     lower = problem.point(cf.power_field(problem.instance))
-    worse, broken = problem.point(cf.greedy(problem.instance)), lower.copy()
-    worse[problem.blocks["s"].columns] += 0.1
-    broken[problem.blocks["s"].columns] -= 10 * FEASIBLE
+    worse, broken = problem.point(cf.greedy_field(problem.instance)), lower.copy()
+    worse[problem.blocks["s"].slice] += 0.1
+    broken[problem.blocks["s"].slice] -= 10 * FEASIBLE
     start = watch.value
     assert seen(worse[order]) == seen(broken[order]) == start
     assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))

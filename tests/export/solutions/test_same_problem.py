@@ -17,7 +17,7 @@ from crossfield.models.search.starts import first_field
 def ring():
     """A sample whose greedy field is improved by other jumps: they are not the same data."""
     instance = cf.sample("ring", 8, stroke_weight=0.3, skew_weight=1e-7)
-    assert (cf.greedy(instance).p != first_field(instance).p).any()
+    assert (cf.greedy_field(instance).p != first_field(instance).p).any()
     return instance
 
 
@@ -68,14 +68,16 @@ def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
     arguments = ["solve", str(instance), "--formulation", "qp-fixed", "-o", str(tmp_path / "both"), "-q"]
     assert invoke(arguments) == 0
     assert listed() == [".col", ".gms", ".lp", ".mps", ".nl", ".row"]
-    greedy = cf.write_field(cf.greedy(cf.read_instance(instance)), tmp_path / "greedy.npz")
+    greedy = cf.write_field(cf.greedy_field(cf.read_instance(instance)), tmp_path / "greedy.npz")
     assert invoke([*arguments, "--start", str(greedy)]) == 0
     assert listed() == [".col", ".nl", ".row"]
 
 
 def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
-    """A field of energy 15.5 came from an optimum of 1e-6: columns alike, fixed jumps different."""
-    other = cf.write_problem(cf.formulate(ring, "qp-fixed", p=cf.greedy(ring).p), tmp_path / "files", ["nl"])
+    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
+    other = cf.write_problem(
+        cf.formulate(ring, "qp-fixed", p=cf.greedy_field(ring).p), tmp_path / "files", formats=["nl"]
+    )
     assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
     assert "solution of another problem" in capsys.readouterr().err
     assert not (tmp_path / "field.npz").exists()
@@ -151,7 +153,7 @@ def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):
 def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
     """Also in files that hold the problem with products lifted: they are of the same problem."""
     problem = cf.formulate(ring, "minlp-quartic")
-    manifest = cf.write_problem(problem, tmp_path, ["mps"])
+    manifest = cf.write_problem(problem, tmp_path, formats=["mps"])
     stamp = f"sha256_{manifest.document['sha256'][:12]}"
     held = cf.write(problem, tmp_path / "a.mps").problem
     assert problem.stamp == held.stamp == stamp
@@ -159,8 +161,8 @@ def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
 
 
 def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):
-    """The second stage's jumps are the MILP's: only its own manifest can read its solution."""
-    cf.two_stage(ring, tmp_path, limits=cf.Limits(5.0))
+    """The second stage's jumps are the MILP's: only a manifest of its own can read its solution."""
+    cf.two_stage(ring, folder=tmp_path, limits=cf.Limits(5.0))
     manifest = cf.read_manifest(only(tmp_path, "*.qp-fixed.manifest.json"))
     solution = cf.read_solution(only(tmp_path, "*.qp-fixed.ipopt.sol"), manifest.problem())
     assert solution.violation.worst < 1e-6

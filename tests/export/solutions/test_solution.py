@@ -7,9 +7,9 @@ from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import ROUND, Solution, read_solution
-from crossfield.export.writing.names import column_names
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import formulate, lifted
 from loops import for_each
 
@@ -40,7 +40,7 @@ def by_name(path, names, values, *, objective=1.0, status="Optimal"):
 
 
 def by_position(path, problem, point, *, binary=False):
-    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.row_count, 0, binary=binary)
+    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0, binary=binary)
 
 
 @for_each("name", FORMULATIONS)
@@ -69,7 +69,7 @@ def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path,
     held = lifted(problem)
     path = by_name(tmp_path / "x.sol", names_of(held), held.point(field))
     solution = read_solution(path, problem)
-    assert solution.problem.columns == held.columns == problem.columns + len(field.p)
+    assert solution.problem.n_columns == held.n_columns == problem.n_columns + len(field.p)
     assert solution.unknown == 0
     assert solution.objective == pytest.approx(problem.objective_value(problem.point(field)), rel=1e-12)
     assert solution.field.p.tolist() == field.p.tolist()
@@ -78,7 +78,7 @@ def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path,
 def test_a_cheated_product_shows_as_a_violation(tmp_path, field):
     held = lifted(problem_of(field, "minlp-quartic"))
     point = held.point(field)
-    cheated = held.blocks["z"].columns
+    cheated = held.blocks["z"].slice
     point[cheated] += 0.25
     solution = read_solution(
         by_name(tmp_path / "x.sol", names_of(held), point), problem_of(field, "minlp-quartic")
@@ -152,8 +152,8 @@ def test_with_the_printed_facet_p_is_believed_and_z_is_not(tmp_path):
     grid = field.instance.grid
     z = np.clip((beta[grid.first] - beta[grid.second]) / 2, -np.pi / 4, 0)
     blocks = problem.blocks
-    point[blocks["z"].columns][even] = z[even]
-    point[blocks["t"].columns][even] = np.abs(beta[grid.first] - 2 * z - beta[grid.second])[even]
+    point[blocks["z"].slice][even] = z[even]
+    point[blocks["t"].slice][even] = np.abs(beta[grid.first] - 2 * z - beta[grid.second])[even]
     solution = read_solution(by_name(tmp_path / "x.sol", names_of(problem), point), problem)
     assert solution.violation.worst < 1e-12
     assert solution.field.p.tolist() == field.p.tolist()
@@ -171,7 +171,7 @@ def test_a_missing_column_is_an_error(tmp_path, field):
     problem = problem_of(field, "milp-mccormick")
     names, values = names_of(problem)[:-1], problem.point(field)[:-1]
     with pytest.raises(
-        SolutionError, match=rf"x.sol: 1 of {problem.columns} columns of milp-mccormick are missing"
+        SolutionError, match=rf"x.sol: 1 of {problem.n_columns} columns of milp-mccormick are missing"
     ):
         read_solution(by_name(tmp_path / "x.sol", names, values), problem)
 
@@ -196,7 +196,7 @@ def test_infinite_values_are_an_error(tmp_path, field, value):
 def test_a_file_without_a_point_has_no_field(tmp_path, field):
     problem = problem_of(field, "milp-mccormick")
     path = tmp_path / "x.sol"
-    write_ampl_sol(path, "no room", np.zeros(0), problem.row_count, 220, columns=problem.columns)
+    write_ampl_sol(path, "no room", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
     solution = read_solution(path, problem)
     assert (solution.point, solution.objective, solution.violation) == (None, None, None)
     assert solution.status == Status.INFEASIBLE

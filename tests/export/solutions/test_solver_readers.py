@@ -41,8 +41,8 @@ from answers import (
 from crossfield.export.solutions.readers.registry import READERS, parse_raw, read_raw
 from crossfield.export.solutions.readers.text import HEAD, Status, values_for, values_in_order
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.writing.names import column_names
 from crossfield.models.errors import SolutionError
+from crossfield.models.formulations.names import column_names
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each

@@ -71,7 +71,7 @@ def relaxed_by_highs(skew, path):
 def by_names(problem, values):
     """A plain list of names and values."""
     from cases import names_of
-    from crossfield.export.writing.names import column_names
+    from crossfield.models.formulations.names import column_names
 
     pairs = zip(names_of(column_names(problem)), map(float, values), strict=True)
     return "".join(f"{name} {value!r}\n" for name, value in pairs)
@@ -173,12 +173,12 @@ def test_a_bound_of_gurobi_above_the_objective_contradicts_it(tmp_path):
 def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, tmp_path, code, status):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
-    point = held.point(cf.greedy(instance))
+    point = held.point(cf.greedy_field(instance))
     bad = point.copy()
     bad[: len(instance.theta)] += 1
     for values in (point, bad):
         path = tmp_path / "x.sol"
-        write_ampl_sol(path, "some words", values[Layout(held).order], held.row_count, code)
+        write_ampl_sol(path, "some words", values[Layout(held).order], held.n_rows, code)
         exit_code, facts, complaint, written = reading(path)
         assert (exit_code, written) == (1, False)
         assert facts["claimed"] == status
@@ -193,7 +193,7 @@ def test_values_of_an_ampl_file_that_tells_of_no_answer_are_none(skew, reading, 
 def test_values_that_no_column_can_have_are_refused(skew, reading, tmp_path):
     instance = cf.read_instance(skew / "skew.instance.json")
     held = formulate(instance, MILP)
-    point = held.point(cf.greedy(instance))
+    point = held.point(cf.greedy_field(instance))
     for block, value in (("p2", 4294967296.0), ("p2", 1e308), ("alpha", 1e300), ("s", -1.1 * LARGEST)):
         wrong = point.copy()
         wrong[held.blocks[block].offset] = value
@@ -245,7 +245,7 @@ def answers(tmp_path_factory):
     point = read_solution(folder / "x.sol", milp).point[Layout(milp).order]
     for binary in (False, True):
         path = write_ampl_sol(
-            folder / "a.sol", "optimal solution found", point, milp.row_count, 0, binary=binary
+            folder / "a.sol", "optimal solution found", point, milp.n_rows, 0, binary=binary
         )
         found[f"ampl binary={binary}"] = (path.read_bytes(), milp)
     return found

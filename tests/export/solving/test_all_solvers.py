@@ -6,9 +6,9 @@ import pytest
 from cases import make_instance
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import Solvers
 from crossfield.models.formulations.problem import formulate
+from crossfield.models.processes.limits import Limits
 from crossfield.models.proof.prove import prove
 
 pytestmark = pytest.mark.oracles

@@ -57,7 +57,7 @@ def test_the_angles_are_those_of_fields_made_without_the_curve():
     assert (found.drawn, cf.evaluate(instance, methods=["greedy"], curves=2).drawn) == (True, False)
     curves = hidden_curves(found.instance, curves_of(instance, "mouse"), 2)
     for row, hidden in zip(found.curves, curves, strict=True):
-        field = cf.greedy(hidden.rest)
+        field = cf.greedy_field(hidden.rest)
         at = instance.stroke_pixels[hidden.stroke]
         pixel = instance.grid.number[at[:, 0], at[:, 1]]
         theta = instance.theta[hidden.stroke]

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.solving.methods import METHODS, Request
 from crossfield.export.solving.proven import NOTHING, certified
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.limits import Limits
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.prove import _Limits
-from crossfield.models.search.greedy import greedy
+from crossfield.models.proof.work import WorkLimits
+from crossfield.models.search.greedy import greedy_field
 
 
 class Ticking:
@@ -48,7 +48,7 @@ def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path
 
 
 def test_two_stages_without_time_return_the_start(tmp_path):
-    start = greedy(cf.sample("mouse", 12))
+    start = greedy_field(cf.sample("mouse", 12))
     request = Request(start.instance, tmp_path, Limits(1e-3), start=start, clock=Ticking())
     (only,) = METHODS["two-stage"].find(request)
     assert only.field.energy(1).total == pytest.approx(start.energy(1).total, rel=1e-9)
@@ -56,7 +56,7 @@ def test_two_stages_without_time_return_the_start(tmp_path):
 
 def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
     """The deadline is far away, although its clock began long after that of other processes."""
-    field = greedy(cf.sample("mouse", 6))
+    field = greedy_field(cf.sample("mouse", 6))
     problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
     held = write(problem, tmp_path / "model.nl", start=field).problem
     files, deadline = Files.beside(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)
@@ -73,7 +73,7 @@ def passed():
 
 
 def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
-    proof = cf.prove(cf.sample("mouse", 24), seconds=passed, certified=True)
+    proof = cf.prove(cf.sample("mouse", 24), limits=cf.Limits().until(passed), certified=True)
     assert (proof.bound, proof.status, proof.levels, proof.ended) == (0.0, "gap", (), "time")
     path = tmp_path / "certificate.npz"
     with pytest.raises(SolverError, match="nothing was proven"):
@@ -107,7 +107,7 @@ def test_the_method_prove_reports_that_nothing_was_proven(tmp_path, capsys):
 
 def limits(seconds):
     """Limits of a certified proof whose clock stands still."""
-    return _Limits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
+    return WorkLimits(Deadline.after(seconds, lambda: 0.0), lambda: False, lambda: False, 0.0, certified=True)
 
 
 def test_a_proof_keeps_time_for_its_certificate():

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 
 import crossfield as cf
 import pytest
@@ -13,7 +14,7 @@ from crossfield.models.processes.deadline import Deadline
 def test_without_time_the_start_is_the_answer(tmp_path, name):
     """No solver is started then; a feasible start is the best point so far."""
     instance = cf.sample("skew", 6)
-    start = cf.greedy(instance)
+    start = cf.greedy_field(instance)
     problem = cf.formulate(instance, name, p=start.p if name == "qp-fixed" else None)
     found = cf.solve(problem, folder=tmp_path, start=start, limits=cf.Limits(1e-6))
     assert found.status == Status.LIMIT_WITH_POINT
@@ -38,7 +39,7 @@ def test_limits_become_what_is_left():
     limits = cf.Limits(60.0, 1e-3, 2)
     assert limits.until(deadline) == cf.Limits(10.0, 1e-3, 2)
     now[0] = 20.0
-    assert 0 < limits.until(deadline).seconds < 0.1
+    assert 0 < limits.until(deadline).time_limit < 0.1
 
 
 def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
@@ -50,8 +51,47 @@ def test_the_child_process_of_a_solver_loads_neither_formulas_nor_writers():
 
 def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
     instance = cf.sample("skew", 6)
-    start, problem = cf.greedy(instance), cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(1e-6))
+    start, problem = cf.greedy_field(instance), cf.formulate(instance, "milp-mccormick")
+    found = cf.solve(problem, "highs", folder=tmp_path, start=start, limits=cf.Limits(1e-6))
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
     assert found.bound is None
     assert not list(tmp_path.glob("*.log"))
+
+
+def test_an_event_ends_a_solve_with_its_best_point(tmp_path):
+    """HiGHS does not close the gap of this problem within minutes."""
+    start, asked = cf.greedy_field(cf.sample("bottle", 16)), threading.Event()
+    problem = cf.formulate(start.instance, "milp-mccormick")
+    asked.set()
+    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
+    assert found.interrupted
+    assert found.objective <= problem.objective_value(problem.point(start)) + 1e-6
+    assert found.field.instance.sha256 == start.instance.sha256
+
+
+def test_an_event_ends_a_run_with_the_fields_so_far(tmp_path):
+    asked = threading.Event()
+
+    def progress(line):
+        if line.startswith("PolyVector"):
+            asked.set()
+
+    report = cf.run(cf.sample("skew", 4), tmp_path, limits=cf.Limits(600.0), progress=progress, stop=asked)
+    assert report.interrupted == "polyvector"
+    assert report.field is report.kept.field
+    assert {each.method for each in report.candidates} <= {
+        "start",
+        "greedy",
+        "power",
+        "power + QP",
+        "polyvector",
+    }
+    assert (tmp_path / "field.npz").exists()
+    assert not (tmp_path / "overview.png").exists()
+
+
+def test_an_event_ends_a_measure_with_the_curves_so_far():
+    asked = threading.Event()
+    asked.set()
+    found = cf.evaluate(cf.sample("mouse", 12), methods=["greedy"], stop=asked)
+    assert (found.interrupted, found.curves) == (True, ())

@@ -1,6 +1,7 @@
 """Local solvers: right optima, limits, starts, interrupts, and refusals by name."""
 
 import itertools
+import math
 import re
 import signal
 import subprocess
@@ -20,6 +21,7 @@ from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
+from crossfield.export.solving.methods import Request
 from crossfield.export.solving.run import plan
 from crossfield.models.errors import (
     InputError,
@@ -59,7 +61,7 @@ def random_instance(height, width, seed, *, gauge="strokes", strokes=0.6, skew_c
 def formulated(instance, name, *, relax=False):
     recipe = FORMULATIONS[name]
     return cf.formulate(
-        instance, name, p=cf.greedy(instance).p if recipe.fixed else None, relax=relax or None
+        instance, name, p=cf.greedy_field(instance).p if recipe.fixed else None, relax=relax or None
     )
 
 
@@ -205,8 +207,8 @@ def test_bonmin_and_highs_agree_on_a_milp():
 def test_three_solvers_agree_on_a_qp():
     instance = random_instance(5, 6, 6)
     problem = formulated(instance, "qp-fixed")
-    found = [cf.solve(problem, solver, start=cf.greedy(instance)).objective for solver in BUNDLED]
-    assert found == pytest.approx([least_squares(instance, cf.greedy(instance).p)] * 3, abs=1e-6)
+    found = [cf.solve(problem, solver, start=cf.greedy_field(instance)).objective for solver in BUNDLED]
+    assert found == pytest.approx([least_squares(instance, cf.greedy_field(instance).p)] * 3, abs=1e-6)
 
 
 # The table of solvers and classes
@@ -232,7 +234,7 @@ REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer 
 @cache
 def solution_of(label, solver):
     name, relax = split(label)
-    start = cf.greedy(SMALL)
+    start = cf.greedy_field(SMALL)
     return cf.solve(formulated(SMALL, name, relax=relax), solver, start=start, limits=cf.Limits(250))
 
 
@@ -243,7 +245,7 @@ def test_every_pair_of_the_table_is_solved(label, solver):
     problem = solution.problem
     assert solution.status in SOLVED
     assert solution.violation.worst < 1e-6
-    assert solution.objective <= problem.objective_value(problem.point(cf.greedy(SMALL))) + 1e-6
+    assert solution.objective <= problem.objective_value(problem.point(cf.greedy_field(SMALL))) + 1e-6
     if problem.convex:
         everyone = [solution_of(label, other).objective for label_, other in DONE if label_ == label]
         assert everyone == pytest.approx([solution.objective] * len(everyone), abs=2e-5)
@@ -254,7 +256,7 @@ def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, rea
     name, relax = split(label)
     folder = tmp_path / "out"
     with pytest.raises(UnsupportedBySolverError) as caught:
-        cf.solve(formulated(small, name, relax=relax), solver, folder)
+        cf.solve(formulated(small, name, relax=relax), solver, folder=folder)
     assert reason in str(caught.value)
     assert name in str(caught.value)
     assert solver in str(caught.value)
@@ -296,7 +298,7 @@ def test_a_missing_package_is_a_named_error(small, monkeypatch):
 
 @pytest.mark.parametrize("name", TWO_NORM)
 def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
-    start = cf.greedy(small)
+    start = cf.greedy_field(small)
     expected = least_squares(small, start.p)
     solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
     assert solution.objective == pytest.approx(expected, abs=1e-6)
@@ -305,7 +307,7 @@ def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
 
 @pytest.mark.parametrize("name", ["miqcp-bilinear-l1", "milp-mccormick"])
 def test_with_integers_fixed_ipopt_finds_what_the_lp_finds(small, name):
-    start = cf.greedy(small)
+    start = cf.greedy_field(small)
     expected = least_deviations(small, start.p)
     solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
     assert solution.objective == pytest.approx(expected, abs=1e-6)
@@ -333,8 +335,8 @@ def hard():
     "name,solver", [("milp-mccormick", "highs"), ("miqp-exact", "bonmin"), ("milp-mccormick", "bonmin")]
 )
 def test_a_time_limit_ends_with_the_incumbent(hard, name, solver):
-    """No solver proves it in hours, and all take the start at once: three seconds are enough."""
-    problem, start = cf.formulate(hard, name), cf.greedy(hard)
+    """No solver proves it in hours, and all take the start at once: three seconds are as good as thirty."""
+    problem, start = cf.formulate(hard, name), cf.greedy_field(hard)
     solution = cf.solve(problem, solver, start=start, limits=cf.Limits(3))
     assert solution.status == Status.LIMIT_WITH_POINT
     assert solution.objective <= problem.objective_value(problem.point(start)) + 1e-9
@@ -346,7 +348,7 @@ def test_without_a_start_and_time_there_is_no_point(tmp_path):
     instance = cf.sample("mouse", 30)
     (tmp_path / "mouse.milp-mccormick.highs.sol").write_text("that of yesterday")
     problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path, limits=cf.Limits(1e-6))
+    found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(1e-6))
     assert (found.status, found.point) == (Status.LIMIT_WITHOUT_POINT, None)
     with pytest.raises(SolutionError, match="returned no answer within its time; give it more, or a start"):
         _ = found.field
@@ -383,7 +385,7 @@ def test_a_claim_that_its_point_contradicts_is_no_answer(tmp_path, monkeypatch, 
 def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch):
     """A HiGHS that ignores the clock: the parent ends it, and the start is the answer."""
     instance = cf.sample("mouse", 8)
-    start = cf.greedy(instance)
+    start = cf.greedy_field(instance)
     run_in_children(
         """
         import signal, time
@@ -395,7 +397,7 @@ def test_highs_is_ended_at_its_deadline_and_the_start_kept(tmp_path, monkeypatch
         monkeypatch,
     )
     problem = cf.formulate(instance, "milp-mccormick")
-    found = cf.solve(problem, "highs", tmp_path / "files", limits=cf.Limits(2.0), start=start)
+    found = cf.solve(problem, "highs", folder=tmp_path / "files", limits=cf.Limits(2.0), start=start)
     assert found.status == Status.LIMIT_WITH_POINT
     assert found.objective == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-12)
     assert not list((tmp_path / "files").glob("*.start"))
@@ -417,7 +419,9 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
     problem, files = cf.formulate(cf.sample("mouse", 8), "milp-mccormick"), tmp_path / "files"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        found = cf.solve(problem, "highs", files, limits=cf.Limits(2.0), start=cf.greedy(problem.instance))
+        found = cf.solve(
+            problem, "highs", folder=files, limits=cf.Limits(2.0), start=cf.greedy_field(problem.instance)
+        )
     finally:
         signal.signal(signal.SIGINT, before)
     assert found.status == Status.LIMIT_WITH_POINT
@@ -425,8 +429,8 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
 
 
 def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
-    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
-    cf.solve(problem, "highs", tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
+    cf.solve(problem, "highs", folder=tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
     log = (tmp_path / "mouse.milp-mccormick.highs.log").read_text()
     claimed = re.search(r"MIP start solution is feasible, objective value is (\S+)", log)
     assert float(claimed[1]) == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
@@ -434,7 +438,7 @@ def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
 
 @pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact", "minlp-cubic"])
 def test_the_start_is_in_the_nl_file(tmp_path, small, name):
-    problem, start = formulated(small, name), cf.greedy(small)
+    problem, start = formulated(small, name), cf.greedy_field(small)
     cf.write(problem, tmp_path / "model.nl", start=start)
     builder = ca.NlpBuilder()
     builder.import_nl(str(tmp_path / "model.nl"))
@@ -459,7 +463,7 @@ def test_bonmin_improves_a_start_that_is_not(small):
 
 
 def test_a_wide_gap_ends_the_search_early(hard):
-    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy(hard)
+    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
     solution = cf.solve(problem, "highs", start=start, limits=cf.Limits(300, gap=0.97))
     assert solution.status == Status.OPTIMAL_GLOBAL
     assert solution.bound < 0.9 * solution.objective
@@ -469,20 +473,19 @@ def test_a_wide_gap_ends_the_search_early(hard):
 def test_threads_may_change_from_solve_to_solve(tmp_path, small):
     problem = cf.formulate(small, "milp-mccormick")
     found = [
-        cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=threads)).objective
+        cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=threads)).objective
         for threads in (1, 2, 1, 0)
     ]
     assert found == pytest.approx([found[0]] * 4, abs=1e-7)
-    cf.solve(problem, "highs", tmp_path, limits=cf.Limits(250, threads=1))
+    cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(250, threads=1))
     assert "threads" in (tmp_path / "random_1.milp-mccormick.highs.log").read_text().lower()
 
 
 @pytest.mark.parametrize(
     "given",
     [
-        {"seconds": 0},
-        {"seconds": float("nan")},
-        {"seconds": float("inf")},
+        {"time_limit": 0},
+        {"time_limit": float("nan")},
         {"gap": -1},
         {"threads": -1},
         {"threads": 100000},
@@ -493,10 +496,24 @@ def test_impossible_limits_are_refused(given):
         cf.Limits(**given)
 
 
+def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):
+    endless, instance = cf.Limits(math.inf), cf.sample("skew", 4)
+    for work in (
+        lambda: cf.solve(cf.formulate(instance, "milp-mccormick"), limits=endless),
+        lambda: cf.run(instance, tmp_path, limits=endless),
+        lambda: cf.two_stage(instance, limits=endless),
+        lambda: cf.evaluate(cf.sample("mouse", 8), limits=endless),
+        lambda: Request(instance, tmp_path, endless),
+    ):
+        with pytest.raises(InputError, match=r"a time limit of inf s .* out of range"):
+            work()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_is_solved_is_the_file(tmp_path, small):
     """Another bound in the file would show: the solvers see nothing else."""
     problem = formulated(small, "qp-fixed")
-    solution = cf.solve(problem, "ipopt", tmp_path)
+    solution = cf.solve(problem, "ipopt", folder=tmp_path)
     stem = tmp_path / "random_1.qp-fixed"
     left = {path for path in tmp_path.iterdir() if "instance" not in path.name}
     assert {path.name.removeprefix(stem.name) for path in left} == {
@@ -511,7 +528,7 @@ def test_what_is_solved_is_the_file(tmp_path, small):
 
 def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, monkeypatch):
     problem = formulated(small, "qp-fixed")
-    cf.solve(problem, "ipopt", tmp_path)
+    cf.solve(problem, "ipopt", folder=tmp_path)
     answer = tmp_path / "random_1.qp-fixed.ipopt.sol"
     assert answer.exists()
     broken = tmp_path / "broken"
@@ -519,7 +536,7 @@ def test_a_crashed_solver_is_said_and_no_stale_answer_taken(tmp_path, small, mon
     (broken / "casadi.py").write_text("raise ImportError('libgfortran is gone')")
     monkeypatch.setenv("PYTHONPATH", str(broken))
     with pytest.raises(SolverError, match=r"random_1\.qp-fixed\.nl: Ipopt: ImportError: libgfortran is gone"):
-        cf.solve(problem, "ipopt", tmp_path)
+        cf.solve(problem, "ipopt", folder=tmp_path)
     assert not answer.exists()
 
 
@@ -566,7 +583,7 @@ def test_ctrl_c_keeps_the_best_point(tmp_path, solver):
     if solver != "ipopt":
         assert (
             field.energy(1 if solver == "highs" else 2).total
-            <= cf.greedy(field.instance).energy(1 if solver == "highs" else 2).total + 1e-9
+            <= cf.greedy_field(field.instance).energy(1 if solver == "highs" else 2).total + 1e-9
         )
     assert not list(tmp_path.rglob("*.part"))
 

@@ -18,7 +18,6 @@ from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import Files, Solvers
 from crossfield.export.verify.verify import (
     Verdict,
@@ -37,6 +36,7 @@ from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.file import write_instance
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.deadline import Deadline
+from crossfield.models.processes.limits import Limits
 from crossfield.models.sketch.samples import sample
 from loops import for_each
 
@@ -128,7 +128,7 @@ def test_optima_agree(verified: Callable[[str], Verification], solver: str, inst
 @pytest.mark.slow
 def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
     """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
-    write_all(on_grid(1, 2), tmp_path, PROVEN, start=make_field(on_grid(1, 2)))
+    write_all(on_grid(1, 2), tmp_path, formulations=PROVEN, start=make_field(on_grid(1, 2)))
     found = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
     assert {f.verdict for f in found} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
     present = {name for name, solver in SOLVERS.items() if not solver.missing}
@@ -138,7 +138,7 @@ def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path: Path):
 def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path: Path):
     """Slacks of weighted deviations, each reduced by a solver's tolerance for its row: the same field."""
     problem = formulate(sample("skew", 4), "milp-mccormick")
-    write_all(problem.instance, tmp_path, ["milp-mccormick"])
+    write_all(problem.instance, tmp_path, formulations=["milp-mccormick"])
     subjects, _ = _subjects([read_manifest(next(tmp_path.glob("*.manifest.json")))], tmp_path)
     index, cost = problem.merged_objective(1)
     for less, verdict in ((0.0, Verdict.AGREES), (4e-6, Verdict.AGREES), (1e-4, Verdict.DIFFERS)):
@@ -170,7 +170,9 @@ def test_options_and_packed_files(tmp_path: Path):
     chosen = {"facet": "printed", "stroke_norm": 1, "beta_norm": 1}
     names = ["miqp-mccormick", "milp-mccormick", "miqcp-bilinear"]
     dialects = {"nl": "binary", "gms": "scalar"}
-    write_all(instance, tmp_path / "options", names, options=chosen, dialects=dialects, compress=True)
+    write_all(
+        instance, tmp_path / "options", formulations=names, options=chosen, dialects=dialects, compress=True
+    )
     found = verify(tmp_path / "options")
     assert found.bad == []
     assert {f.program for f in found.checks if f.verdict == Verdict.AGREES} >= {"highs", "casadi"}
@@ -179,7 +181,7 @@ def test_options_and_packed_files(tmp_path: Path):
 @pytest.mark.slow
 def test_lonely_columns(tmp_path: Path):
     """A pixel without stroke and neighbour: its alpha stands in no term."""
-    write_all(make_instance("parts"), tmp_path, ["milp-mccormick", "minlp-quartic"])
+    write_all(make_instance("parts"), tmp_path, formulations=["milp-mccormick", "minlp-quartic"])
     assert verify(tmp_path).bad == []
 
 
@@ -213,7 +215,7 @@ def spoiled(tmp_path_factory: pytest.TempPathFactory) -> Verification:
     folder = tmp_path_factory.mktemp("spoiled")
     for name, (formulation, kind, pattern, replacement) in WRONG.items():
         instance = replace(on_grid(2, 3), name=name)
-        (manifest,) = write_all(instance, folder, [formulation], [kind])
+        (manifest,) = write_all(instance, folder, formulations=[formulation], formats=[kind])
         path = folder / f"{name}.{formulation}.{kind}"
         text = path.read_text()
         wrong = re.sub(
@@ -258,7 +260,7 @@ def blind_to(name: str) -> set[str]:
 
 
 def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
-    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp", "mps"])
+    write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp", "mps"])
     path = tmp_path / "small.qp-fixed.lp"
     path.write_bytes(path.read_bytes() + b"\n")
     (tmp_path / "small.qp-fixed.mps").unlink()
@@ -272,7 +274,9 @@ def test_a_file_that_is_not_the_manifests_is_not_tried(tmp_path: Path):
 def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
     """An understated count of nonlinear variables crashes SCIP's process; the next file is still read."""
     for name in ("crash", "well"):
-        write_all(replace(on_grid(2, 3), name=name), tmp_path, ["miqcp-bilinear"], ["nl"])
+        write_all(
+            replace(on_grid(2, 3), name=name), tmp_path, formulations=["miqcp-bilinear"], formats=["nl"]
+        )
     path = tmp_path / "crash.miqcp-bilinear.nl"
     lines = path.read_text().splitlines(keepends=True)
     lines[4] = " 0 0 0\n"
@@ -283,7 +287,7 @@ def test_a_crash_is_a_row_of_the_table(tmp_path: Path):
 
 
 def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
+    write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     monkeypatch.setitem(PROGRAMS, "xpress", replace(PROGRAMS["xpress"], needs="no_such_package"))
     found = verify(tmp_path, programs=["highs", "xpress"])
     assert found.absent == {"xpress": "pip install xpress"}
@@ -293,7 +297,7 @@ def test_absent_programs_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.slow
 def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    write_all(on_grid(1, 2), tmp_path, ["qp-fixed"], ["lp"])
+    write_all(on_grid(1, 2), tmp_path, formulations=["qp-fixed"], formats=["lp"])
     assert invoke(["verify", str(tmp_path), "--solve", "-p", "highs", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ok"] is True
     assert invoke(["verify", str(tmp_path), "-p", "highs"]) == 0
@@ -333,7 +337,7 @@ def test_a_folder_without_manifests_is_an_error(tmp_path: Path):
 def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, program: str):
     """A size that no free edition takes; with a licence it is solved or meets the time limit."""
     MASKS.setdefault("wide", ["#" * 16] * 16)
-    write_all(make_instance("wide"), tmp_path, ["miqp-mccormick"], ["lp", "gms"])
+    write_all(make_instance("wide"), tmp_path, formulations=["miqp-mccormick"], formats=["lp", "gms"])
     found = verify(tmp_path, seconds=0.1, programs=[program])
     assert found.ok
     sized = [f for f in found.checks if "the free edition takes" in f.reason]
@@ -347,8 +351,8 @@ def test_beyond_the_free_edition_is_not_tried_and_never_a_pass(tmp_path: Path, p
 def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path: Path):
     problem = formulate(sample("skew", 5), "minlp-quartic")
     with Solvers() as solvers:
-        found = solvers.solve(problem, "xpress", tmp_path, limits=Limits(1.0, threads=1))
-    assert found.point is None or len(found.point) == found.problem.columns
+        found = solvers.solve(problem, "xpress", folder=tmp_path, limits=Limits(1.0, threads=1))
+    assert found.point is None or len(found.point) == found.problem.n_columns
 
 
 # the table of capabilities is true

@@ -33,7 +33,7 @@ def test_columns_stand_in_lp_and_mps_in_the_order_of_the_form(label: str):
     limits = lp[lp.index("Bounds") + 1 :]
     assert [m[1] for line in limits if (m := re.search(r"<= (\w+) <=", line))] == named(form, "lp")
     assert [m[1] for line in mps if (m := re.fullmatch(r" (\w+) obj \S+", line))] == named(form, "mps")
-    assert form.column_count == len(form.order("lp")) == form.problem.columns + form.has_one
+    assert form.column_count == len(form.order("lp")) == form.problem.n_columns + form.has_one
 
 
 def test_a_block_is_binary_when_all_its_bounds_are_exactly_0_and_1():

@@ -299,6 +299,6 @@ def test_points_of_any_size_are_starting_points():
     problem = make_problem("qp-fixed", make_instance("row"))
     point = points_of(problem)[0] * 10.0 ** np.arange(-150, 150, 30)
     lines = b"".join(nl.generate(Canonical(problem), start=point)).decode().splitlines()
-    at = lines.index(f"x{problem.columns}")
-    found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.columns]]
+    at = lines.index(f"x{problem.n_columns}")
+    found = [float(line.split()[1]) for line in lines[at + 1 : at + 1 + problem.n_columns]]
     np.testing.assert_array_equal(found, point[nl.Layout(problem).order])

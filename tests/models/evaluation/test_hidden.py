@@ -78,7 +78,7 @@ def test_a_part_of_the_mask_keeps_a_stroke():
 def test_a_field_on_other_pixels_is_refused():
     (hidden,) = hidden_curves(*traced("mouse"), 1)
     with pytest.raises(InstanceError, match="not on the pixels of mouse"):
-        hidden.deviation(cf.greedy(cf.sample("bottle", 12)))
+        hidden.deviation(cf.greedy_field(cf.sample("bottle", 12)))
 
 
 def test_the_summary_of_some_angles():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.models.errors import InstanceError
+from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import DEGENERATE, CrossField, relabelled
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
@@ -145,11 +145,21 @@ def test_cross_error_takes_the_better_assignment():
 
 def test_cross_error_names_the_shape_that_it_needs():
     field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0, 0], [0, 0, 0], [0, 0])
-    with pytest.raises(InstanceError, match=r"^u has shape \(3, 2\), but \w+ has 3 pixels; give an angle"):
+    with pytest.raises(InputError, match=r"^u_angle has shape \(3, 2\), but \w+ has 3 pixels; give an angle"):
         field.cross_error(field.u, field.v)
-    with pytest.raises(InstanceError, match=r"^v has shape \(2,\), but"):
+    with pytest.raises(InputError, match=r"^v_angle has shape \(2,\), but"):
         field.cross_error([0, 0, 0], [HALF, HALF])
     assert field.cross_error(0.0, [HALF]) == pytest.approx([0, 0, 0])
+    with pytest.raises(InputError, match=r"^u_angle has shape \(3, 2\)"):
+        CrossField.from_lines(field.instance, field.u, field.v)
+
+
+def test_vectors_and_angles_of_lines_are_the_same_lines():
+    field = CrossField(pixels([[1, 1, 1]], {(0, 0): 0}), [0, 0.3, 1], [0.1, -0.2, 0], [0, 0])
+    for vectors, angle in ((field.u, field.u_angle), (field.v, field.v_angle)):
+        assert np.stack([np.cos(angle), np.sin(angle)], axis=-1) == pytest.approx(vectors, abs=1e-15)
+    again = CrossField.from_lines(field.instance, field.u_angle, field.v_angle)
+    assert again.cross_error(field.u_angle, field.v_angle) == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 @pytest.mark.parametrize("index", [0.25, -0.25])

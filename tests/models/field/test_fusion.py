@@ -10,7 +10,7 @@ from crossfield.models.field.fusion import fused
 from crossfield.models.field.jumps import free_jumps
 from crossfield.models.instance.instance import HALF, MOST_WEIGHT
 from crossfield.models.search.box_qp import fitted
-from crossfield.models.search.greedy import greedy
+from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import polyvector_field
 from exhaustive import random_instance, sketch
@@ -26,7 +26,7 @@ def mixed(one, other, taken):
 def test_it_takes_the_better_half_of_each():
     theta = np.full((8, 14), np.nan)
     theta[2:6, [1, 12]] = 0.3
-    good = greedy(sketch(np.ones(theta.shape, bool), theta))
+    good = greedy_field(sketch(np.ones(theta.shape, bool), theta))
     bumps = [np.hypot(good.instance.grid.rows - 4, good.instance.grid.columns - at) < 3 for at in (2, 11)]
     left, right = (CrossField(good.instance, good.alpha + 0.5 * bump, good.beta, good.p) for bump in bumps)
     for one, other in ((left, right), (right, left)):
@@ -39,7 +39,7 @@ def test_prices_beyond_32_bits_are_as_good_as_infinite():
     """Strokes of the greatest weight, half a radian off, compared with an energy of 7."""
     theta = np.full((8, 14), np.nan)
     theta[2:6, [1, 12]] = 0.3
-    good = greedy(replace(sketch(np.ones(theta.shape, bool), theta), stroke_coefficient=MOST_WEIGHT))
+    good = greedy_field(replace(sketch(np.ones(theta.shape, bool), theta), stroke_coefficient=MOST_WEIGHT))
     bump = np.hypot(good.instance.grid.rows - 4, good.instance.grid.columns - 6.5) < 2
     off = np.zeros(len(bump))
     off[good.instance.stroke_index[-2:]] = 0.5
@@ -50,11 +50,13 @@ def test_prices_beyond_32_bits_are_as_good_as_infinite():
 def test_it_is_the_best_choice_of_all_where_a_cut_can_say_it():
     rng = np.random.default_rng(3)
     for seed in range(12):
-        one = greedy(random_instance(seed, (3, 4) if seed < 2 else (3, 3), strokes=5))
+        one = greedy_field(random_instance(seed, (3, 4) if seed < 2 else (3, 3), strokes=5))
         pixels = one.instance.grid.size
         alpha = one.alpha + np.where(rng.random(pixels) < 0.6, rng.normal(0, 0.3, pixels), 0)
         other = CrossField(one.instance, alpha, one.beta, one.p)
-        least = min(mixed(one, other, choice).energy().total for choice in product([False, True], repeat=pixels))
+        least = min(
+            mixed(one, other, choice).energy().total for choice in product([False, True], repeat=pixels)
+        )
         found = fused(one, other).energy().total
         assert found <= one.energy().total
         assert found == pytest.approx(least, rel=1e-5)
@@ -64,7 +66,7 @@ def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time
     lower = 0
     for name in ("mouse", "saddle", "cylinder_bend"):
         instance = sample(name, 40)
-        one, other = greedy(instance), fitted(polyvector_field(instance, hold=0.1))
+        one, other = greedy_field(instance), fitted(polyvector_field(instance, hold=0.1))
         found, again = fused(one, other), fused(one, other)
         assert found.energy().total <= one.energy().total
         assert found.p.tobytes() == again.p.tobytes()
@@ -74,7 +76,7 @@ def test_fields_of_two_strategies_made_one_are_below_both_and_the_same_each_time
 
 
 def test_fields_that_are_one_stay_as_they_are():
-    field = greedy(random_instance(1))
+    field = greedy_field(random_instance(1))
     turned = CrossField(field.instance, field.alpha + HALF, -field.beta, field.p)
     assert fused(field, field) is field
     assert fused(field, turned) is field

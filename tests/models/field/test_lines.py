@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.models.errors import InstanceError
+from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import line_difference
@@ -98,16 +98,16 @@ def test_lines_that_are_one_make_a_cross_of_one_line():
 @for_each(
     "u, message",
     [
-        ([0.0], "u has shape (1,), but two has 2 pixels"),
-        ([[0.0, 1.0]], "u has shape (1, 2), but two has 2 pixels"),
-        ([0.0, np.nan], "u of pixel 1 is nan, which is not an angle"),
-        ([2e6, 0.0], "u of pixel 0 is 2000000.0, which is not an angle"),
-        (["a", "b"], "u holds something other than numbers"),
-        ([1j, 0.0], "u holds something other than numbers"),
+        ([0.0], "u_angle has shape (1,), but two has 2 pixels"),
+        ([[0.0, 1.0]], "u_angle has shape (1, 2), but two has 2 pixels"),
+        ([0.0, np.nan], "u_angle of pixel 1 is nan, which is not an angle"),
+        ([2e6, 0.0], "u_angle of pixel 0 is 2000000.0, which is not an angle"),
+        (["a", "b"], "u_angle holds something other than numbers"),
+        ([1j, 0.0], "u_angle holds something other than numbers"),
     ],
 )
 def test_what_is_no_angle_is_refused(u, message):
     instance = Instance("two", [[True, True]], [[0, 0]], [0.3], [1.0])
-    with pytest.raises(InstanceError) as caught:
+    with pytest.raises(InputError) as caught:
         CrossField.from_lines(instance, u, [0.0, 0.0])
     assert message in str(caught.value)

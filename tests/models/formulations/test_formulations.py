@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import sympy as sp
 from cases import MASKS, make_field, make_instance
-from crossfield.export.solving.limits import Limits
 from crossfield.export.solving.local import solve
 from crossfield.models.errors import FormulationError
 from crossfield.models.field.field import CrossField
@@ -19,6 +18,7 @@ from crossfield.models.formulations import symbols as n
 from crossfield.models.formulations.catalogue import CUBIC, FORMULATIONS, PARITY, QUARTIC, declare
 from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
+from crossfield.models.processes.limits import Limits
 from loops import for_each
 from scipy.optimize import linprog, lsq_linear
 
@@ -203,7 +203,7 @@ def test_parallel_strokes_and_two_families_cost_nothing(degrees):
     pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
     theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
     instance = Instance("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))
-    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(seconds=250))
+    found = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(250))
     assert found.status == "optimal-global"
     assert found.objective < 9 * 1e-6 * QUARTER + 1e-9
     assert found.field.energy(1).total == pytest.approx(found.objective, abs=1e-7)
@@ -226,7 +226,7 @@ def sketch(gauge="strokes", seed=4):
 
 
 def optimum(instance, name="milp-mccormick", **options):
-    found = solve(formulate(instance, name, **options), "highs", limits=Limits(seconds=250, gap=0))
+    found = solve(formulate(instance, name, **options), "highs", limits=Limits(250, gap=0))
     assert found.status == "optimal-global"
     return found.objective
 

@@ -41,14 +41,14 @@ def toy():
 @pytest.mark.slow
 def test_a_toy_formulation_is_one_function(toy, tmp_path):
     instance = cf.sample("skew", 4)
-    field = cf.greedy(instance)
+    field = cf.greedy_field(instance)
     problem = cf.formulate(instance, "toy")
     (listed,) = (each for each in tables()["formulations"][1] if each["name"] == "toy")
     assert (listed["class"], listed["summary"]) == ("MILP", "directions alone")
     assert (problem.problem_class, problem.convex, toy.settable) == ("MILP", True, {"relax", "stroke_norm"})
     assert cf.formulate(instance, "toy", stroke_norm=2).problem_class == "MIQP"
     assert r"\sum_{(i,j) \in E} 2 s_{ij}" in latex(problem.formulation)
-    (manifest,) = write_all(instance, tmp_path, ["toy"], tuple(FORMATS), start=field)
+    (manifest,) = write_all(instance, tmp_path, formulations=["toy"], formats=tuple(FORMATS), start=field)
     assert {each["format"] for each in manifest.document["files"]} >= set(FORMATS)
     assert read_manifest(manifest.path).problem().sha256 == problem.sha256
     solution = cf.solve(problem, folder=tmp_path / "solve", start=field)
@@ -57,7 +57,7 @@ def test_a_toy_formulation_is_one_function(toy, tmp_path):
     least = 2 * np.abs(turned).sum() + solution.field.energy(1).strokes + solution.field.energy(1).beta
     assert solution.objective == pytest.approx(least, abs=1e-6)
     assert solution.violation.worst < 1e-6
-    write_all(instance, tmp_path / "verified", ["toy"], ["nl", "mps"])
+    write_all(instance, tmp_path / "verified", formulations=["toy"], formats=["nl", "mps"])
     checked = verify(tmp_path / "verified")
     assert checked.ok
     assert sum(check.verdict is Verdict.AGREES for check in checked.checks) >= 2  # HiGHS and CasADi at least

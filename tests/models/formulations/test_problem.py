@@ -76,8 +76,8 @@ def test_columns_and_rows_are_counted(label):
     for block in problem.blocks.values():
         assert (block.offset, block.count) == (end, sizes[block.over])
         end += block.count
-    assert problem.columns == end == len(problem.lower) == len(problem.upper) == len(problem.integer)
-    assert problem.row_count == sum(family.count for family in problem.rows)
+    assert problem.n_columns == end == len(problem.lower) == len(problem.upper) == len(problem.integer)
+    assert problem.n_rows == sum(family.count for family in problem.rows)
     assert (problem.lower <= problem.upper).all()
     for name, block in problem.blocks.items():
         whole = name in {"p", "p1", "p2"} and not problem.formulation.options.relax
@@ -92,8 +92,8 @@ def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
     p1, p2 = problem.blocks["p1"], problem.blocks["p2"]
     reached = [set() for _ in instance.grid.first]
     for first, second in product((0, 1), range(-4, 5)):
-        point = np.zeros(problem.columns)
-        point[p1.columns], point[p2.columns] = first, second
+        point = np.zeros(problem.n_columns)
+        point[p1.slice], point[p2.slice] = first, second
         allowed = (p1.lower <= first) & (first <= p1.upper) & (p2.lower <= second) & (second <= p2.upper)
         for family in problem.rows:
             excess = family.values(point)
@@ -134,8 +134,8 @@ def test_lifted_problems_are_exact(name):
     rng = np.random.default_rng(7)
     for point in points_of(problem):
         p1 = rng.integers(0, 2, problem.blocks["p1"].count)
-        point[problem.blocks["p1"].columns] = p1
-        z = p1 * point[problem.blocks["beta"].columns][problem.instance.grid.first]
+        point[problem.blocks["p1"].slice] = p1
+        z = p1 * point[problem.blocks["beta"].slice][problem.instance.grid.first]
         assert list(other.blocks) == [*problem.blocks, "z"]
         extended = np.concatenate([point, z])
         assert other.objective_value(extended) == pytest.approx(problem.objective_value(point), rel=1e-12)
@@ -154,7 +154,7 @@ def test_convex_means_convex():
             assert not problem.convex
             continue
         index, coefficient = problem.merged_objective(2)
-        hessian = np.zeros((problem.columns, problem.columns))
+        hessian = np.zeros((problem.n_columns, problem.n_columns))
         np.add.at(hessian, (index[:, 0], index[:, 1]), coefficient)
         least = np.linalg.eigvalsh(hessian + hessian.T)[0] if len(coefficient) else 0.0
         if problem.convex:
@@ -168,7 +168,7 @@ def test_violations_are_found():
     problem = formulate(field.instance, "milp-mccormick")
     point = problem.point(field)
     tight = next(family for family in problem.rows if family.family.tag == "c22")
-    assert (point[problem.blocks["gamma"].columns] >= np.abs(field.residual_r) - 1e-15).all()
+    assert (point[problem.blocks["gamma"].slice] >= np.abs(field.residual_r) - 1e-15).all()
     worse = point.copy()
     worse[problem.blocks["gamma"].offset] -= 0.25
     found = problem.violation(worse)
@@ -192,7 +192,7 @@ def test_fractional_jumps_of_an_answer_are_rounded():
     field = make_field(make_instance("full"))
     for name in ("milp-mccormick", "minlp-parity"):
         problem = formulate(field.instance, name)
-        noise = np.random.default_rng(0).uniform(-0.1, 0.1, problem.columns)
+        noise = np.random.default_rng(0).uniform(-0.1, 0.1, problem.n_columns)
         point = problem.point(field) + np.where(problem.integer, noise, 0)
         np.testing.assert_array_equal(problem.field(point).p, field.p)
 

@@ -50,7 +50,9 @@ def test_where_no_formulation_is_named_it_is_told_what_was_meant(tmp_path, capfd
 
 
 def test_files_have_full_names_whatever_was_said(tmp_path):
-    (manifest,) = write_all(cf.sample("mouse", 4), tmp_path / "python", ["milp"], ["mps"])
+    (manifest,) = write_all(
+        cf.sample("mouse", 4), tmp_path / "python", formulations=["milp"], formats=["mps"]
+    )
     assert manifest.formulation == "milp-mccormick"
     command = ["export", "mouse", "--size", "4", "-F", "mps", "-q", "-o", str(tmp_path / "command")]
     assert invoke([*command, "-f", "milp", "-f", "milp-mccormick"]) == 0

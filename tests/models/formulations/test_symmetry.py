@@ -31,7 +31,10 @@ def test_optimum_is_the_same_after_quarter_turn_and_mirror(name):
     instance = smallest(name)
     found = [
         cf.solve(
-            cf.formulate(moved, "milp-mccormick"), "highs", limits=cf.Limits(250), start=cf.greedy(moved)
+            cf.formulate(moved, "milp-mccormick"),
+            "highs",
+            limits=cf.Limits(250),
+            start=cf.greedy_field(moved),
         )
         for moved in (instance, instance.turned(), instance.mirrored())
     ]

@@ -2,8 +2,11 @@
 
 import math
 import pickle
+import threading
 
-from crossfield.models.processes.deadline import Deadline
+import pytest
+from crossfield.models.errors import InputError
+from crossfield.models.processes.deadline import Deadline, asked
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,3 +76,15 @@ def test_a_deadline_goes_to_another_process():
     for seconds in (5.0, math.inf):
         sent, arrived = Deadline.after(seconds), pickle.loads(pickle.dumps(Deadline.after(seconds)))
         assert sent.at <= arrived.at <= Deadline.after(seconds).at
+
+
+def test_a_request_to_stop_is_a_function_or_an_event():
+    happened = threading.Event()
+    over = asked(happened)
+    assert not over()
+    happened.set()
+    assert over()
+    assert asked(over) is over
+    assert not asked(None)()
+    with pytest.raises(InputError, match="stop is bool; give a function"):
+        asked(True)

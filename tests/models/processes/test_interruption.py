@@ -159,4 +159,4 @@ def test_too_many_jobs_are_refused_in_python_too(tmp_path):
     with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
         build(default_spec(), tmp_path / "library", jobs=100000)
     with pytest.raises(cf.CrossfieldError, match=r"jobs must be between 1 and \d+, got 100000"):
-        cf.search(cf.sample("mouse", 14), seconds=1, jobs=100000)
+        cf.search(cf.sample("mouse", 14), limits=cf.Limits(1), jobs=100000)

@@ -1,5 +1,7 @@
 """Proofs of the 1-norm: the lemmas at random points, and optima that HiGHS proves of the same problem."""
 
+import math
+
 import crossfield as cf
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ def test_bound_and_energy_are_the_optimum_that_highs_proves():
         instance = random_instance(seed, (2 + seed % 3,) * 2, strokes=(2 + seed % 3) ** 2)
         proof = cf.prove(instance, norm=1, jobs=1)
         optimum = cf.solve(
-            cf.formulate(instance, "milp-mccormick"), "highs", limits=cf.Limits(seconds=100, gap=1e-9)
+            cf.formulate(instance, "milp-mccormick"), "highs", limits=cf.Limits(100, gap=1e-9)
         ).objective
         assert proof.bound <= optimum + 1e-9, seed
         assert proof.energy >= optimum - 1e-7, seed
@@ -35,7 +37,7 @@ def test_levels_bound_any_field_from_any_slopes():
     rng = np.random.default_rng(0)
     for seed in range(6):
         instance = random_instance(seed, (3, 3), strokes=9)
-        good = cf.prove(instance, norm=1, jobs=1, gap=0.01)
+        good = cf.prove(instance, norm=1, jobs=1, limits=cf.Limits(math.inf, 0.01))
         bad = cf.CrossField(instance, rng.uniform(0, 3, 9), rng.uniform(-0.7, 0.7, 9), np.zeros(12, int))
         lattice = CommonLattice.near(bad, rng.uniform(-1, 1, len(instance.theta)), 8)
         assert lattice_bound(lattice) <= good.energy + 1e-12

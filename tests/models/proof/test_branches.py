@@ -72,8 +72,10 @@ def test_a_certificate_that_is_cut_off_has_all_branches_of_a_level_or_none(cut, 
     parts = len(cut.parents) - 1
     whole = write_certificate(cut, tmp_path / "whole.npz")
     for checked in range(1, parts + 2):
-        calls = iter(range(checked * len(cut.field.alpha)))
-        found = write_certificate(cut, tmp_path / "it.npz", lambda calls=calls: next(calls, None) is None)
+        asked = iter(range(checked * len(cut.field.alpha)))
+        found = write_certificate(
+            cut, tmp_path / "it.npz", stop=lambda asked=asked: next(asked, None) is None
+        )
         kept = len(found.verdict.levels)
         assert kept == (1 if checked < 5 else checked)
         assert read_certificate(tmp_path / "it.npz").bound == found.bound <= whole.bound

@@ -84,7 +84,7 @@ def test_a_certificate_that_is_cut_off_holds_with_the_levels_that_were_checked(w
     bound, path, kept = check_certificate.check(whole).bound, tmp_path / "it.npz", []
     pixels = len(whole["alpha"])
     for questions in range(pixels, 5 * pixels, 3):
-        found = write_certificate(proven(3), path, after(questions))
+        found = write_certificate(proven(3), path, stop=after(questions))
         assert read_certificate(path).bound == found.bound <= bound
         kept.append(len(found.verdict.levels))
     assert kept == sorted(kept)
@@ -93,7 +93,7 @@ def test_a_certificate_that_is_cut_off_holds_with_the_levels_that_were_checked(w
 
 def test_no_certificate_is_written_where_it_is_over_before_a_level_is_checked(tmp_path):
     with pytest.raises(SolverError, match="before the coarsest level"):
-        write_certificate(proven(3), tmp_path / "it.npz", after(2))
+        write_certificate(proven(3), tmp_path / "it.npz", stop=after(2))
     assert not list(tmp_path.iterdir())
 
 

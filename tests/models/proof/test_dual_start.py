@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import crossfield as cf
 from crossfield.models.proof.dual_start import suggested
-from crossfield.models.search.search import search as search_patches
+from crossfield.models.search.search import search_patches
 
 
 def test_a_search_is_never_above_what_a_short_proof_finds():
@@ -20,11 +20,11 @@ def test_a_search_is_never_above_what_a_short_proof_finds():
 
 
 def test_what_is_suggested_is_left_out_where_it_would_take_a_good_part_of_the_time():
-    field = cf.greedy(cf.sample("saddle", 24))
-    assert suggested(field, lambda: 4.9, jobs=1) is field
-    assert suggested(field, lambda: float("inf"), jobs=1) is not field
-    small = cf.greedy(cf.sample("saddle", 8))
-    assert suggested(small, lambda: float("inf"), jobs=1) is small
+    field = cf.greedy_field(cf.sample("saddle", 24))
+    assert suggested(field, lambda: 4.9, threads=1) is field
+    assert suggested(field, lambda: float("inf"), threads=1) is not field
+    small = cf.greedy_field(cf.sample("saddle", 8))
+    assert suggested(small, lambda: float("inf"), threads=1) is small
 
 
 def test_small_searches_load_nothing_that_is_compiled():

@@ -1,10 +1,14 @@
 """Proofs from end to end: true for all weights, gauges and masks."""
 
+import math
+import re
+import threading
+
 import crossfield as cf
 import numpy as np
 import pytest
 from children import interrupted
-from crossfield.models.errors import InputError
+from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance.instance import Instance
 from exhaustive import exact, random_instance, sketch
 
@@ -27,8 +31,8 @@ def test_small_instances_are_proven_at_the_least_energy_over_all_jumps():
 
 def a_few_steps():
     """Arguments that end a proof that cannot close its gap after a dozen reports."""
-    seen = []
-    return {"progress": lambda *what: seen.append(what), "stop": lambda: len(seen) > 12}
+    told = []
+    return {"progress": told.append, "stop": lambda: len(told) > 12}
 
 
 def weighted(seed, **weights):
@@ -48,7 +52,7 @@ def weighted(seed, **weights):
 @pytest.mark.slow
 def test_weights_holes_and_parts_without_strokes(weights):
     instance = weighted(3, **weights)
-    proof = cf.prove(instance, jobs=1, gap=1e-4)
+    proof = cf.prove(instance, jobs=1, limits=cf.Limits(math.inf, 1e-4))
     found = cf.search(instance, rounds=1, jobs=1).field.energy().total
     assert proof.bound <= min(found, proof.energy)
     assert proof.energy <= found + 1e-9
@@ -106,33 +110,45 @@ def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
 
 def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
     instance = cf.sample("bottle", 12)
-    one, two = (cf.prove(instance, jobs=jobs, gap=0.01) for jobs in (1, 2))
+    one, two = (cf.prove(instance, jobs=1, limits=cf.Limits(math.inf, 0.01, threads)) for threads in (1, 2))
     assert one.bound == two.bound
     assert one.field.alpha.tobytes() == two.field.alpha.tobytes()
 
 
 def test_limits_end_a_proof_with_what_it_has():
     instance = cf.sample("bottle", 12, stroke_weight=0.5)
-    seen = []
-    some = cf.prove(instance, gap=0.5, progress=lambda *what: seen.append(what))
+    told = []
+    some = cf.prove(instance, limits=cf.Limits(math.inf, 0.5), progress=told.append)
     assert some.ended == "gap"
     assert 0 < some.gap <= 0.5
-    assert all(bound <= energy and labels > 0 for bound, energy, labels in seen)
-    none = cf.prove(instance, stop=lambda: True)
-    assert none.ended == "interrupted"
-    assert none.bound <= some.energy
-    short = cf.prove(instance, seconds=1e-6)
+    for line in told:
+        energy, bound, labels = re.fullmatch(r"energy (\S+), bound (\S+), (\d+) labels", line).groups()
+        assert float(bound) <= float(energy)
+        assert int(labels) > 0
+    asked = threading.Event()
+    asked.set()
+    for stop in (asked, lambda: True):
+        none = cf.prove(instance, stop=stop)
+        assert none.ended == "interrupted"
+        assert none.bound <= some.energy
+    short = cf.prove(instance, limits=cf.Limits(1e-6))
     assert short.ended == "time"
-    for wrong in ({"seconds": 0}, {"gap": -1}, {"jobs": 0}):
+    little = cf.prove(instance, work=1)
+    assert little.ended == "work"
+    assert little.bound <= some.energy
+    for wrong in ({"jobs": 0}, {"norm": 3}, {"stop": 3}):
         with pytest.raises(InputError):
             cf.prove(instance, **wrong)
+    with pytest.raises(InstanceError):
+        cf.prove(instance, start=cf.greedy_field(cf.sample("bottle", 11)))
 
 
 @pytest.mark.slow
 def test_ctrl_c_ends_a_proof_with_what_it_has():
     program = (
         "import crossfield as cf\n"
-        "proof = cf.prove(cf.sample('mouse', 24), progress=lambda *what: print(what[2], flush=True))\n"
+        "told = lambda line: print(line.split()[-2], flush=True)\n"
+        "proof = cf.prove(cf.sample('mouse', 24), progress=told)\n"
         "print(proof.ended, proof.status, proof.bound <= proof.energy)"
     )
     assert interrupted(program) == ["interrupted", "gap", "True"]

@@ -113,7 +113,7 @@ def test_thousands_of_active_bounds(gauge):
 
 def test_contact_along_the_strokes_of_a_drawing():
     # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
-    assert assert_optimal(fitted(power_field(sample("mouse", 96, "box")))) > 200
+    assert assert_optimal(fitted(power_field(sample("mouse", 96, gauge="box")))) > 200
 
 
 @for_each("seed", range(8))
@@ -153,7 +153,7 @@ def residuals(instance, x, p):
     ],
 )
 def test_same_optimum_as_ipopt_on_the_file(name, size):
-    instance = sample(name, size, "box")
+    instance = sample(name, size, gauge="box")
     centre = CrossField(
         instance,
         (instance.alpha_lower + instance.alpha_upper) / 2,

@@ -3,6 +3,7 @@ and what it promises.
 """
 
 import pickle
+import threading
 
 import crossfield as cf
 import numpy as np
@@ -13,8 +14,8 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import HALF, QUARTER
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.coarse import halved, prolonged
-from crossfield.models.search.greedy import greedy
-from crossfield.models.search.improvement import improved, stroke_curves
+from crossfield.models.search.greedy import greedy_field
+from crossfield.models.search.improvement import improved_field, stroke_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
 from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.starts import first_field
@@ -156,7 +157,7 @@ def test_search_is_never_above_what_it_starts_from(name):
     instance = cf.sample(name, 10)
     start = cf.power_field(instance)
     found = cf.search(instance, rounds=1, start=start).field
-    for other in (greedy(instance), first_field(instance), start):
+    for other in (greedy_field(instance), first_field(instance), start):
         assert found.energy().total <= other.energy().total + 1e-9
     assert (np.abs(found.beta) <= QUARTER).all()
     assert (found.alpha >= instance.alpha_lower).all()
@@ -164,7 +165,7 @@ def test_search_is_never_above_what_it_starts_from(name):
 
 
 def test_a_start_on_another_instance_is_refused():
-    start = greedy(cf.sample("skew", 6))
+    start = greedy_field(cf.sample("skew", 6))
     for other in (cf.sample("skew", 5), start.instance.with_gauge("box")):
         with pytest.raises(InstanceError, match=r"the field is on another instance .* not on this one"):
             cf.search(other, rounds=0, jobs=1, start=start)
@@ -192,10 +193,10 @@ def test_same_seed_gives_the_same_bits_in_one_process_and_in_two(gauge):
 def test_a_large_grid_is_searched_from_coarse_to_fine_by_patches():
     instance = cf.sample("mouse", 40)
     seen = []
-    found = cf.search(instance, rounds=2, progress=lambda rounds, energy: seen.append((rounds, energy)))
+    found = cf.search(instance, rounds=2, progress=seen.append)
     assert found.field.energy().total < first_field(instance).energy().total
     assert (found.rounds, found.ended) == (2, "rounds")
-    assert [rounds for rounds, _ in seen] == [1, 2]
+    assert [line.split(" after ")[1] for line in seen] == ["1 rounds", "2 rounds"]
 
 
 @pytest.mark.slow
@@ -210,7 +211,7 @@ def test_search_ends_by_itself_when_nothing_is_found():
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
 def test_a_search_without_time_gives_a_field_within_its_bounds(name):
     instance = cf.sample(name, 24)
-    found = cf.search(instance, seconds=1e-9, jobs=1)
+    found = cf.search(instance, limits=cf.Limits(1e-9), jobs=1)
     assert (found.rounds, found.ended) == (0, "time")
     assert (np.abs(found.field.beta) <= QUARTER).all()
     assert (found.field.alpha >= instance.alpha_lower).all()
@@ -219,7 +220,7 @@ def test_a_search_without_time_gives_a_field_within_its_bounds(name):
 
 def test_a_deadline_that_is_far_changes_no_bit():
     instance = cf.sample("ring", 10)
-    fields = [cf.search(instance, rounds=1, seconds=seconds, jobs=1).field for seconds in (None, 1e9)]
+    fields = [cf.search(instance, rounds=1, limits=limits, jobs=1).field for limits in (None, cf.Limits(1e9))]
     assert fields[0].alpha.tobytes() == fields[1].alpha.tobytes()
 
 
@@ -235,8 +236,8 @@ class Hourglass:
 
 
 WORK = {
-    "greedy": lambda over: greedy(cf.sample("mouse", 16), over=over),
-    "improved": lambda over: improved(greedy(cf.sample("mouse", 16)), over),
+    "greedy": lambda over: greedy_field(cf.sample("mouse", 16), stop=over),
+    "improved": lambda over: improved_field(greedy_field(cf.sample("mouse", 16)), stop=over),
     "prolonged": lambda over: prolonged(
         first_field(halved(cf.sample("mouse", 16))), cf.sample("mouse", 16), over
     ),
@@ -277,17 +278,25 @@ def test_a_deadline_in_another_process_says_what_was_left_when_it_was_sent():
     assert pickle.loads(pickle.dumps(Deadline(np.inf))).left() == np.inf
 
 
-@pytest.mark.parametrize("given", [{"seconds": 0}, {"seconds": np.nan}, {"rounds": -1}, {"jobs": 0}])
+@pytest.mark.parametrize("given", [{"time_limit": 0}, {"time_limit": np.nan}, {"rounds": -1}, {"jobs": 0}])
 def test_limits_that_cannot_be_are_refused(given):
+    instance, seconds = cf.sample("skew", 6), given.pop("time_limit", 1)
     with pytest.raises(cf.CrossfieldError, match="positive"):
-        cf.search(cf.sample("skew", 6), **given)
+        cf.search(instance, limits=cf.Limits(seconds), **given)
+
+
+def test_an_event_ends_a_search_with_the_best_field_so_far():
+    instance, asked = cf.sample("ring", 10), threading.Event()
+    found = cf.search(instance, jobs=1, progress=lambda line: asked.set(), stop=asked)
+    assert (found.rounds, found.ended) == (1, "interrupted")
+    assert found.field.energy().total <= first_field(instance).energy().total + 1e-9
 
 
 CHILD = """
 import crossfield as cf
 if True:
     instance = cf.sample("mouse", 16)
-    found = cf.search(instance, jobs=2, progress=lambda rounds, energy: print(rounds, flush=True))
+    found = cf.search(instance, jobs=2, progress=lambda line: print(line.split()[-2], flush=True))
     print(found.ended, found.field.energy().total)
 """
 
@@ -302,10 +311,10 @@ def test_ctrl_c_gives_the_best_field_so_far():
 @given(seed=SEEDS, gauge=st.sampled_from(["strokes", "box"]))
 @settings(deadline=None, max_examples=30)
 def test_improved_fields_are_no_worse_and_stay_improved(seed, gauge):
-    field = greedy(random_instance(seed, gauge=gauge))
-    better = improved(field)
+    field = greedy_field(random_instance(seed, gauge=gauge))
+    better = improved_field(field)
     assert better.energy().total <= field.energy().total
-    assert improved(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
+    assert improved_field(better).energy().total == pytest.approx(better.energy().total, rel=1e-6, abs=1e-12)
 
 
 def test_a_constant_field_stays_constant_on_finer_grids():

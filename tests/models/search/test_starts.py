@@ -4,11 +4,11 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.instance.instance import QUARTER
-from crossfield.models.proof.prove import first_of
+from crossfield.models.proof.work import first_of
 from crossfield.models.search import starts
 from crossfield.models.search.coarse import grown, halved, prolonged
-from crossfield.models.search.greedy import greedy
-from crossfield.models.search.improvement import improved
+from crossfield.models.search.greedy import greedy_field
+from crossfield.models.search.improvement import improved_field
 from crossfield.models.search.starts import first_field, polyvector_start
 from exhaustive import random_instance
 
@@ -19,13 +19,15 @@ pytestmark = pytest.mark.numeric
 @pytest.mark.parametrize("name, size", [("mouse", 96), ("saddle", 128)])
 def test_on_a_large_grid_the_first_field_is_at_most_the_improved_greedy_one(name, size):
     instance = cf.sample(name, size)
-    assert first_field(instance).energy().total <= improved(greedy(instance)).energy().total + 1e-9
+    assert (
+        first_field(instance).energy().total <= improved_field(greedy_field(instance)).energy().total + 1e-9
+    )
 
 
 def test_many_hasty_fields_made_one_are_well_below_the_improved_greedy_one():
     instance = cf.sample("mouse", 56)
     assert starts._SMALL < instance.grid.size < 4 * starts._SMALL
-    assert first_field(instance).energy().total < 0.9 * improved(greedy(instance)).energy().total
+    assert first_field(instance).energy().total < 0.9 * improved_field(greedy_field(instance)).energy().total
 
 
 def test_the_larger_the_grid_the_fewer_strategies_are_tried(monkeypatch):
@@ -54,7 +56,7 @@ def test_first_fields_of_large_grids_are_the_same_each_time(monkeypatch):
 
 def test_proofs_and_searches_begin_at_most_at_the_polyvector_start():
     instance = cf.sample("mouse", 16)
-    polyvector = improved(polyvector_start(instance)).energy().total
+    polyvector = improved_field(polyvector_start(instance)).energy().total
     assert polyvector < first_field(instance).energy().total - 1e-3
     assert first_of(instance, None, lambda: False).energy().total <= polyvector + 1e-9
     assert cf.search(instance, rounds=0).field.energy().total <= polyvector + 1e-9

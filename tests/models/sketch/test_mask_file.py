@@ -103,7 +103,7 @@ def test_warnings_reach_standard_error_and_the_report_once(tmp_path, capsys):
     assert invoke(["instance", str(drawing), "-o", str(tmp_path / "b.json"), "--size", "48", "-q"]) == 0
     assert capsys.readouterr().err == ""
     assert (tmp_path / "mask.png").read_bytes() == cf.write_mask(instance, tmp_path / "m.png").read_bytes()
-    report = Report(instance, (Candidate(START, cf.greedy(instance), 0.0),), ())
+    report = Report(instance, (Candidate(START, cf.greedy_field(instance), 0.0),), ())
     assert report.document()["warnings"] == [warning]
 
 
@@ -112,5 +112,5 @@ def test_what_the_reader_says_is_no_part_of_the_instance(tmp_path):
     again = cf.read_instance(cf.write_instance(instance, tmp_path / "a.json"))
     assert again.sha256 == instance.sha256
     assert again.reading is None
-    assert instance.with_gauge("box").with_weights(2.0).reading is instance.reading
+    assert instance.with_gauge("box").with_weights(stroke_weight=2.0).reading is instance.reading
     assert instance.turned().reading is None

@@ -80,7 +80,7 @@ def check_the_sample(name, size):
 @pytest.mark.parametrize("name", ["mouse", "wave_sheet"])
 def test_samples_are_the_same_each_time_and_take_a_gauge(name):
     assert sample(name, 20).sha256 == sample(name, 20).sha256
-    assert sample(name).sha256 == sample(name, 24, "strokes").sha256
+    assert sample(name).sha256 == sample(name, 24, gauge="strokes").sha256
     assert sample(name, 20, gauge="box").gauge == "box"
     assert sample(name, 20, gauge="box").with_gauge("strokes").sha256 == sample(name, 20).sha256
 

@@ -73,7 +73,7 @@ def test_the_energy_falls_and_the_singularities_stay(name):
 
     The greedy field of light strokes lies far from strokes that are then held harder.
     """
-    start, hold = cf.greedy(replace(cf.sample(name, 16), stroke_coefficient=1)), 1.5
+    start, hold = cf.greedy_field(replace(cf.sample(name, 16), stroke_coefficient=1)), 1.5
     field = bend_field(start, harmonic=HARMONIC, hold=hold)
     assert bend_energy(field, hold) < 0.8 * bend_energy(start, hold)
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
@@ -96,7 +96,7 @@ def test_the_field_moves_with_the_sketch(name):
 
 def test_labels_do_not_matter():
     instance = cf.sample("singular", 16)
-    start = cf.greedy(instance)
+    start = cf.greedy_field(instance)
     field = bend_field(start)
     boxed = bend_field(cf.CrossField.from_lines(instance.with_gauge("box"), *lines(start)))
     assert (boxed.p != field.p).any()
@@ -158,7 +158,7 @@ def test_a_heavier_hold_keeps_the_strokes():
 
 def test_a_heavy_weight_of_skew_makes_right_angles():
     instance = cf.sample("mouse", 16, skew_weight=1e4)
-    assert line_difference(*lines(bend_field(cf.greedy(instance)))) == pytest.approx(HALF, abs=1e-2)
+    assert line_difference(*lines(bend_field(cf.greedy_field(instance)))) == pytest.approx(HALF, abs=1e-2)
 
 
 def test_the_method_bends_a_given_start_too(tmp_path):
@@ -179,13 +179,13 @@ def test_rounds_end_when_the_time_is_over():
         calls.append(rounds)
         return len(calls) > rounds
 
-    assert bend_field(start, over=lambda: over(0)) is start
+    assert bend_field(start, stop=lambda: over(0)) is start
     energies = []
     for rounds in (1, 2, 3):
         calls.clear()
-        found = bend_field(start, harmonic=HARMONIC, over=lambda rounds=rounds: over(rounds))
+        found = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
         assert len(calls) == rounds + 1
         energies.append(_Bend.of(start, HARMONIC, HOLD).energy(np.concatenate(_lines(found))))
     assert energies == sorted(energies, reverse=True)
     whole = bend_field(start)
-    assert np.array_equal(bend_field(start, over=lambda: False).alpha, whole.alpha)
+    assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)

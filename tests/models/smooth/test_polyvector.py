@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import QUARTER, Instance
-from crossfield.models.search.improvement import improved
-from crossfield.models.search.search import search
+from crossfield.models.search.improvement import improved_field
+from crossfield.models.search.search import search_patches
 from crossfield.models.search.starts import polyvector_start
 from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
@@ -107,7 +107,8 @@ def test_the_start_is_the_best_of_the_holds():
     instance = sample("cylinder_bend", 16)
     start = polyvector_start(instance).energy().total
     assert (
-        start <= min(improved(polyvector_field(instance, hold=hold)).energy().total for hold in HOLDS) * 1.05
+        start
+        <= min(improved_field(polyvector_field(instance, hold=hold)).energy().total for hold in HOLDS) * 1.05
     )
     assert polyvector_start(instance, lambda: True).energy().total >= start
 
@@ -115,9 +116,9 @@ def test_the_start_is_the_best_of_the_holds():
 def test_the_search_begins_where_the_polyvector_field_leads():
     """The improved greedy and power fields of the saddle have the wrong jumps."""
     instance = sample("saddle", 24)
-    reached = improved(polyvector_start(instance)).energy().total
-    assert reached < 0.95 * improved(power_field(instance)).energy().total
-    assert search(instance, rounds=0).field.energy().total <= reached + 1e-9
+    reached = improved_field(polyvector_start(instance)).energy().total
+    assert reached < 0.95 * improved_field(power_field(instance)).energy().total
+    assert search_patches(instance, rounds=0).field.energy().total <= reached + 1e-9
 
 
 def test_one_pixel_under_the_heaviest_strokes_is_solved():

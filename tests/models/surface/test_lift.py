@@ -194,7 +194,7 @@ def test_an_end_in_time_leaves_the_best_so_far():
     errors = []
     for most in (0, 8, 10_000):
         left = iter(range(most))
-        found = cf.surface(field, over=lambda left=left: next(left, None) is None)
+        found = cf.surface(field, stop=lambda left=left: next(left, None) is None)
         assert np.isfinite(found.normals).all()
         assert any("time" in doubt for doubt in found.doubts) == (most < 10_000)
         errors.append(error(found, true))

@@ -1,0 +1,94 @@
+"""Names of columns and rows: `alpha_012_034`, `p1_012_034_u`, `c14_012_034_r`.
+
+A name consists of the block or row tag, and of the row and the column of the pixel (of a pair: of its first
+pixel). A pair adds `u` for the upper or `r` for the right neighbour. Numbers are zero-padded to the grid's
+width. Names have at most 15 characters and no leading e, i or n, and they are unique without regard to case
+(docs/format-rules.md, W6). So a solver's log can be read, and every solution file maps back without the
+model.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.instance import Instance
+from .families import PlacedFamily, Placement
+from .symbols import IndexSet, pixel_of
+
+Bytes = NDArray[np.uint8]
+"""Texts as rows of bytes, padded with NUL on the right."""
+
+_FOUR: Final = np.array([b"%04d" % value for value in range(10_000)]).view(np.uint32)
+"""The decimals 0000 to 9999, four bytes each."""
+
+
+def digits(values: NDArray[Any], width: int) -> Bytes:
+    """Decimal digits with leading zeros, shape (len(values), width): four at a time from a table."""
+    groups = -(-width // 4)
+    out = np.empty((len(values), groups), dtype=np.uint32)
+    rest = values
+    for place in range(groups - 1, 0, -1):
+        high = rest // 10_000
+        out[:, place] = _FOUR.take(rest - high * 10_000)
+        rest = high
+    out[:, 0] = _FOUR.take(rest)
+    return out.view(np.uint8)[:, 4 * groups - width :]
+
+
+def element_names(instance: Instance, tag: str, over: IndexSet) -> Bytes:
+    """Names `tag_row_column[_u|_r]` of all elements of an index set, shape (count, width), no padding."""
+    grid, at = instance.grid, pixel_of(instance, over)
+    labels = digits(np.arange(max(grid.height, grid.width)), _digits(instance))
+    parts = [f"{tag}_", labels[grid.rows[at]], "_", labels[grid.columns[at]]]
+    if over == "pairs":
+        parts.append(np.frombuffer(b"_r_u", np.uint8).reshape(2, 2)[grid.upward.astype(np.intp)])
+    return np.concatenate(
+        [_repeated(part, len(at)) if isinstance(part, str) else part for part in parts], axis=1
+    )
+
+
+def _repeated(text: str, count: int) -> Bytes:
+    word = np.frombuffer(text.encode(), np.uint8)
+    return np.broadcast_to(word, (count, len(word)))
+
+
+def name_length(instance: Instance, tag: str, over: IndexSet) -> int:
+    """Length of each of these names."""
+    return len(tag) + 2 * (1 + _digits(instance)) + (2 if over == "pairs" else 0)
+
+
+def _digits(instance: Instance) -> int:
+    """Digits of a row or column number: as many as the largest has, at least two."""
+    return max(2, len(str(max(instance.grid.height, instance.grid.width) - 1)))
+
+
+def stacked(matrices: list[Bytes]) -> Bytes:
+    """Matrices of names below each other, narrower ones padded with NUL on the right."""
+    width = max((matrix.shape[1] for matrix in matrices), default=1)
+    out = np.zeros((sum(len(matrix) for matrix in matrices), width), dtype=np.uint8)
+    start = 0
+    for matrix in matrices:
+        out[start : start + len(matrix), : matrix.shape[1]] = matrix
+        start += len(matrix)
+    return out
+
+
+def column_names(problem: Placement) -> Bytes:
+    """Names of all columns in column order, shape (columns, width), padded with NUL."""
+    return stacked(
+        [element_names(problem.instance, block.name, block.over) for block in problem.blocks.values()]
+    )
+
+
+def family_names(family: PlacedFamily) -> Bytes:
+    """Names of the rows of a family, shape (count, width), no padding."""
+    names = element_names(family.problem.instance, family.family.tag, family.family.over)
+    return names if family.everywhere else names[family.elements]
+
+
+def row_names(problem: Placement) -> Bytes:
+    """Names of all rows in row order, shape (rows, width), padded with NUL."""
+    return stacked([family_names(family) for family in problem.rows])

@@ -1,0 +1,78 @@
+"""Limits of work: seconds, relative gap, threads."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from ..errors import InputError
+from .deadline import Deadline
+from .side_by_side import checked
+
+LEAST: Final = 0.01
+"""Seconds of a solve for which no time is left: its starting point is still returned."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a solve, a search, a proof or a run.
+
+    Parameters
+    ----------
+    time_limit
+        Seconds, files included. `math.inf` sets no limit; only `search` and `prove` accept it.
+    gap
+        Relative gap, (energy - bound) / energy, at which the work may stop. A search has no bound and
+        ignores it.
+    threads
+        Threads inside one solver or proof. With 0 the solver chooses; `search` and `prove` then take as many
+        as they have jobs.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
+
+    """
+
+    time_limit: float = 60.0
+    gap: float = 1e-6
+    threads: int = 0
+    _end: Deadline | None = field(default=None, repr=False, compare=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        if not (self.time_limit > 0 and 0 <= self.gap < math.inf):
+            raise _refusal(self)
+        checked(self.threads, "threads", least=0)
+
+    @classmethod
+    def bounded(cls, given: Limits | None) -> Limits:
+        """Return the limits of work that always needs a time limit; the defaults for None.
+
+        Raises
+        ------
+        InputError
+            When the time limit is infinite.
+
+        """
+        limits = given or cls()
+        if limits.time_limit == math.inf:
+            raise _refusal(limits)
+        return limits
+
+    def deadline(self) -> Deadline:
+        """Return the moment at which the time limit ends, counted from now unless `until` fixed it."""
+        return self._end or Deadline.after(self.time_limit)
+
+    def until(self, deadline: Deadline) -> Limits:
+        """Return the same limits with the seconds that are left until a deadline."""
+        return replace(self, time_limit=max(deadline.left(), LEAST), _end=deadline)
+
+
+def _refusal(limits: Limits) -> InputError:
+    return InputError(
+        f"a time limit of {limits.time_limit} s and a gap of {limits.gap} are out of range; "
+        "give a positive number of seconds, and a gap that is not negative"
+    )

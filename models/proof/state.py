@@ -1,0 +1,37 @@
+"""Arrays that the compiled passes of a proof read and change."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.grid import Floats, Ints
+from .lattice import Starts
+
+Indices = NDArray[np.int64]
+"""Numbers of pixels and pairs: all of one type, so that each function is compiled once."""
+
+
+class State(NamedTuple):
+    """A lattice and the shares on it as arrays, which the compiled passes read and change."""
+
+    h: float
+    alpha: Floats  # of each pixel's first label
+    beta: Floats
+    alpha_count: Ints
+    beta_count: Ints
+    start: Starts
+    unary: Floats
+    first: Indices
+    second: Indices
+    odd: Ints
+    start_first: Starts
+    start_second: Starts
+    around: Indices  # pairs to the upper, left, lower, right neighbour of each pixel, or -1
+    shares_first: Floats
+    shares_second: Floats
+    theta: Floats  # as the last pass found it at each pixel
+    least: Floats  # of each pixel's theta
+    norm: int  # 1 or 2

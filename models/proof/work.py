@@ -1,0 +1,417 @@
+"""The work of a proof: a field, and how far from the best it is at most.
+
+Lattice after lattice, each of half the spacing. On each level the dual rises by passes
+(models/proof/sweep.py), fields are rounded from it (rounding.py), and what cannot hold a better field is
+dropped (pruning.py), until the jumps are forced (forced.py). A better field becomes the centre: the
+lattices begin anew round it.
+
+Where a field has a vortex, the local polytope mixes fields with the vortex in other places, and finer
+lattices leave its gap. Once such a level is met, the one before is cut into branches at the alpha of the
+pixel of which the dual says least. The branch of least bound goes on, with half the spacing, or cut again;
+the least of their bounds is that of all.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+from heapq import heappop, heappush
+from typing import ClassVar, Final
+
+import numpy as np
+
+from ..field.field import CrossField, Norm, relabelled
+from ..field.jumps import free_jumps
+from ..instance.instance import Instance
+from ..processes.crew import Crew
+from ..processes.deadline import Deadline, Over, never
+from ..processes.progress import Progress
+from ..search.improvement import improved_field
+from ..search.search import search_patches
+from ..search.starts import first_field, polyvector_start
+from .certificate_pace import certificate_effort, checking_pace
+from .check_certificate import MOST_LEVELS
+from .forced import Forced, forced
+from .lattice import Lattice, reached
+from .pruning import branches, finer, prolonged, remaining_cells
+from .record import EXACT, LevelRecord, Proof, Status
+from .rounding import Rounding, improve
+from .sweep import Dual
+
+COARSEST: Final = 16  # steps in pi/2 of the first level
+_FINEST: Final = 2**16  # of the last one: spacings of 2e-5 radians
+_PASSES: Final = 3  # forwards and backwards between two roundings
+_SLOW: Final = 0.05
+"""Share of the gap: a level on which some passes close less has done its work.
+A tenth of it where no other level can follow.
+"""
+_MOST_ROUNDS: Final = 40  # a level
+_STALLED: Final = 0.5  # share of the gap that half the spacing leaves where branches are needed
+_PARTS: Final = 8  # branches of a level
+_SLOW_BRANCH: Final = 0.05  # as _SLOW, on branches
+_MOST_WORK: Final = 1e11  # additions of a pass, some 20 s
+MOST_LABELS: Final = 16_000_000  # a level; each takes some 200 bytes
+_MOST_BRANCHED: Final = 5_000_000  # of all branches that wait: each keeps its messages
+_RECORDING: Final = 4  # passes: what rounding begins, the bound of a record and the pruning take as long
+_WORTH: Final = 2 * _RECORDING  # passes; where there is no time for as many, a level is not begun
+_DECIMALS: Final = 7  # of centres, which need few: their last digits differ between processors
+_BETTER: Final = 1e-6  # relative; below, a better field need not become the centre
+_MANY: Final = 4  # levels after which a gap that is left may be that of the field
+_LARGE: Final = 1_000_000  # labels of a level before which to search, for passes over it take as long
+_SEARCH: Final = 0.1  # share of the time for that search
+_SLICE: Final = 0.3  # share of the time that is left for a search where the lattices have come to their end
+_ROUNDS: Final = 5  # of a search without a limit of time
+
+
+@dataclass
+class WorkLimits:
+    """When to end: a deadline, whether the user or the caller asks for it, a sufficient gap, enough work.
+
+    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. work:
+    greatest number of labels; labels: those so far. pace: greatest measured seconds per unit of the
+    certificate's effort. kept: the seconds that the certificate is expected to take.
+    """
+
+    whole: Deadline
+    interrupted: Over
+    stop: Over
+    gap: float
+    certified: bool
+    work: float = math.inf
+    labels: int = 0
+    pace: float = 0.0
+    kept: float = 0.0
+
+    @property
+    def deadline(self) -> Deadline:
+        """The end of the proof itself."""
+        return self.whole.later(-self.kept)
+
+    def keep(self, effort: float) -> None:
+        """Keep time for a certificate of that effort.
+
+        If there is too little for the first level, no certificate can be written in time. The proof then uses
+        all of the time, and looks for better fields.
+        """
+        if not self.certified or self.whole.at == np.inf:
+            return
+        self.pace = max(self.pace, checking_pace())
+        seconds = effort * self.pace
+        self.certified = self.kept > 0 or self.whole.left() > seconds
+        self.kept = seconds if self.certified else 0.0
+
+    def met(self) -> str:
+        """Which limit is met; empty when none is."""
+        if self.interrupted() or self.stop():
+            return "interrupted"
+        if self.labels > self.work:
+            return "work"
+        return "time" if self.deadline.passed() else ""
+
+    def over(self, ahead: float = 0.0) -> bool:
+        """Whether work has to end now, or within so many seconds."""
+        return bool(self.met()) or self.deadline.left() <= ahead
+
+
+def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
+    """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
+    fields = [first_field(instance, over)]
+    if given is not None:
+        fields.append(improved_field(given, stop=over))
+    if not over():
+        fields.append(improved_field(polyvector_start(instance, over), stop=over))
+    return min(fields, key=lambda field: round(field.energy().total, 9))
+
+
+@dataclass
+class _Chain:
+    """The levels round one centre, and what they prove together."""
+
+    levels: list[LevelRecord] = field(default_factory=list)
+    parents: list[int] = field(default_factory=list)
+    bound: float = 0.0
+    forced: int = 0
+
+    @property
+    def effort(self) -> float:
+        """The effort of a certificate of these levels."""
+        return sum(map(certificate_effort, self.levels))
+
+
+@dataclass(frozen=True, order=True)
+class _Branch:
+    """A level with nothing after it yet: its bound, its number, its dual, and whether it has to be cut."""
+
+    bound: float
+    number: int
+    dual: Dual = field(compare=False)
+    stalls: bool = field(compare=False)
+
+
+@dataclass
+class Work:
+    """State of a proof of the 2-norm."""
+
+    norm: ClassVar[Norm] = 2
+    first = staticmethod(first_of)
+    improve = staticmethod(improve)
+    forced = staticmethod(forced)
+
+    instance: Instance
+    best: CrossField
+    limits: WorkLimits
+    hands: Crew
+    seed_and_jobs: tuple[int, int]
+    progress: Progress
+    chain: _Chain = field(default_factory=_Chain)
+    proven: _Chain = field(default_factory=_Chain)
+    searched: bool = False
+    searches: int = 0
+    began: float = 0.0
+
+    def improved(self, field: CrossField, over: Over = never) -> CrossField:
+        """The field, with jumps and angles improved."""
+        return improved_field(field, stop=over)
+
+    def energy(self, field: CrossField) -> float:
+        """The energy that the proof is of."""
+        return field.energy(self.norm).total
+
+    def level(self, centre: CrossField) -> Lattice:
+        """The first level round a field."""
+        return Lattice.whole(centre, COARSEST)
+
+    def proof(self, seconds: float, ended: str) -> Proof:
+        """The proof so far, with the levels that prove it."""
+        bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
+        status: Status = "optimal" if self._exact(bound) else "gap"
+        return Proof(
+            self.best, energy, bound, status, self.proven.forced, tuple(self.proven.levels), seconds, ended,
+            self.norm, tuple(self.proven.parents),
+        )  # fmt: skip
+
+    def run(self) -> str:
+        """Go through chains of levels until a limit is met, or nothing helps; which one."""
+        ended = self._descend()
+        while not ended or (ended == "labels" and self._found_more()):
+            ended = self._descend()
+        return self.limits.met() or ended
+
+    def _found_more(self) -> bool:
+        """Whether a search in the time that is left finds a field for which to begin anew.
+
+        That needs as much time as the last chain took; with less the search goes on to the end.
+        """
+        before, spent = self.energy(self.best), time.monotonic() - self.began
+        while not self.limits.over():
+            left = self.limits.deadline.left()
+            self._search(_SLICE if left > 2 * spent else 1.0)
+            if not np.isfinite(left) or self.limits.deadline.left() > spent:
+                better = self.energy(self.best) < before * (1 - _BETTER)
+                if better or not np.isfinite(left):
+                    return better
+        return False
+
+    def _descend(self) -> str:
+        """Go through the levels round the best field; how it ended, empty where a better one was found."""
+        if met := self.limits.met():
+            return met
+        self.chain, before, self.began = _Chain(), self.best, time.monotonic()
+        dual = coarser = Dual(self.level(_centre(before)), self.hands)
+        self.limits.keep(self._effort_with(dual.lattice))
+        patient = False
+        while True:
+            self._ascend(dual, _SLOW / 10 if patient else _SLOW)
+            what = self._record(dual, again=patient)
+            if (ended := self._ended()) or what is None:
+                return ended or "labels"
+            lattice = finer(what.left)
+            small = not _too_large(lattice) and self._in_time(dual, lattice)
+            stalls = not patient and self._stalls()
+            if not self.searched and (stalls or self._costly(lattice)):
+                self.searched = True
+                self._search(_SEARCH)
+            if self.energy(self.best) < self.energy(before) * (1 - _BETTER):
+                return self.limits.met()
+            if stalls:
+                return self._branch(coarser)
+            if not small and patient:
+                return "labels"
+            if not small and self._closing(dual)():
+                return self.limits.met() or "time"
+            patient = not small
+            if small:
+                self.limits.keep(self._effort_with(lattice))
+                coarser, dual = dual, prolonged(dual, lattice)
+
+    def _in_time(self, dual: Dual, lattice: Lattice) -> bool:
+        """Whether there is time for some passes over the lattice that follows, and for its certificate."""
+        passes = _WORTH * dual.seconds_on(lattice)
+        certificate = self._effort_with(lattice) * self.limits.pace if self.limits.certified else 0.0
+        return not self.limits.over(passes + max(0.0, certificate - self.limits.kept))
+
+    def _effort_with(self, lattice: Lattice) -> float:
+        """The effort of a certificate with one more level."""
+        return max(self.proven.effort, self.chain.effort + certificate_effort(lattice))
+
+    def _closing(self, dual: Dual) -> Over:
+        """Says whether the time that is left is what it takes to record the level."""
+        return lambda: self.limits.over(_RECORDING * dual.seconds)
+
+    def _stalls(self) -> bool:
+        """Whether half the spacing has left more than half of the gap, and the best field has a vortex.
+
+        Then the dual mixes places where it may be, and finer lattices do not help.
+        """
+        bounds = [self.energy(self.best) - level.bound for level in self.chain.levels[-2:]]
+        vortices = len(self.best.singularities.index) > 0
+        return len(self.chain.levels) > 2 and bounds[1] > _STALLED * bounds[0] and vortices
+
+    def _branch(self, dual: Dual) -> str:
+        """Cut the last level but one into branches, and go on with the one of least bound; how it ended."""
+        levels = self.chain.levels[:-1]
+        self.chain = _Chain(levels, list(range(-1, len(levels) - 1)))
+        waiting = [_Branch(levels[-1].bound, len(levels) - 1, dual, stalls=True)]
+        while not (ended := self._ended()):
+            branch = heappop(waiting)
+            parts = self._parts(branch)
+            more = sum(int(part.lattice.allowed.sum()) for part in parts)
+            full = _labels(waiting) + more > _MOST_BRANCHED
+            if not parts or full or len(levels) + len(parts) > MOST_LEVELS:
+                return "labels"
+            for part in parts:
+                if not self._in_time(part, part.lattice):
+                    return self.limits.met() or "time"
+                heappush(waiting, self._raised(part, branch))
+            self.chain.bound = min(waiting[0].bound, self.energy(self.best))
+            if self.chain.bound > self.proven.bound:
+                self.proven = replace(self.chain, levels=levels[:], parents=self.chain.parents[:])
+            self._tell(self.proven.bound, _labels(waiting))
+        return ended or self._ended()
+
+    def _parts(self, branch: _Branch) -> list[Dual]:
+        """The duals that follow from a branch: on the lattice of half the spacing, or on parts of its own."""
+        if branch.stalls:
+            return branches(branch.dual, _PARTS)
+        lattice = finer(remaining_cells(branch.dual, branch.bound, self.energy(self.best)))
+        return [] if _too_large(lattice) else [prolonged(branch.dual, lattice)]
+
+    def _raised(self, dual: Dual, parent: _Branch) -> _Branch:
+        """The branch of a dual, which is raised as long as it pays, and recorded."""
+        reached, energy = -np.inf, self.energy(self.best)
+        self.limits.keep(self._effort_with(dual.lattice))
+        closing = self._closing(dual)
+        for _ in range(_MOST_ROUNDS):
+            bound = dual.ascend(_PASSES, closing)
+            if closing() or bound > energy or bound - reached <= _SLOW_BRANCH * (energy - bound):
+                break
+            reached = bound
+        level, levels = LevelRecord.of(dual, energy), self.chain.levels
+        levels.append(level)
+        self.chain.parents.append(parent.number)
+        stalls = not parent.stalls and energy - level.bound > _STALLED * (energy - parent.bound)
+        return _Branch(level.bound, len(levels) - 1, dual, stalls=stalls)
+
+    def _ended(self) -> str:
+        """Why the work is at its end; empty if it is not."""
+        energy, bound = self.energy(self.best), self.proven.bound
+        if self._exact(bound):
+            return "optimal"
+        return "gap" if energy - bound <= self.limits.gap * energy else self.limits.met()
+
+    def _exact(self, bound: float) -> bool:
+        energy = self.energy(self.best)
+        return energy - bound <= EXACT * (1 + energy)
+
+    def _costly(self, lattice: Lattice) -> bool:
+        """Whether it is time to search for a better centre: the next level takes long, or there were many."""
+        return len(self.chain.levels) == _MANY or bool(lattice.start[-1] > _LARGE)
+
+    def _search(self, share: float) -> None:
+        """Search for a better field from the best one, for a share of the time, or some rounds."""
+        if self.limits.over():
+            return
+        seed, jobs = self.seed_and_jobs
+        timed = np.isfinite(self.limits.deadline.left())
+        self._offer(
+            search_patches(
+                self.instance,
+                deadline=self.limits.deadline.share(share) if timed else None,
+                rounds=None if timed else _ROUNDS,
+                seed=seed + self.searches,
+                jobs=jobs,
+                start=self.best,
+                stop=self.limits.stop,
+            ).field
+        )
+        self.searches += 1
+
+    def _offer(self, found: CrossField) -> None:
+        self.best = min(self.best, found, key=self.energy)
+
+    def _ascend(self, dual: Dual, slow: float) -> None:
+        """Raise the dual of a level, and round fields from it, until the bound's rise is slow."""
+        reached, rounding, closing = -np.inf, Rounding(dual, self.improve), self._closing(dual)
+        for _ in range(_MOST_ROUNDS):
+            bound = dual.ascend(_PASSES, closing)
+            self.best = rounding.lower(self.best, closing)
+            energy = self.energy(self.best)
+            self._tell(max(self.proven.bound, min(bound, energy)), int(dual.lattice.allowed.sum()))
+            if closing() or self._exact(bound) or bound - reached <= slow * (energy - bound):
+                return
+            reached = bound
+
+    def _tell(self, bound: float, labels: int) -> None:
+        """Report bound, least energy and remaining labels, and count the labels as work."""
+        self.limits.labels += labels
+        self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
+
+    def _record(self, dual: Dual, *, again: bool) -> Forced | None:
+        """Record the level and what it proves, prune it, and see what is forced; not when the time is over.
+
+        again: it is recorded already, with less.
+        """
+        chain, energy = self.chain, self.energy(self.best)
+        level, what = LevelRecord.of(dual, energy), None
+        if again:
+            if level.bound <= chain.levels[-1].bound:
+                return None
+            chain.levels.pop()
+        if level.bound > chain.bound or not self.limits.over():
+            chain.levels.append(level)
+            chain.bound = max(chain.bound, level.bound)
+        if not self.limits.over():
+            what = self.forced(remaining_cells(dual, level.bound, energy))
+            chain.forced = int(what.pairs.sum())
+            self._fit(what)
+        if chain.bound >= self.proven.bound:
+            self.proven = chain
+        return what
+
+    def _fit(self, what: Forced) -> None:
+        """Solve the convex problem that is left, if all is forced."""
+        if what.everything:
+            found, least = what.least(self.energy(self.best), self.limits.over)
+            jumps = relabelled(self.instance, found.alpha, found.beta, found.p)
+            self._offer(self.improved(jumps, self.limits.over))
+            self.chain.bound = max(self.chain.bound, min(least, self.chain.levels[-1].energy))
+
+
+def _labels(waiting: list[_Branch]) -> int:
+    """The number of labels that are left on branches."""
+    return sum(int(branch.dual.lattice.allowed.sum()) for branch in waiting)
+
+
+def _too_large(lattice: Lattice) -> bool:
+    """Whether a level is beyond what memory, time or the digits of an angle allow."""
+    fine = lattice.h < np.pi / 2 / _FINEST
+    return fine or bool(lattice.start[-1] > MOST_LABELS) or lattice.work > _MOST_WORK
+
+
+def _centre(field: CrossField) -> CrossField:
+    """The same crosses in the gauge `strokes`, each pair with its best jump; 0 where no stroke reaches."""
+    instance = field.instance.with_gauge("strokes")
+    known = reached(instance)
+    alpha, beta = (np.round(angle, _DECIMALS) * known for angle in (field.alpha, field.beta))
+    return relabelled(instance, alpha, beta, free_jumps(instance.grid, alpha, beta)[0])

@@ -1,0 +1,64 @@
+"""No module imports another one that leads back to it, at any level: deferred and type-only imports count."""
+
+from __future__ import annotations
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import places
+import pytest
+
+PARTS = ("models", "export", "templates")
+
+
+def modules(root: Path) -> dict[str, Path]:
+    """The modules below the parts of a package by name, packages by the name of their folder."""
+    found = {}
+    for path in (path for part in PARTS for path in (root / part).rglob("*.py")):
+        parts = path.relative_to(root).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported(name: str, path: Path, known: dict[str, Path]) -> set[str]:
+    """The known modules that a module imports by relative imports, wherever in its text they stand."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = [*package[: len(package) - node.level + 1], *filter(None, [node.module])]
+            for alias in node.names:
+                target = ".".join([*base, alias.name])
+                found.add(target if target in known else ".".join(base))
+    return found & set(known)
+
+
+def circle(root: Path) -> list[str]:
+    """A circle of imports, empty where there is none."""
+    known = modules(root)
+    try:
+        TopologicalSorter({name: imported(name, path, known) for name, path in known.items()}).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_there_is_no_circle_of_imports():
+    assert len(modules(places.ROOT)) > 200
+    assert circle(places.ROOT) == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "from .a import f\n",
+        "def late():\n    from . import a\n",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from ..models.a import f\n",
+    ],
+)
+def test_every_kind_of_import_is_seen(back, tmp_path):
+    for name, text in {"models/a.py": "from .b import g\n", "models/b.py": back}.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert set(circle(tmp_path)) == {"models.a", "models.b"}
