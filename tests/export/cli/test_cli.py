@@ -326,7 +326,7 @@ def test_debug_shows_the_traceback(tmp_path, capsys):
 def test_an_internal_error_is_one_line_too(tmp_path, instance_file):
     code = (
         "import sys, crossfield.models.search.greedy as g, crossfield.export.cli.app as c\n"
-        "g.greedy = lambda *_, **__: 1 / 0\n"
+        "g.greedy_field = lambda *_, **__: 1 / 0\n"
         "sys.exit(c.invoke(sys.argv[1:]))"
     )
     arguments = ["solve", str(instance_file), "-f", "qp-fixed", "-o", str(tmp_path / "out")]

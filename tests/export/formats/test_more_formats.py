@@ -152,7 +152,7 @@ def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
     code = (
         "import sys; from crossfield.export.bundle.manifest import write_all\n"
         "from crossfield.models.sketch.samples import sample\n"
-        f"write_all(sample('skew', 6), sys.argv[1], {chosen!r}, {MORE!r})"
+        f"write_all(sample('skew', 6), sys.argv[1], formulations={chosen!r}, formats={MORE!r})"
     )
     here = tmp_path / "here"
     write_all(sample("skew", 6), here, formulations=chosen, formats=MORE)

@@ -60,7 +60,7 @@ def test_highs_without_time_returns_the_start_and_no_bound(tmp_path):
 
 def test_an_event_ends_a_solve_with_its_best_point(tmp_path):
     """HiGHS does not close the gap of this problem within minutes."""
-    start, asked = cf.greedy_field(cf.sample("bottle", 16)), threading.Event()
+    start, asked = cf.greedy_field(cf.sample("bottle", 12)), threading.Event()
     problem = cf.formulate(start.instance, "milp-mccormick")
     asked.set()
     found = cf.solve(problem, "highs", folder=tmp_path, limits=cf.Limits(600.0), start=start, stop=asked)
