@@ -63,7 +63,7 @@ def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the pixels of an instance lie on its drawing."""
+    """Coordinates and lengths of an instance on its drawing."""
 
     instance: Instance
 

@@ -38,7 +38,7 @@ class Parts:
 
     @cached_property
     def total(self) -> int:
-        """How many there are in all."""
+        """The number of all rows or columns."""
         return sum(self.counts)
 
     @property
@@ -50,7 +50,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where a matrix has entries: their rows and columns, shape (k,), and which stand in nonlinear terms."""
+    """The entries of a matrix: their rows and columns, shape (k,), and which stand in nonlinear terms."""
 
     down: Parts
     across: Parts
@@ -60,7 +60,7 @@ class Pattern:
 
     @property
     def entries(self) -> int:
-        """How many entries there are."""
+        """The number of entries."""
         return len(self.rows)
 
     @cached_property
@@ -108,7 +108,7 @@ def _cells(pattern: Pattern, height: int, width: int, unit: float) -> list[Area]
 
 
 def _cuts(parts: Parts, scale: float) -> list[float]:
-    """Where the parts end, but for the last."""
+    """The ends of all parts but the last."""
     return [end * scale for end in list(accumulate(parts.counts))[:-1]]
 
 

@@ -114,7 +114,7 @@ def _axis(values: list[float]) -> _Axis:
 
 
 def _at(value: float, axis: _Axis) -> float:
-    """Where a value lies on a scale, from 0 to 1; one beyond it lies at its end."""
+    """The place of a value on a scale, from 0 to 1; one beyond it lies at its end."""
     return min(max((value - axis.ticks[0]) / (axis.ticks[-1] - axis.ticks[0]), 0.0), 1.0)
 
 

@@ -243,9 +243,3 @@ def test_malformed_sketch_is_named(tmp_path, polyline):
     with pytest.raises(InputError, match="polyline 1 of the sketch"):
         draw(singular(4), tmp_path / "a.png", sketch=[[(0.0, 0.0), (1.0, 1.0)], polyline])
     assert not list(tmp_path.iterdir())
-
-
-def test_kinds_are_described_in_one_line():
-    for kind in KINDS.values():
-        assert kind.description
-        assert "\n" not in kind.description

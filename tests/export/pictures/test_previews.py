@@ -1,4 +1,4 @@
-"""What notebooks show: pictures, tables that load nothing, and one line of each."""
+"""Contents of notebooks: pictures, tables that load nothing, and one line of each."""
 
 import base64
 import io
@@ -34,16 +34,16 @@ def solution(instance, field):
 
 
 def test_every_repr_is_one_line_with_sizes_and_energy(instance, field, problem, solution):
-    told = [repr(each) for each in (instance, field, problem, solution)]
-    for line, name in zip(told, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
+    lines = [repr(each) for each in (instance, field, problem, solution)]
+    for line, name in zip(lines, ("Instance", "CrossField", "Problem", "Solution"), strict=True):
         assert re.fullmatch(rf"<{name} .*>", line)
         assert len(line) < 130
-    assert instance.summary in told[0]
-    assert f"{field.energy().total:.6g}" in told[1]
-    assert f"{problem.columns} columns" in told[2]
-    assert f"{problem.row_count} rows" in told[2]
-    assert f"objective {solution.objective:.6g}" in told[3]
-    assert "optimal" in told[3]
+    assert instance.summary in lines[0]
+    assert f"{field.energy().total:.6g}" in lines[1]
+    assert f"{problem.columns} columns" in lines[2]
+    assert f"{problem.row_count} rows" in lines[2]
+    assert f"objective {solution.objective:.6g}" in lines[3]
+    assert "optimal" in lines[3]
 
 
 def test_instances_and_fields_are_pictures(instance, field):
@@ -74,7 +74,7 @@ def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
     assert len(list(roots[1].iter("img"))) == 1
 
 
-def test_a_solution_without_a_point_is_told(problem):
+def test_a_solution_without_a_point_is_reported(problem):
     from crossfield.export.solutions.readers.text import Status
 
     empty = cf.Solution(problem, None, Status.INFEASIBLE, "<no> & never", "highs")
