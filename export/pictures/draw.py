@@ -9,7 +9,7 @@ no part.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,8 +184,11 @@ def _panels(what: Subject, kind: Kind, sketch: Sequence[ArrayLike], title: str |
 
 
 @contextmanager
-def own_settings() -> Iterator[None]:
-    """Settings of matplotlib that are always the same, whatever the user's are."""
+def own_settings(more: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Settings of matplotlib that are always the same, whatever the user's are.
+
+    more: settings on top of these.
+    """
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -195,6 +198,7 @@ def own_settings() -> Iterator[None]:
         mpl.rcParams.update(
             {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
         )
+        mpl.rcParams.update(more or {})
         yield
 
 
