@@ -9,7 +9,7 @@ no part.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,7 +184,7 @@ def _panels(what: Subject, kind: Kind, sketch: Sequence[ArrayLike], title: str |
 
 
 @contextmanager
-def own_settings(more: Mapping[str, Any] | None = None) -> Iterator[None]:
+def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
     """Settings of matplotlib that are always the same, whatever the user's are.
 
     more: settings on top of these.
