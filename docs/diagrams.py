@@ -11,13 +11,14 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
+from crossfield.export.pictures.draw import own_settings
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.instance import HALF, QUARTER, Instance
 from matplotlib.figure import Figure
 
 U, V, GREY, FILL = "#c0392b", "#2563a8", "#7a7a7a", "#dfe9f5"
-STYLE: Final = {"svg.hashsalt": "crossfield", "font.family": "DejaVu Sans", "font.size": 11}
+STYLE: Final = {"font.family": "DejaVu Sans", "font.size": 11}
 
 
 def line(axes: Any, angle: float, colour: str, name: str = "", at: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -189,7 +190,7 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float]]] = {
 def draw(folder: Path) -> None:
     """Write every figure as SVG, with equal bytes each time."""
     for name, (paint, width, height) in FIGURES.items():
-        with mpl.rc_context(STYLE):
+        with own_settings(STYLE):
             figure = Figure(figsize=(width, height), layout="constrained")
             paint(figure)
             figure.savefig(folder / f"math_{name}.svg", metadata={"Date": None, "Creator": None})

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
+from crossfield.export.pictures.draw import own_settings
 from matplotlib.figure import Figure
 
 from .errors import medians
@@ -23,7 +24,6 @@ DASHES: Final = ("-", "--", ":", "-.")
 OURS: Final = "crossfield prove"
 """Beginnings of the names of lines that are drawn thicker."""
 _STYLE: Final = {
-    "svg.hashsalt": "crossfield",
     "svg.fonttype": "path",
     "font.size": 9,
     "axes.spines.top": False,
@@ -43,7 +43,7 @@ Bars = tuple[list[float], list[float], list[float]]
 @contextmanager
 def drawn(path: Path, panels: int, high: float = 3.4, wide: float = 10.0) -> Iterator[Any]:
     """The axes of adjacent panels; the file is written at the end of the context."""
-    with mpl.rc_context(_STYLE):
+    with own_settings(_STYLE):
         figure = Figure(figsize=(wide, high), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1)
         yield np.atleast_1d(figure.subplots(1, panels))

@@ -25,10 +25,10 @@ from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
 from . import panels, reliefs
+from .canvas import cover, page_of
 from .drawing import Drawing, read_drawing
 from .layers import sheet
-from .layers_page import page_of
-from .layers_svg import svg_of
+from .svg import svg_of
 
 Panel = Callable[[Any, panels.Picture], None]
 
@@ -210,8 +210,11 @@ def _panels(what: Subject, kind: Kind, sketch: Sequence[ArrayLike], title: str |
 
 
 @contextmanager
-def own_settings() -> Iterator[None]:
-    """Settings of matplotlib that are always the same, whatever the user's are."""
+def own_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
+    """Settings of matplotlib that are always the same, whatever the user's are.
+
+    more: settings on top of these.
+    """
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -221,6 +224,7 @@ def own_settings() -> Iterator[None]:
         mpl.rcParams.update(
             {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": 7.5, "path.simplify": False}
         )
+        mpl.rcParams.update(more or {})
         yield
 
 
@@ -295,7 +299,7 @@ def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
     for number, (heading, panel) in enumerate(kind.panels):
         corner = np.array([(page[0] - row) / 2 + number * pitch + (pitch - _GAP - width) / 2, below])
         axes = figure.add_axes((*(corner / page), *(np.array([width, height]) / page)))
-        _frame(axes, picture.instance.mask.shape)
+        cover(axes, 0.0, 0.0, width, height)
         axes.set_title(heading, fontsize=8, pad=4)
         panel(axes, picture)
     if title is not None:
@@ -315,13 +319,6 @@ def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:
     return figure
 
 
-def _frame(axes: Any, shape: tuple[int, ...]) -> None:
-    axes.set_xlim(-0.5, shape[1] - 0.5)
-    axes.set_ylim(0.5 - shape[0], 0.5)
-    axes.set_axis_off()
-    axes.set_autoscale_on(False)
-
-
 def _caption(picture: panels.Picture, *, full: bool) -> str:
     instance = picture.instance
     parts = [
@@ -329,7 +326,7 @@ def _caption(picture: panels.Picture, *, full: bool) -> str:
         f"{len(instance.theta)} stroke pixel{'' if len(instance.theta) == 1 else 's'}",
     ]
     if picture.field is not None:
-        parts.append(_counted(picture.field))
+        parts.append(counted(picture.field))
     if picture.field is not None and full:
         parts.append(
             f"energy {picture.field.energy(2).total:.4g} (2-norm), "
@@ -340,8 +337,8 @@ def _caption(picture: panels.Picture, *, full: bool) -> str:
     return "  ·  ".join(parts)
 
 
-def _counted(field: CrossField) -> str:
-    """How many singularities of which index, as 3 singularities (2 of +1/4, 1 of −1/2)."""
+def counted(field: CrossField) -> str:
+    """The number of singularities by index, as 3 singularities (2 of +1/4, 1 of −1/2)."""
     values, counts = np.unique(np.round(4 * field.singularities.index).astype(int), return_counts=True)
     if not len(values):
         return "no singularity"

@@ -54,7 +54,7 @@ class Drawing:
     scale: float = 1.0
 
     def check(self, instance: Instance) -> None:
-        """Nothing, when the instance may be one of this drawing. Raises InputError when it lies elsewhere."""
+        """Raise InputError where an instance lies elsewhere than this drawing."""
         left, top = instance.origin
         right = left + instance.pixel_size * instance.grid.width
         bottom = top + instance.pixel_size * instance.grid.height

@@ -15,10 +15,9 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ..shading.raster import drawn_border
-from .combing import combed
 from .cubics import fitted
 from .drawing import INK, Box, Drawing
-from .panels import FAMILIES, NEGATIVE, POSITIVE, runs
+from .marks import FAMILIES, Frame, Layer, Lines, Sheet, runs
 from .streamlines import streamlines
 
 UNITS: Final = 400.0
@@ -28,7 +27,6 @@ _LINE: Final = 0.95
 _CROSS: Final = 0.7
 _BELOW: Final = 1.7  # strokes under a field
 _DOT: Final = 3.2
-_RIM: Final = 0.8
 _TOLERANCE: Final = 0.12  # of a smooth curve
 _LEAST: Final = 5.0  # length of a streamline
 _MUCH: Final = 12.0  # sides of the grid that strokes are long before they are drawn thinner
@@ -36,49 +34,6 @@ _BLUR: Final = 1.0  # pixels by which the stairs of the mask are smoothed
 _BORDER: Final = 0.5  # of the blurred mask at a straight border
 _DRAWN_BORDER: Final = 0.15  # more where strokes are the border: they run through the middle of its pixels
 _MOST_CROSSES: Final = 64  # along a side; of more, one in several
-_STROKES: Final = "#4a4a4a"
-
-
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """Lines of one colour and width: each (m, 4, 2) cubics or (m, 2, 2) straight pieces, end to end.
-
-    single: whether each is a thing of its own that a designer may want to pick, or all are one.
-    """
-
-    colour: str
-    width: float
-    lines: list[Floats]
-    single: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Dots:
-    """Discs of one colour with a white rim: centres (k, 2) and radii (k,)."""
-
-    colour: str
-    centres: Floats
-    radii: Floats
-    rim: float
-
-
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """A named layer. shown: whether it is visible at first."""
-
-    name: str
-    parts: tuple[Lines | Dots, ...]
-    shown: bool = True
-    opacity: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Sheet:
-    """Layers on a page (x, y, width, height), the lowest first; drawing: what lies below them, or None."""
-
-    page: Box
-    layers: tuple[Layer, ...]
-    drawing: Drawing | None
 
 
 def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
@@ -86,10 +41,10 @@ def sheet(field: CrossField, drawing: Drawing | None = None) -> Sheet:
     place = Place(field.instance)
     layers = (
         *(() if drawing is None else (_drawn(drawing, place),)),
-        Layer("strokes", (_strokes(place),), shown=drawing is None, opacity=0.45),
+        Layer("strokes", _strokes(place), shown=drawing is None, opacity=0.45),
         Layer("crosses", _crosses(field, place), shown=False),
         *_streamlines(field, place),
-        Layer("singularities", _singularities(field, place)),
+        Layer("singularities", tuple(place.frame.singularities(field, _DOT * place.unit))),
     )
     return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
 
@@ -100,7 +55,7 @@ def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
     They are those of the drawing, or pieces of line at the stroke pixels where none is given.
     """
     place = Place(instance)
-    layer = Layer("strokes", (_strokes(place),)) if drawing is None else _drawn(drawing, place)
+    layer = Layer("strokes", _strokes(place)) if drawing is None else _drawn(drawing, place)
     size = instance.pixel_size
     page = (*instance.origin, size * instance.grid.width, size * instance.grid.height)
     return Sheet(page, (layer,), drawing)
@@ -108,7 +63,7 @@ def strokes_sheet(instance: Instance, drawing: Drawing | None = None) -> Sheet:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the pixels of an instance lie on its drawing."""
+    """Coordinates and lengths of an instance on its drawing."""
 
     instance: Instance
 
@@ -117,14 +72,14 @@ class Place:
         """Length of a unit of the pictures."""
         return float(self.instance.pixel_size * max(self.instance.mask.shape) / UNITS)
 
-    def on_drawing(self, points: Floats) -> Floats:
-        """Points (..., 2) of the field's plane, y up and pixel centres at whole numbers, on the drawing."""
-        inside: Floats = points * np.array([1.0, -1.0]) + 0.5
-        return np.array(self.instance.origin) + self.instance.pixel_size * inside
+    @property
+    def frame(self) -> Frame:
+        """The coordinates of the drawing."""
+        return Frame(self.instance, self.instance.origin, self.instance.pixel_size)
 
     @property
     def page(self) -> Box:
-        """The page where no drawing tells it: from zero, where pages begin, to the far sides of the mask.
+        """The page without a drawing: from zero, where pages begin, to the far sides of the mask.
 
         A mask that reaches more than a pixel beyond zero is the page itself.
         """
@@ -149,29 +104,14 @@ def _drawn(drawing: Drawing, place: Place) -> Layer:
     )
 
 
-def _strokes(place: Place) -> Lines:
-    """A piece of line at each pixel that has a direction."""
-    instance = place.instance
-    row, column = instance.stroke_pixels.T
-    arm = 0.5 * np.stack([np.cos(instance.theta), np.sin(instance.theta)], axis=1)
-    return Lines(_STROKES, _BELOW * place.unit, _pieces(place, np.stack([column, -row], axis=1), arm))
+def _strokes(place: Place) -> tuple[Lines, ...]:
+    return tuple(place.frame.strokes(INK["black"], _BELOW * place.unit))
 
 
 def _crosses(field: CrossField, place: Place) -> tuple[Lines, ...]:
     """A cross on each pixel, on large grids one in several."""
-    field = combed(field)
-    grid = field.instance.grid
     every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
-    chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
-    centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
-    return tuple(
-        Lines(colour, _CROSS * place.unit, _pieces(place, centre, 0.42 * every * vectors[chosen]))
-        for vectors, colour in zip((field.u, field.v), FAMILIES, strict=True)
-    )
-
-
-def _pieces(place: Place, centre: Floats, arm: Floats) -> list[Floats]:
-    return list(place.on_drawing(np.stack([centre - arm, centre + arm], axis=1))[:, None])
+    return tuple(place.frame.crosses(field, _CROSS * place.unit, every))
 
 
 def _streamlines(field: CrossField, place: Place) -> list[Layer]:
@@ -183,7 +123,7 @@ def _streamlines(field: CrossField, place: Place) -> list[Layer]:
     for family, name in ((1, "streamlines-v"), (0, "streamlines-u")):
         inside = [part for line in found for run in runs(line, family) for part in trimmed(run, depth)]
         smooth = [fitted(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
-        lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.on_drawing, smooth)), single=True)
+        lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
         layers.append(Layer(name, (lines,)))
     return layers
 
@@ -211,15 +151,3 @@ def trimmed(line: Floats, depth: Floats) -> list[Floats]:
 
 def _length(line: Floats) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
-def _singularities(field: CrossField, place: Place) -> tuple[Dots, ...]:
-    """Red (+) and blue (-) dots, larger from an index of 1/2 on."""
-    found = field.singularities
-    centre = place.on_drawing(np.stack([found.column + 0.5, -found.row - 0.5], axis=1))
-    crowd = float(np.clip(7 / np.sqrt(max(len(found.index), 1)), 0.45, 1.0))
-    radius = np.where(np.abs(found.index) < 0.5, _DOT, 1.4 * _DOT) * crowd * place.unit
-    return tuple(
-        Dots(colour, centre[some], radius[some], _RIM * crowd * place.unit)
-        for colour, some in ((POSITIVE, found.index > 0), (NEGATIVE, found.index < 0))
-    )

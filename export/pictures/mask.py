@@ -52,7 +52,7 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
 
 
 def has_mask(instance: Instance) -> bool:
-    """Whether the mask of an instance can be written as a picture."""
+    """True for an instance whose mask can be written as a picture."""
     return _page(instance) is not None
 
 

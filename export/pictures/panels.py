@@ -1,34 +1,25 @@
 """The panels of a picture: each function draws one kind onto one set of matplotlib axes.
 
-Axes are in pixel units, x = column, y = -row (y up); pixel [row, column] is the unit square round (column,
--row). Widths, marks and spacings are in points of the printed picture, so that 24 and 200 pixels look alike.
-The two families are teal and orange, which stay apart for all common kinds of colour blindness.
+Axes are in points of the printed picture, y down, from the top left corner of the grid. Widths, marks and
+spacings do not depend on the size of a pixel, so that 24 and 200 pixels look alike.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
 from ...models.errors import InputError
 from ...models.field.field import CrossField
-from ...models.instance.grid import Bools, Floats
+from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
-from .combing import combed
-from .streamlines import Streamline, streamlines
+from .canvas import paint
+from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, Frame, Lines, Mark, straight
 
-FAMILIES: Final = ("#00798c", "#e1812c")
-POSITIVE: Final = "#d1242f"
-NEGATIVE: Final = "#3056d3"
 COLLAPSED: Final = "#b9a3d6"
-STROKE: Final = "#b3261e"
-FAINT: Final = "#c9c9c9"
-BORDER: Final = "#9a9a9a"
 OUTSIDE: Final = "#ececec"
 OPENING: Final = "#3056d3"
 
@@ -38,7 +29,7 @@ SPACING: Final = 6.5
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a panel shows and how large it is.
+    """Contents and size of a panel.
 
     size: points of the longer side of the grid. sketch: polylines (k, 2) in pixel units, drawn faintly below.
     surface: of its field, where the picture shows one.
@@ -51,14 +42,14 @@ class Picture:
     surface: Surface | None = None
 
     @property
-    def openings(self) -> tuple[Floats, ...]:
-        """The bridged gaps in the outline, (2, 2) each, in pixel units."""
-        reading = self.instance.reading
-        return (
-            ()
-            if reading is None
-            else tuple(on_grid(np.array(ends), self.instance) for ends in reading.openings)
-        )
+    def frame(self) -> Frame:
+        """The coordinates of the axes."""
+        return Frame(self.instance, (0.0, 0.0), self.unit)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of an image over the grid."""
+        return 0.0, self.unit * self.instance.grid.width, self.unit * self.instance.grid.height, 0.0
 
     @property
     def unit(self) -> float:
@@ -80,11 +71,6 @@ class Picture:
             )
         return self.field
 
-    @cached_property
-    def combed(self) -> CrossField:
-        """The field with labels that agree from pixel to pixel, so that colours do."""
-        return combed(self.crosses)
-
 
 def on_grid(points: Floats, instance: Instance) -> Floats:
     """Points (k, 2) of the sketch, y down, in pixel units, y up."""
@@ -94,46 +80,38 @@ def on_grid(points: Floats, instance: Instance) -> Floats:
 
 def draw_instance(axes: Any, picture: Picture) -> None:
     """Mask and strokes, and the gaps in the outline that were bridged when the drawing was read."""
-    from matplotlib.colors import to_rgba
-
-    mask = picture.instance.mask
-    shade = np.where(mask[..., None], 1.0, np.array(to_rgba(OUTSIDE)))
-    _image(axes, shade)
-    _sketch(axes, picture)
-    _strokes(axes, picture, STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6)), fade=1.0)
+    frame, reading = picture.frame, picture.instance.reading
+    openings = () if reading is None else reading.openings
+    gaps = [straight(frame.at(on_grid(np.array(ends), picture.instance))) for ends in openings]
+    paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask), *_sketch(picture)])
+    paint(axes, frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6))))
     _border(axes, picture)
-    _lines(axes, picture.openings, OPENING, 2.6 * picture.ink)
+    paint(axes, [Lines(OPENING, 2.6 * picture.ink, gaps)])
 
 
 def draw_crosses(axes: Any, picture: Picture) -> None:
     """Crosses on the pixels, at least some points apart."""
-    field = picture.combed
-    grid = field.instance.grid
-    every = int(np.ceil(7.5 * picture.ink / picture.unit))
-    chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
     _under(axes, picture)
-    for vectors, colour in zip((field.u, field.v), FAMILIES, strict=True):
-        centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
-        arm = 0.42 * every * vectors[chosen]
-        _lines(axes, np.stack([centre - arm, centre + arm], axis=1), colour, 0.9 * picture.ink)
+    every = int(np.ceil(7.5 * picture.ink / picture.unit))
+    paint(axes, picture.frame.crosses(picture.crosses, 0.9 * picture.ink, every))
     _singularities(axes, picture)
 
 
 def draw_streamlines(axes: Any, picture: Picture) -> None:
     """Evenly spaced streamlines of both families, singularities and degenerate pixels."""
+    field = picture.crosses
     _under(axes, picture)
-    _degenerate(axes, picture)
-    spacing = SPACING * picture.ink / picture.unit
-    lines = streamlines(picture.crosses, spacing)
-    for family, colour in enumerate(FAMILIES):
-        _lines(axes, [run for line in lines for run in runs(line, family)], colour, 0.85 * picture.ink)
+    paint(axes, [picture.frame.area(COLLAPSED, field.image(field.degenerate) > 0)])
+    paint(axes, picture.frame.streamlines(field, 0.85 * picture.ink, SPACING * picture.ink))
     _singularities(axes, picture)
 
 
 def draw_angle(axes: Any, picture: Picture) -> None:
     """The angle between the two lines in degrees."""
     field = picture.crosses
-    image = _image(axes, field.image(np.degrees(field.angle_between)), vmin=0.0, vmax=90.0, cmap="magma")
+    image = _image(
+        axes, picture, field.image(np.degrees(field.angle_between)), vmin=0.0, vmax=90.0, cmap="magma"
+    )
     _border(axes, picture)
     _singularities(axes, picture)
     _bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
@@ -146,7 +124,7 @@ def draw_energy(axes: Any, picture: Picture) -> None:
     field = picture.crosses
     energy = field.pixel_energy
     top = float(energy.max()) if energy.max() > 1e-12 else 1.0
-    image = _image(axes, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds")
+    image = _image(axes, picture, field.image(energy), norm=PowerNorm(0.5, vmin=0.0, vmax=top), cmap="Reds")
     _border(axes, picture)
     _singularities(axes, picture)
     _bar(
@@ -160,7 +138,7 @@ def draw_energy(axes: Any, picture: Picture) -> None:
 
 
 def legend_of(picture: Picture) -> list[Any]:
-    """Keys for what a picture of the field holds."""
+    """Keys of the marks in a picture of a field."""
     from matplotlib.lines import Line2D
 
     field = picture.crosses
@@ -181,104 +159,26 @@ def legend_of(picture: Picture) -> list[Any]:
 
 
 def _under(axes: Any, picture: Picture) -> None:
-    _sketch(axes, picture)
-    if not picture.sketch:
-        _strokes(axes, picture, FAINT, 2.6 * picture.ink, fade=0.8)
+    """The sketch, or the strokes where it is not given, faintly, and the border."""
+    paint(axes, _sketch(picture) if picture.sketch else picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8))
     _border(axes, picture)
 
 
-def runs(line: Streamline, family: int) -> list[Floats]:
-    """The stretches of a line on which it belongs to a family; neighbouring stretches share a point."""
-    limits = np.concatenate([[0], np.flatnonzero(np.diff(line.families)) + 1, [len(line.points)]])
-    return [
-        line.points[first : stop + 1]
-        for first, stop in pairwise(limits.tolist())
-        if line.families[first] == family
-    ]
-
-
-def _lines(axes: Any, lines: Any, colour: Any, width: float, *, snap: bool = False) -> None:
-    from matplotlib.collections import LineCollection
-
-    lines = LineCollection(
-        lines, colors=colour, linewidths=width, capstyle="round", joinstyle="round", clip_on=False
-    )
-    lines.set_snap(snap)
-    axes.add_collection(lines, autolim=False)
-
-
-def _sketch(axes: Any, picture: Picture) -> None:
-    _lines(axes, picture.sketch, FAINT, 1.6 * picture.ink)
-
-
-def _strokes(axes: Any, picture: Picture, colour: str, width: float, fade: float) -> None:
-    """A short segment at each stroke pixel, the more opaque the more reliable."""
-    from matplotlib.colors import to_rgba
-
-    theta, w = picture.instance.theta, picture.instance.w
-    row, column = picture.instance.stroke_pixels.T
-    centre = np.stack([column, -row], axis=1)
-    arm = 0.48 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    colours = np.tile(to_rgba(colour), (len(row), 1))
-    colours[:, 3] = fade * (0.2 + 0.8 * w)
-    _lines(axes, np.stack([centre - arm, centre + arm], axis=1), colours, width)
+def _sketch(picture: Picture) -> list[Mark]:
+    return [Lines(FAINT, 1.6 * picture.ink, [straight(picture.frame.at(line)) for line in picture.sketch])]
 
 
 def _border(axes: Any, picture: Picture) -> None:
-    """The outline of the mask, along pixel sides."""
-    outline = sides(np.pad(picture.instance.mask, 1), between=False) * (1, -1) + (-0.5, 0.5)
-    _lines(axes, outline, BORDER, 0.5 * picture.ink, snap=True)
-
-
-def sides(mask: Bools, *, between: bool) -> Floats:
-    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border.
-
-    Points are (x, y) with y down; pixel [row, column] reaches from (column, row) one further.
-    """
-    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
-    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
-    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
-    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
-    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
-    return np.concatenate([level, upright]).astype(np.float64)
-
-
-def _image(axes: Any, values: Floats, **style: Any) -> Any:
-    height, width = values.shape[:2]
-    return axes.imshow(
-        values,
-        extent=(-0.5, width - 0.5, 0.5 - height, 0.5),
-        origin="upper",
-        interpolation="nearest",
-        **style,
-    )
+    paint(axes, [picture.frame.border(BORDER, 0.5 * picture.ink)], snap=True)
 
 
 def _singularities(axes: Any, picture: Picture) -> None:
-    """Red and blue dots, larger from an index of 1/2 on."""
-    found = picture.crosses.singularities
-    crowd = np.clip(40 / np.sqrt(max(len(found.index), 1)), 0.35, 1.0)
-    size = np.where(np.abs(found.index) < 0.5, 5.5, 8.0) * picture.ink * crowd
-    colours = np.where(found.index > 0, POSITIVE, NEGATIVE)
-    axes.scatter(
-        found.column + 0.5,
-        -found.row - 0.5,
-        s=size**2,
-        c=colours,
-        edgecolors="white",
-        linewidths=0.8 * picture.ink * crowd,
-        zorder=3,
-        clip_on=False,
-    )
+    paint(axes, picture.frame.singularities(picture.crosses, 2.75 * picture.ink))
 
 
-def _degenerate(axes: Any, picture: Picture) -> None:
-    field = picture.crosses
-    grid = field.instance.grid
-    at = field.degenerate
-    size = max(1.15 * picture.unit, 2.5 * picture.ink)  # a little over, or seams show
-    axes.scatter(
-        grid.columns[at], -grid.rows[at], s=size**2, marker="s", color=COLLAPSED, linewidths=0, zorder=1
+def _image(axes: Any, picture: Picture, values: Floats, **style: Any) -> Any:
+    return axes.imshow(
+        values, extent=picture.extent, origin="upper", interpolation="nearest", aspect="auto", **style
     )
 
 

@@ -34,11 +34,11 @@ def _draw(axes: Any, picture: Picture, colours: Callable[[Raster], Floats]) -> N
     """An image over the whole grid, smooth at any size; a picture without a surface has none."""
     if picture.surface is None:
         return
-    height, width = picture.instance.mask.shape
     scale = max(1, round(_DOTS_A_POINT * picture.unit))
     axes.imshow(
         colours(raster(picture.instance, picture.surface.normals, scale)),
-        extent=(-0.5, width - 0.5, 0.5 - height, 0.5),
+        extent=picture.extent,
+        aspect="auto",
         origin="upper",
         interpolation="hanning",
         interpolation_stage="rgba",

@@ -15,30 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.grid import Bools
-from .panels import FAMILIES, STROKE
-from .scheme import label, number, opening, style
+from .marks import FAMILIES, PAPER, STROKE, Area, Lines, Mark, Text, boxes, segments, straight
+from .web import CUT, EDGE, SIDE, picture, wide
 
 Places = NDArray[np.int64]
 
 CELLS: Final = 160
 """Cells on the longer side of a picture, at most."""
 
-_SIDE: Final = 320.0  # units of the longer side
-_MARGIN: Final = 44.0  # for names of rows, left, and of columns, above
+_EDGE: Final = 8.0  # around names
+_BELOW: Final = 5.0  # the name of a last row of few is lower than the row
 _LINE: Final = 11.0  # units from one name to the next, at least
 _LEVELS: Final = 4
-_STYLE: Final = style(
-    {
-        "ground": ("#ffffff", "#1d2126"),
-        "linear": (FAMILIES[0], "#41b3c5"),
-        "curved": (STROKE, "#ff7b72"),
-        "cut": ("#c3c8ce", "#4a525c"),
-        "edge": ("#8b929c", "#7d8590"),
-        "name": ("#555e68", "#a3acb6"),
-    },
-    ("ground", "linear", "curved", "name"),
-    ".cut,.edge{fill:none;stroke-width:.7}text{font:10px system-ui,sans-serif}",
-)
 
 
 @dataclass(frozen=True)
@@ -50,19 +38,19 @@ class Parts:
 
     @cached_property
     def total(self) -> int:
-        """How many there are in all."""
+        """The number of all rows or columns."""
         return sum(self.counts)
 
     @property
-    def told(self) -> str:
-        """Them in words: `90 alpha, 90 beta`."""
+    def summary(self) -> str:
+        """All parts with their counts: `90 alpha, 90 beta`."""
         each = zip(self.names, self.counts, strict=True)
         return ", ".join(f"{count:,} {name}".replace(",", "\u202f") for name, count in each)
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where a matrix has entries: their rows and columns, shape (k,), and which stand in nonlinear terms."""
+    """The entries of a matrix: their rows and columns, shape (k,), and which stand in nonlinear terms."""
 
     down: Parts
     across: Parts
@@ -72,7 +60,7 @@ class Pattern:
 
     @property
     def entries(self) -> int:
-        """How many entries there are."""
+        """The number of entries."""
         return len(self.rows)
 
     @cached_property
@@ -84,64 +72,43 @@ class Pattern:
 def sparsity_picture(pattern: Pattern) -> bytes:
     """The picture of a pattern: cells of linear and of nonlinear entries, cut into its parts, with names."""
     height, width = (-(-parts.total // pattern.bin) for parts in (pattern.down, pattern.across))
-    unit = _SIDE / max(height, width)
+    unit = SIDE / max(height, width)
     right, bottom = width * unit, height * unit
     scale = unit / pattern.bin
-    frame = f"M0 0H{number(right)}V{number(bottom)}H0z"
-    cuts = [f"M{number(at)} 0V{number(bottom)}" for at in _cuts(pattern.across, scale)]
-    cuts += [f"M0 {number(at)}H{number(right)}" for at in _cuts(pattern.down, scale)]
-    parts = [
-        opening(-_MARGIN, -_MARGIN, right + _MARGIN + 2, bottom + _MARGIN + 2),
-        _STYLE,
-        f'<path class="ground" d="{frame}"/>',
-        f'<g transform="scale({unit:.6g})">',
-        *_cells(pattern),
-        "</g>",
-        *([f'<path class="cut" d="{"".join(cuts)}"/>'] if cuts else []),
-        f'<path class="edge" d="{frame}"/>',
-        *(label(at, -4, name, turned=-60) for at, name in _names(pattern.across, scale)),
-        *(label(-4, at + 3.5, name, anchor="end") for at, name in _names(pattern.down, scale)),
-        "</svg>",
-        "",
+    above, beside = _names(pattern.across, scale), _names(pattern.down, scale)
+    cuts = [(at, 0.0, at, bottom) for at in _cuts(pattern.across, scale)]
+    cuts += [(0.0, at, right, at) for at in _cuts(pattern.down, scale)]
+    frame = straight(np.array([(0, 0), (right, 0), (right, bottom), (0, bottom), (0, 0)]))
+    marks: list[Mark] = [
+        Area(PAPER, np.array([[0.0, 0.0, right, bottom]])),
+        *_cells(pattern, height, width, unit),
+        Lines(CUT, 0.7, segments(cuts)),
+        Lines(EDGE, 0.7, [frame]),
+        *(Text(name, at, -4, turned=-60) for at, name in above),
+        *(Text(name, -4, at + 3.5, "end") for at, name in beside),
     ]
-    return "\n".join(parts).encode()
+    left = _EDGE + max(wide(name) for _, name in beside)
+    top = _EDGE + 0.9 * max(wide(name) for _, name in above)
+    end = max(right + _BELOW, *(at + 0.5 * wide(name) + _EDGE for at, name in above))
+    return picture(-left, -top, end, bottom + _BELOW, marks)
 
 
-def _cells(pattern: Pattern) -> list[str]:
-    """Paths of cells in a row beside each other, by kind and strength."""
-    width = -(-pattern.across.total // pattern.bin)
-    place = (pattern.rows // pattern.bin).astype(np.int64) * width + pattern.columns // pattern.bin
+def _cells(pattern: Pattern, height: int, width: int, unit: float) -> list[Area]:
+    """Cells by kind and strength."""
     found = []
-    for name, chosen in (("linear", ~pattern.curved), ("curved", pattern.curved)):
-        cells, counts = np.unique(place[chosen], return_counts=True)
-        # The square root: a cell with one entry of a thousand is still to be seen.
+    for colour, chosen in ((FAMILIES[0], ~pattern.curved), (STROKE, pattern.curved)):
+        counts = np.zeros((height, width), dtype=np.int64)
+        np.add.at(counts, (pattern.rows[chosen] // pattern.bin, pattern.columns[chosen] // pattern.bin), 1)
+        # The square root keeps a cell with one entry of a thousand visible.
         level = np.ceil(_LEVELS * np.sqrt(counts / max(int(counts.max(initial=1)), 1))).astype(int)
-        for each in range(1, _LEVELS + 1):
-            data = _runs(cells[level == each], width)
-            faded = f' opacity="{each / _LEVELS:.2f}"' if each < _LEVELS else ""
-            if data:
-                found.append(f'<path class="{name}"{faded} d="{data}"/>')
+        found += [
+            Area(colour, unit * boxes(level == each), each / _LEVELS) for each in np.unique(level[level > 0])
+        ]
     return found
 
 
-def _runs(cells: Places, width: int) -> str:
-    """Path data of sorted cells; neighbours in a row are one rectangle."""
-    if not len(cells):
-        return ""
-    rows, columns = cells // width, cells % width
-    begins = np.concatenate([[True], (np.diff(cells) != 1) | (np.diff(rows) != 0)])
-    starts = np.flatnonzero(begins)
-    lengths = np.diff(np.append(starts, len(cells)))
-    return "".join(
-        f"M{column} {row}h{length}v1h-{length}z"
-        for row, column, length in zip(
-            rows[starts].tolist(), columns[starts].tolist(), lengths.tolist(), strict=True
-        )
-    )
-
-
 def _cuts(parts: Parts, scale: float) -> list[float]:
-    """Where the parts end, but for the last."""
+    """The ends of all parts but the last."""
     return [end * scale for end in list(accumulate(parts.counts))[:-1]]
 
 

@@ -203,7 +203,7 @@ def _free(z: Positions, _q: Labels) -> Bools:
 
 @dataclass(frozen=True)
 class _Pace:
-    """How lines are traced: step and greatest length in pixels, distance to their seed, limits."""
+    """Limits and steps of tracing: step and greatest length in pixels, distance to their seed, limits."""
 
     step: float
     length: float
@@ -277,7 +277,7 @@ def _joined(ahead: _Walk, behind: _Walk) -> _Walk:
 
 @dataclass(eq=False)
 class _Heads:
-    """Where lines have got to: line, position, pixel's centre, label in it, heading; shapes (m,)."""
+    """Current ends of lines: line, position, pixel's centre, label in it, heading; shapes (m,)."""
 
     line: Labels
     z: Positions
@@ -402,7 +402,7 @@ class _Cover:
         return near
 
     def covered(self, z: complex, family: int) -> bool:
-        """Whether a line may no longer start at z."""
+        """True where a line may no longer start at z."""
         row, column = self._raster(np.array(z))
         return bool(self.wide[family, row, column] or self.shut[family, row, column])
 

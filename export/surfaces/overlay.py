@@ -8,10 +8,10 @@ import numpy as np
 
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
+from ..pictures.canvas import pixels_of
 from ..pictures.draw import own_settings
 from ..pictures.drawing import Drawing
 from ..pictures.layers import strokes_sheet
-from ..pictures.layers_page import pixels_of
 
 PAPER: Final = (0.93, 0.91, 0.88)
 

@@ -29,7 +29,8 @@ from ....models.processes.progress import Progress, silent
 from ....models.storage import make_folder, neighbour, read_bytes, remove_dead, sha256_of, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS
-from ...pictures.svg import field_picture, instance_picture, thumbnail, told
+from ...pictures.draw import counted
+from ...pictures.web import field_picture, instance_picture, thumbnail
 from ..building.index import SOLU, SUMS
 from ..documents.documents import Library, about_file, read_about, read_library
 from ..documents.mathematics import model
@@ -196,7 +197,7 @@ def _draw(folder: Path, shown: Shown, target: Path) -> None:
         found = read_field(folder / file)
         name = f"{file.removesuffix('.json')}.svg"
         write_bytes(target / name, field_picture(found))
-        shown.pictures.append(Picture(tuple(roles), shown.about["fields"][roles[0]], name, told(found)))
+        shown.pictures.append(Picture(tuple(roles), shown.about["fields"][roles[0]], name, counted(found)))
 
 
 def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], stage: Path) -> list[Path]:

@@ -18,6 +18,8 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import write_site
+from crossfield.export.pictures.marks import FAMILIES, STROKE
+from crossfield.export.pictures.web import HUES
 from crossfield.export.writing.canonical import Canonical
 from forging import seal
 
@@ -221,8 +223,8 @@ def test_every_matrix_and_every_hessian_has_its_picture(library, site):
         assert ("all is linear" in text) == (entry["class"] == "MILP")
         if counts["nonzeros"]:
             drawn = ET.parse(site / "pictures" / f"{entry['name']}.matrix.svg").getroot()
-            assert drawn.findall(".//*[@class='linear']")
-            assert bool(drawn.findall(".//*[@class='curved']")) == bool(counts["nonlinear_nonzeros"])
+            assert drawn.findall(f".//*[@fill='{FAMILIES[0]}']")
+            assert bool(drawn.findall(f".//*[@fill='{STROKE}']")) == bool(counts["nonlinear_nonzeros"])
 
 
 def test_presolve_is_told_of_linear_models_alone(library, site):
@@ -271,7 +273,7 @@ def test_an_entry_tells_its_runs_origin_and_citation_where_it_has_them(site, tol
     agreed = r"Solved\s+by agreement of Gurobi 1, SCIP 1, Bonmin 2 on cf_mouse_n004_cubic\."
     assert re.search(agreed, text_of(told, f"{INSTANCE}_exact"))
     plot = ET.parse(told / "pictures" / f"{ENTRY}.runs.svg").getroot()
-    assert len(plot.findall(".//*[@class='c0']")) == len(plot.findall(".//*[@class='c1']")) == 2
+    assert [len(plot.findall(f".//*[@stroke='{hue}']")) for hue in HUES[:2]] == [3, 2]
     for other in (text_of(site, ENTRY), text_of(told, f"{INSTANCE}_qp")):
         assert [each for each in wanted[:4] if each in other] == []
         assert "runs.svg" not in other

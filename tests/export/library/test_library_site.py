@@ -19,7 +19,8 @@ from crossfield.export.library.building.build import build
 from crossfield.export.library.documents.mathematics import model
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.library.site.site import count, percent, size, value, write_site
-from crossfield.export.pictures.svg import told
+from crossfield.export.pictures.draw import counted
+from crossfield.export.pictures.marks import FAMILIES, NEGATIVE, POSITIVE, STROKE
 from crossfield.models.errors import InputError, InstanceError, OutputError
 from crossfield.models.field.file import read_field
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
@@ -388,17 +389,15 @@ def test_pictures_hold_the_strokes_and_the_singularities(library, site):
         instance = read_instance(library.folder / entry["instance"]["file"])
         field = read_field(library.folder / f"{name}.field.json")
         picture = ET.parse(site / "pictures" / f"{name}.svg").getroot()
-        strokes = [each.get("d").count("M") for each in picture if each.get("class") == "stroke"]
+        strokes = [each.get("d").count("M") for each in picture if each.get("stroke") == STROKE]
         assert sum(strokes) == len(instance.theta)
         drawn = ET.parse(site / "pictures" / f"{name}.field.svg").getroot()
-        crosses = {
-            each.get("class"): each.get("d").count("M") for each in drawn if each.get("class") in {"u", "v"}
-        }
-        assert crosses == {"u": instance.grid.size, "v": instance.grid.size}
+        crosses = [each.get("d").count("M") for each in drawn if each.get("stroke") in FAMILIES]
+        assert crosses == [instance.grid.size, instance.grid.size]
         index = field.singularities.index
-        dots = [each.get("class") for each in drawn if each.tag.endswith("circle")]
-        assert (dots.count("positive"), dots.count("negative")) == (sum(index > 0), sum(index < 0))
-        assert told(field).startswith(f"{len(index) or 'no'} singularit")
+        dots = {each.get("fill"): len(each) for each in drawn if each.tag.endswith("}g")}
+        assert (dots.get(POSITIVE, 0), dots.get(NEGATIVE, 0)) == (sum(index > 0), sum(index < 0))
+        assert counted(field).startswith(f"{len(index) or 'no'} singularit")
 
 
 @for_each("name", FORMULATIONS)

@@ -10,8 +10,10 @@ import pytest
 from cases import CASES, make_instance, make_problem, problem_of
 from crossfield.export.library.documents.statistics import counts
 from crossfield.export.library.site.structure import blocks, hessian, matrix
+from crossfield.export.pictures.marks import FAMILIES, STROKE
 from crossfield.export.pictures.sparsity import CELLS, Parts, Pattern, sparsity_picture
 from crossfield.export.pictures.traces import curve, trace_picture
+from crossfield.export.pictures.web import EDGE, GRID, HUES
 from crossfield.export.writing.canonical import Canonical
 from loops import for_each
 from oracles import by_casadi
@@ -66,13 +68,15 @@ def test_blocks_are_the_columns_that_no_entry_joins():
     assert counts(problem)["nonlinear_variables"] == sum(sizes)
 
 
-def cells_of(picture):
-    """Cells drawn, by class, and the names of parts."""
+def cells_of(picture, pattern):
+    """Cells drawn, by kind, and the names of parts."""
     root = ET.fromstring(picture)
-    paths = [each for each in root.iter(f"{SVG}path") if each.get("class") in {"linear", "curved"}]
-    drawn = {"linear": 0, "curved": 0}
-    for path in paths:
-        drawn[path.get("class")] += sum(map(int, re.findall(r"h(\d+)v", path.get("d"))))
+    cell = 320 / max(-(-parts.total // pattern.bin) for parts in (pattern.down, pattern.across))
+    drawn = dict.fromkeys(("linear", "curved"), 0)
+    for kind, colour in zip(drawn, (FAMILIES[0], STROKE), strict=True):
+        for path in root.findall(f"{SVG}path[@fill='{colour}']"):
+            widths = np.array(re.findall(r"h(\d[\d.]*)v", path.get("d")), float) / cell
+            drawn[kind] += int(np.round(widths).sum())
     return drawn, [each.text for each in root.iter(f"{SVG}text")]
 
 
@@ -80,7 +84,7 @@ def test_a_small_matrix_is_drawn_entry_by_entry_with_the_names_of_its_parts():
     problem = make_problem("miqcp-bilinear", make_instance())
     pattern = matrix(problem)
     assert pattern.bin == 1
-    drawn, names = cells_of(sparsity_picture(pattern))
+    drawn, names = cells_of(sparsity_picture(pattern), pattern)
     assert drawn == {"linear": int((~pattern.curved).sum()), "curved": int(pattern.curved.sum())}
     assert pattern.entries == counts(problem)["nonzeros"]
     assert pattern.curved.sum() == counts(problem)["nonlinear_nonzeros"]
@@ -94,7 +98,7 @@ def test_a_large_matrix_is_binned_and_its_picture_stays_small():
     parts = Parts(("one", "other"), (side // 2, side // 2))
     pattern = Pattern(parts, parts, rows, columns, np.zeros(len(rows), bool))
     picture = sparsity_picture(pattern)
-    drawn, names = cells_of(picture)
+    drawn, names = cells_of(picture, pattern)
     assert CELLS <= drawn["linear"] <= CELLS**2
     assert drawn["curved"] == 0
     assert names == ["one", "other", "one", "other"]
@@ -112,8 +116,14 @@ def test_a_plot_draws_what_logs_tell_and_leaves_out_what_they_do_not():
     assert [len(each.objectives) for each in told] == [4, 0, 0]
     picture = trace_picture(told[:2])
     root = ET.fromstring(picture)
-    paths = [each.get("class") for each in root.iter(f"{SVG}path")]
-    assert paths == ["grid", "edge", "c0", "c0 upper", "c0", "c1", "c1"]
+    paths = [(each.get("stroke"), "stroke-dasharray" in each.attrib) for each in root.iter(f"{SVG}path")]
+    first, second = HUES[:2]
+    assert paths == [
+        (GRID, False),
+        (EDGE, False),
+        *((first, dashed) for dashed in (False, True, False)),
+        *[(second, False)] * 2,
+    ]
     texts = [each.text for each in root.iter(f"{SVG}text")]
     assert {"A <b> 1", "B", "seconds", "0", "10"} <= set(texts)
     assert trace_picture(told[:2]) == picture
@@ -131,3 +141,21 @@ def test_first_values_that_are_larger_by_powers_of_ten_do_not_flatten_a_plot():
     ticks = [each.text for each in root.iter(f"{SVG}text") if each.get("text-anchor") == "end"]
     assert {"0", "5", "10"} <= set(ticks)
     assert len(ticks) < 8
+
+
+@pytest.mark.parametrize("name", ["a", "a_rather_long_name_of_a_column"])
+def test_names_and_numbers_have_room_on_the_page(name):
+    parts = Parts(("other", name), (100, 2))
+    nowhere = np.zeros(0, np.int64)
+    pattern = Pattern(parts, parts, nowhere, nowhere, np.zeros(0, bool))
+    for picture in (sparsity_picture(pattern), trace_picture([curve("A", [[0, -1.23457e7, None]])])):
+        root = ET.fromstring(picture)
+        left, top, width, height = map(float, root.get("viewBox").split())
+        for each in root.iter(f"{SVG}text"):
+            x, y, reach = float(each.get("x")), float(each.get("y")), 6 * len(each.text)
+            if each.get("transform"):
+                assert y - reach * np.sin(np.pi / 3) >= top
+                assert x + reach * np.cos(np.pi / 3) <= left + width
+            elif each.get("text-anchor") == "end":
+                assert x - reach >= left
+            assert y + 3 <= top + height

@@ -6,7 +6,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from crossfield.export.pictures import panels
+from crossfield.export.pictures import marks, panels
 from crossfield.export.pictures.draw import KINDS, _caption, _on_grid, draw
 from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.field import CrossField, relabelled
@@ -43,7 +43,7 @@ def like(picture, colour, tolerance=12):
 
 def frame_of(picture):
     """First and last row and column of the outline of a full mask."""
-    grey = like(picture, panels.BORDER, 40) & (np.ptp(picture, axis=-1) < 12)
+    grey = like(picture, marks.BORDER, 40) & (np.ptp(picture, axis=-1) < 12)
     sides = (np.flatnonzero(grey.sum(axis) > 0.3 * grey.sum(axis).max()) for axis in (1, 0))
     return [side[at] for side in sides for at in (0, -1)]
 
@@ -98,14 +98,14 @@ def test_the_rest_of_matplotlib_is_left_alone(tmp_path):
 def test_row_0_is_at_the_top_and_strokes_lie_where_they_are(tmp_path):
     path = draw(instance_of(np.ones((8, 8)), 2, 5), tmp_path / "a.png", kind="instance")
     picture = picture_of(path)
-    across, down = place(like(picture, panels.STROKE), picture)
+    across, down = place(like(picture, marks.STROKE), picture)
     assert across == pytest.approx(5.5 / 8, abs=0.01)
     assert down == pytest.approx(2.5 / 8, abs=0.01)
 
 
 def test_strokes_lean_counter_clockwise(tmp_path):
     path = draw(instance_of(np.ones((3, 3)), 1, 1, theta=np.pi / 6), tmp_path / "a.png", kind="instance")
-    down, across = np.nonzero(like(picture_of(path), panels.STROKE))
+    down, across = np.nonzero(like(picture_of(path), marks.STROKE))
     slope = np.polyfit(across, -down, 1)[0]
     assert np.arctan(slope) == pytest.approx(np.pi / 6, abs=0.05)
 
@@ -122,10 +122,10 @@ def test_the_mask_is_white_and_the_rest_grey(tmp_path):
 @pytest.mark.parametrize(
     "kind, index, colour",
     [
-        ("field", 0.25, panels.POSITIVE),
-        pytest.param("crosses", -0.25, panels.NEGATIVE, marks=pytest.mark.slow),
-        ("angle", -0.25, panels.NEGATIVE),
-        pytest.param("energy", 0.25, panels.POSITIVE, marks=pytest.mark.slow),
+        ("field", 0.25, marks.POSITIVE),
+        pytest.param("crosses", -0.25, marks.NEGATIVE, marks=pytest.mark.slow),
+        ("angle", -0.25, marks.NEGATIVE),
+        pytest.param("energy", 0.25, marks.POSITIVE, marks=pytest.mark.slow),
     ],
 )
 def test_singularities_are_dots_in_their_place(tmp_path, kind, index, colour):
@@ -142,7 +142,7 @@ def test_both_families_have_their_colours(tmp_path):
     field = relabelled(instance, flat, flat, np.zeros(len(instance.grid.first), dtype=np.int32))
     for kind in ("field", "crosses"):
         picture = picture_of(draw(field, tmp_path / "a.png", kind=kind))[:1000]
-        level, upright = (like(picture, colour, 60) for colour in panels.FAMILIES)
+        level, upright = (like(picture, colour, 60) for colour in marks.FAMILIES)
         assert level.sum(axis=1).max() > 3 * level.sum(axis=0).max()  # u is level, as the stroke is
         assert upright.sum(axis=0).max() > 3 * upright.sum(axis=1).max()
 
@@ -163,7 +163,7 @@ def test_sketch_is_mapped_by_origin_and_pixel_size(tmp_path):
     np.testing.assert_allclose(line, [[-0.5, 0.5], [3.0, -1.0]])
     path = draw(instance, tmp_path / "a.png", kind="instance", sketch=[[(10.0, 27.5), (25.0, 27.5)]])
     picture = picture_of(path)
-    _, down = place(like(picture, panels.FAINT, 3), picture)
+    _, down = place(like(picture, marks.FAINT, 3), picture)
     assert down == pytest.approx(3 / 4, abs=0.01)
 
 
@@ -243,9 +243,3 @@ def test_malformed_sketch_is_named(tmp_path, polyline):
     with pytest.raises(InputError, match="polyline 1 of the sketch"):
         draw(singular(4), tmp_path / "a.png", sketch=[[(0.0, 0.0), (1.0, 1.0)], polyline])
     assert not list(tmp_path.iterdir())
-
-
-def test_kinds_are_described_in_one_line():
-    for kind in KINDS.values():
-        assert kind.description
-        assert "\n" not in kind.description

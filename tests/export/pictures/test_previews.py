@@ -74,7 +74,7 @@ def test_problems_and_solutions_are_tables_that_load_nothing(problem, solution):
     assert len(list(roots[1].iter("img"))) == 1
 
 
-def test_a_solution_without_a_point_is_told(problem):
+def test_a_solution_without_a_point_is_reported(problem):
     from crossfield.export.solutions.readers.text import Status
 
     empty = cf.Solution(problem, None, Status.INFEASIBLE, "<no> & never", "highs")

@@ -1,14 +1,15 @@
-"""The visible layers of a field on one page by matplotlib, for PNG and PDF."""
+"""Marks and sheets with matplotlib, for PNG and PDF."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .drawing import ink_colours
-from .layers import Lines, Sheet
+from .marks import Area, Dots, Lines, Mark, Sheet
 
 _SIDE: Final = 400.0
 """Points of the longer side of the page."""
@@ -23,17 +24,11 @@ def page_of(sheet: Sheet) -> Any:
     scale = _SIDE / max(width, height)
     figure = Figure(figsize=(scale * width / 72, scale * height / 72), facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_xlim(x, x + width)
-    axes.set_ylim(y + height, y)
-    axes.set_axis_off()
-    axes.set_autoscale_on(False)
+    cover(axes, x, y, width, height)
     _ink(axes, sheet)
     for layer in sheet.layers:
-        for part in layer.parts if layer.shown else ():
-            if isinstance(part, Lines):
-                _lines(axes, part, scale, layer.opacity)
-            else:
-                _dots(axes, part, scale)
+        if layer.shown:
+            paint(axes, layer.parts, scale, layer.opacity)
     return figure
 
 
@@ -51,6 +46,30 @@ def pixels_of(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
     return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
+def cover(axes: Any, x: float, y: float, width: float, height: float) -> None:
+    """Give axes the coordinates of a picture, y down, without frame and ticks."""
+    axes.set_xlim(x, x + width)
+    axes.set_ylim(y + height, y)
+    axes.set_axis_off()
+    axes.set_autoscale_on(False)
+
+
+def paint(
+    axes: Any, marks: Iterable[Mark], scale: float = 1.0, opacity: float = 1.0, *, snap: bool = False
+) -> None:
+    """Draw lines, dots and areas in the coordinates of the axes.
+
+    scale: points per unit of the axes. snap: move lines to whole pixels of a bitmap, for upright ones.
+    """
+    for mark in marks:
+        if isinstance(mark, Lines):
+            _lines(axes, mark, scale, opacity, snap=snap)
+        elif isinstance(mark, Dots):
+            _dots(axes, mark, scale)
+        elif isinstance(mark, Area):
+            _area(axes, mark)
+
+
 def _ink(axes: Any, sheet: Sheet) -> None:
     """The ink of a bitmap, smooth at any size."""
     if sheet.drawing is None or sheet.drawing.ink is None:
@@ -66,27 +85,38 @@ def _ink(axes: Any, sheet: Sheet) -> None:
     axes.set_aspect("auto")
 
 
-def _lines(axes: Any, part: Lines, scale: float, opacity: float) -> None:
-    from matplotlib.patches import PathPatch
+def _lines(axes: Any, part: Lines, scale: float, opacity: float, *, snap: bool) -> None:
     from matplotlib.path import Path
 
-    if not part.lines:
-        return
     vertices, codes = [], []
     for line in part.lines:
         vertices += [line[0, :1], line[:, 1:].reshape(-1, 2)]
         curve = Path.LINETO if line.shape[1] == 2 else Path.CURVE4
         codes += [np.array([Path.MOVETO]), np.full(len(vertices[-1]), curve)]
-    path = Path(np.concatenate(vertices), np.concatenate(codes))
-    axes.add_patch(
-        PathPatch(
-            path, fill=False, edgecolor=part.colour, linewidth=scale * part.width, alpha=opacity,
-            capstyle="round", joinstyle="round", clip_on=False,
-        )
-    )  # fmt: skip
+    if codes:
+        _path(
+            axes, Path(np.concatenate(vertices), np.concatenate(codes)), fill=False, edgecolor=part.colour,
+            linewidth=scale * part.width, alpha=opacity * part.opacity, capstyle="round",
+            joinstyle="round", snap=snap,
+        )  # fmt: skip
 
 
-def _dots(axes: Any, part: Any, scale: float) -> None:
+def _area(axes: Any, part: Area) -> None:
+    from matplotlib.path import Path
+
+    corners = part.boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3], [0, 1]]].reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(part.boxes))
+    if len(corners):
+        _path(axes, Path(corners, codes), facecolor=part.colour, linewidth=0, alpha=part.opacity, zorder=0.5)
+
+
+def _path(axes: Any, path: Any, **style: Any) -> None:
+    from matplotlib.patches import PathPatch
+
+    axes.add_patch(PathPatch(path, clip_on=False, **style))
+
+
+def _dots(axes: Any, part: Dots, scale: float) -> None:
     axes.scatter(
         *part.centres.T,
         s=(2 * scale * part.radii) ** 2,

@@ -1,0 +1,214 @@
+"""Marks of a picture (lines, dots, areas, words), and those of an instance and its field in any coordinates.
+
+`svg` and `canvas` write the same marks: `svg` as a small SVG file, `canvas` with matplotlib.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.instance.grid import Bools, Floats
+from ...models.instance.instance import Instance
+from .combing import combed
+from .drawing import Box, Drawing
+from .streamlines import Streamline, streamlines
+
+FAMILIES: Final = ("#00798c", "#e1812c")
+"""Teal and orange, which differ for all common kinds of colour blindness."""
+POSITIVE: Final = "#d1242f"
+NEGATIVE: Final = "#3056d3"
+STROKE: Final = "#b3261e"
+FAINT: Final = "#c9c9c9"
+BORDER: Final = "#9a9a9a"
+PAPER: Final = "#ffffff"
+
+_LEVELS: Final = 5  # shades of strokes by their reliability
+_CROWD: Final = 16.0
+"""Dots are drawn smaller from about the square of this many on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one colour and width: each (m, 4, 2) cubics or (m, 2, 2) straight pieces, end to end.
+
+    single: whether each is an object of its own that a designer may want to pick; otherwise all are one.
+    """
+
+    colour: str
+    width: float
+    lines: list[Floats]
+    single: bool = False
+    opacity: float = 1.0
+    dashed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Discs of one colour with a white rim: centres (k, 2) and radii (k,)."""
+
+    colour: str
+    centres: Floats
+    radii: Floats
+    rim: float
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """Filled boxes of one colour: left, top, right, bottom, shape (k, 4)."""
+
+    colour: str
+    boxes: Floats
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class Text:
+    """A line of text. anchor: `start`, `middle` or `end`, the part at (x, y). turned: degrees, clockwise."""
+
+    text: str
+    x: float
+    y: float
+    anchor: str = "start"
+    turned: float = 0.0
+
+
+Mark = Lines | Dots | Area | Text
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A named layer; one without a name is no group of its own. shown: whether it is visible at first."""
+
+    name: str
+    parts: tuple[Mark, ...]
+    shown: bool = True
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Layers on a page (x, y, width, height), the lowest first; drawing: what lies below them, or None."""
+
+    page: Box
+    layers: tuple[Layer, ...]
+    drawing: Drawing | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Coordinates of a picture, y down: where the grid's top left corner is, and the side of a pixel."""
+
+    instance: Instance
+    corner: tuple[float, float]
+    pixel: float
+
+    def at(self, points: Floats) -> Floats:
+        """Points (..., 2) of the field's plane, y up and pixel centres at whole numbers, on the picture."""
+        inside: Floats = points * np.array([1.0, -1.0]) + 0.5
+        return np.array(self.corner) + self.pixel * inside
+
+    def strokes(self, colour: str, width: float, opacity: float = 1.0) -> list[Lines]:
+        """A piece of line at each pixel that has a direction, the more opaque the more reliable."""
+        instance = self.instance
+        row, column = instance.stroke_pixels.T
+        arm = 0.5 * np.stack([np.cos(instance.theta), np.sin(instance.theta)], axis=1)
+        pieces = self._pieces(np.stack([column, -row], axis=1), arm)
+        level = np.ceil(_LEVELS * instance.w).astype(int)
+        return [
+            Lines(colour, width, list(pieces[level == each]), opacity=opacity * (0.2 + 0.8 * each / _LEVELS))
+            for each in np.unique(level).tolist()
+        ]
+
+    def crosses(self, field: CrossField, width: float, every: int = 1) -> list[Lines]:
+        """A cross on each pixel, or on one in several in both directions; u and v keep their colours."""
+        field = combed(field)
+        grid = field.instance.grid
+        chosen = (grid.rows % every == every // 2) & (grid.columns % every == every // 2)
+        centre = np.stack([grid.columns, -grid.rows], axis=1)[chosen]
+        return [
+            Lines(colour, width, list(self._pieces(centre, 0.42 * every * vectors[chosen])))
+            for vectors, colour in zip((field.u, field.v), FAMILIES, strict=True)
+        ]
+
+    def streamlines(self, field: CrossField, width: float, spacing: float) -> list[Lines]:
+        """Lines of both families, evenly spaced; lengths in units of the picture."""
+        found = streamlines(field, spacing / self.pixel)
+        return [
+            Lines(colour, width, [straight(self.at(run)) for line in found for run in runs(line, family)])
+            for family, colour in enumerate(FAMILIES)
+        ]
+
+    def singularities(self, field: CrossField, radius: float) -> list[Dots]:
+        """Red (+) and blue (-) dots, larger from an index of 1/2 on, smaller where there are many."""
+        found = field.singularities
+        centre = self.at(np.stack([found.column + 0.5, -found.row - 0.5], axis=1))
+        crowd = float(np.clip(_CROWD / np.sqrt(max(len(found.index), 1)), 0.4, 1.0))
+        radii = np.where(np.abs(found.index) < 0.5, 1.0, 1.4) * crowd * radius
+        return [
+            Dots(colour, centre[some], radii[some], 0.25 * crowd * radius)
+            for colour, some in ((POSITIVE, found.index > 0), (NEGATIVE, found.index < 0))
+            if some.any()
+        ]
+
+    def border(self, colour: str, width: float) -> Lines:
+        """The outline of the mask along the sides of pixels."""
+        return self._sides(colour, width, between=False)
+
+    def cells(self, colour: str, width: float) -> Lines:
+        """The sides between pixels of the mask."""
+        return self._sides(colour, width, between=True)
+
+    def area(self, colour: str, chosen: Bools) -> Area:
+        """The chosen pixels, bool [height, width]."""
+        return Area(colour, boxes(chosen) * self.pixel + np.tile(self.corner, 2))
+
+    def _sides(self, colour: str, width: float, *, between: bool) -> Lines:
+        ends = np.array(self.corner) + self.pixel * _sides(np.pad(self.instance.mask, 1), between=between)
+        return Lines(colour, width, list(ends[:, None]))
+
+    def _pieces(self, centre: Floats, arm: Floats) -> Floats:
+        return self.at(np.stack([centre - arm, centre + arm], axis=1))[:, None]
+
+
+def straight(points: Floats) -> Floats:
+    """The pieces (k - 1, 2, 2) of a polyline (k, 2)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def segments(ends: Iterable[Iterable[float]]) -> list[Floats]:
+    """Straight lines, each given as (x, y, x, y)."""
+    return [np.array(each, dtype=np.float64).reshape(1, 2, 2) for each in ends]
+
+
+def boxes(chosen: Bools) -> Floats:
+    """The chosen cells of an image as boxes (k, 4): left, top, right, bottom; neighbours in a row are one."""
+    row, column = np.nonzero(np.diff(np.pad(chosen, ((0, 0), (1, 1))).astype(np.int8), axis=1))
+    return np.stack([column[::2], row[::2], column[1::2], row[::2] + 1], axis=1).astype(np.float64)
+
+
+def runs(line: Streamline, family: int) -> list[Floats]:
+    """The stretches of a line on which it belongs to a family; neighbouring stretches share a point."""
+    limits = np.concatenate([[0], np.flatnonzero(np.diff(line.families)) + 1, [len(line.points)]])
+    stretches = (
+        (line.points[first : stop + 1], line.families[first]) for first, stop in pairwise(limits.tolist())
+    )
+    return [points for points, found in stretches if found == family and len(points) > 1]
+
+
+def _sides(mask: Bools, *, between: bool) -> Floats:
+    """Sides of pixels as segments (k, 2, 2): between pixels of the padded mask, or at its border.
+
+    Points are (x, y) with y down; pixel [row, column] reaches from (column, row) one further.
+    """
+    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
+    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
+    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
+    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
+    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
+    return np.concatenate([level, upright]).astype(np.float64)

@@ -1,0 +1,99 @@
+"""Pictures for a web site, in the reader's light or dark mode; same input, same bytes.
+
+The longer side of the mask is 320 units; pixel [row, column] is the square at (column, row) times the unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from ...models.field.field import CrossField
+from ...models.instance.instance import Instance
+from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Area, Frame, Layer, Lines, Mark, Sheet
+from .svg import LABEL, web_svg_of
+
+SIDE: Final = 320.0
+CROSSES_UP_TO: Final = 12
+"""Longer side of a grid, in pixels, up to which its crosses are drawn one by one; beyond, streamlines."""
+GRID: Final = "#e4e6ea"
+EDGE: Final = "#8b929c"
+CUT: Final = "#c3c8ce"
+HUES: Final = (FAMILIES[0], "#b5179e", "#a35c00", "#2f6b2f", "#4361ee", "#9b2226")
+"""Colours of curves, one after the other."""
+_SHADE: Final = "#e1e4e9"
+_FAINT: Final = "#d3d6db"
+_NIGHT: Final = {
+    PAPER: "#1d2126",
+    _SHADE: "#3a424c",
+    GRID: "#30363d",
+    EDGE: "#7d8590",
+    CUT: "#4a525c",
+    STROKE: "#ff7b72",
+    _FAINT: "#3d444d",
+    FAMILIES[0]: "#41b3c5",
+    FAMILIES[1]: "#f0a35e",
+    POSITIVE: "#ff6b70",
+    NEGATIVE: "#7c9cff",
+    LABEL: "#a3acb6",
+    **dict(zip(HUES[1:], ("#f07be0", "#f0a35e", "#7ccf7c", "#8fa2ff", "#ff8a8f"), strict=True)),
+}
+"""Colours in dark mode by those in light mode."""
+_MARGIN: Final = 7.0
+_CHARACTER: Final = 6.2  # the widest digits and letters of usual fonts at the size of the labels
+_SPACING: Final = 10.0  # between streamlines of one family
+_CELLS_FROM: Final = 9.0  # units of a pixel from which on its sides are drawn
+
+
+def instance_picture(instance: Instance) -> bytes:
+    """Mask, pixels and strokes: the more reliable a stroke, the stronger its line."""
+    frame = _frame(instance)
+    width = float(np.clip(0.2 * frame.pixel, 2.0, 6.0))
+    return _page(frame, [*_ground(frame), *frame.strokes(STROKE, width)])
+
+
+def thumbnail(instance: Instance) -> bytes:
+    """Silhouette and strokes with lines that are visible at the height of a line of text."""
+    frame = _frame(instance)
+    return _page(frame, [frame.area(_SHADE, instance.mask), *frame.strokes(STROKE, 12.0)])
+
+
+def field_picture(field: CrossField) -> bytes:
+    """Crosses or, on a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
+    frame = _frame(field.instance)
+    few = max(field.instance.mask.shape) <= CROSSES_UP_TO
+    lines = (
+        frame.crosses(field, min(0.07 * frame.pixel, 2.6)) if few else frame.streamlines(field, 1.3, _SPACING)
+    )
+    strokes = frame.strokes(_FAINT, float(np.clip(0.3 * frame.pixel, 2.6, 9.0)))
+    return _page(frame, [*_ground(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
+
+
+def picture(left: float, top: float, right: float, bottom: float, marks: Iterable[Mark]) -> bytes:
+    """The SVG of marks on a page between these sides, with colours for both modes."""
+    x, y, width, height = (round(value, 1) for value in (left, top, right - left, bottom - top))
+    return web_svg_of(Sheet((x, y, width, height), (Layer("", tuple(marks)),)), _NIGHT)
+
+
+def wide(text: str) -> float:
+    """Room for a line of text in the units of the picture, whatever font the reader has."""
+    return _CHARACTER * len(text)
+
+
+def _frame(instance: Instance) -> Frame:
+    return Frame(instance, (0.0, 0.0), SIDE / float(np.ptp(np.argwhere(instance.mask), axis=0).max() + 1))
+
+
+def _ground(frame: Frame) -> list[Area | Lines]:
+    """The mask, its pixels where they are large enough, and its outline."""
+    cells = [frame.cells(GRID, 0.8)] if frame.pixel >= _CELLS_FROM else []
+    return [frame.area(PAPER, frame.instance.mask), *cells, frame.border(EDGE, 1.2)]
+
+
+def _page(frame: Frame, marks: Iterable[Mark]) -> bytes:
+    inside = np.argwhere(frame.instance.mask)[:, ::-1]
+    left, top = (frame.pixel * inside.min(axis=0) - _MARGIN).tolist()
+    right, bottom = (frame.pixel * (inside.max(axis=0) + 1) + _MARGIN).tolist()
+    return picture(left, top, right, bottom, marks)
