@@ -387,7 +387,7 @@ def _angles(instance: Instance, given: Any, name: str) -> Floats:
     wrong = ~(np.abs(angles) <= MOST_ANGLE)
     if wrong.any():
         raise InputError(
-            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is no angle; "
+            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is not an angle; "
             f"give radians up to {MOST_ANGLE:g}"
         )
     return angles

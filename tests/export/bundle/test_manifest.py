@@ -334,7 +334,7 @@ def test_unknown_formats_dialects_and_folders(tmp_path):
         write(problem, tmp_path / "absent" / "model.lp")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be made"):
+    with pytest.raises(OutputError, match="cannot be created"):
         write_problem(problem, tmp_path / "file", formats=["lp"])
     assert format_of("a.b.mps.gz").name == "mps"
     with pytest.raises(InputError, match=r"MODEL\.PS\.GZ: no format has the suffix 'PS'"):

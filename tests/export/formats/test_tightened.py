@@ -144,7 +144,7 @@ def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
             formulate(certificate.field.instance, "miqp-exact"),
             replace(windows, beta_lower=windows.beta_lower - 2),
         )
-    with pytest.raises(InstanceError, match="not of the grid"):
+    with pytest.raises(InstanceError, match="do not fit the grid"):
         tightened(formulate(random_instance(1, (2, 2)), "miqp-exact"), windows)
     field = tmp_path / "field.npz"
     write_field(certificate.field, field)
@@ -162,5 +162,5 @@ def test_what_does_not_fit_is_refused(proof, tmp_path, capsys):
     )[0]
     broken = manifest.document | {"windows": manifest.document["windows"] | {"p_max": [64]}}
     manifest.path.write_text(json.dumps(broken))
-    with pytest.raises(InstanceError, match="not of the grid"):
+    with pytest.raises(InstanceError, match="do not fit the grid"):
         read_manifest(manifest.path).problem()

@@ -104,7 +104,7 @@ def test_the_picture_shows_the_layers_where_the_drawing_has_them(tmp_path):
 
 
 def test_layers_take_the_drawing_and_no_polylines(tmp_path):
-    with pytest.raises(InputError, match="give the drawing as over"):
+    with pytest.raises(InputError, match="give the drawing as underlay"):
         draw(level(), tmp_path / "a.svg", sketch=[[(0, 0), (1, 1)]])
 
 

@@ -59,7 +59,7 @@ def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
     field = greedy_field(cf.sample("mouse", 6))
     problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
     held = write(problem, tmp_path / "model.nl", start=field).problem
-    files, deadline = Files.beside(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)
+    files, deadline = Files.for_model(tmp_path / "model.nl", "ipopt"), Deadline.after(600.0, lambda: -1e9)
     with Solvers() as solvers:
         solvers.solve_file(held, "ipopt", files, Limits(600.0), deadline, start=field)
     first = files.log.read_text().splitlines()[0]
