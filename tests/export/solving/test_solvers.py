@@ -492,7 +492,7 @@ def test_threads_may_change_from_solve_to_solve(tmp_path, small):
     ],
 )
 def test_impossible_limits_are_refused(given):
-    with pytest.raises(InputError, match="out of range|must be between"):
+    with pytest.raises(InputError, match=r"out of range|must be between"):
         cf.Limits(**given)
 
 
