@@ -26,8 +26,7 @@ NAMED = {
     "shade": ["samples", "size", "methods", "kept method", "picture side", "light"],
     "verify": ["programs"],
     "library solve": ["all solvers", "rungs"],
-    "library submit-run": ["logs", "run statuses"],
-    "library submit-point": ["answers"],
+    "library submit": ["answers", "logs", "run statuses"],
 }
 OTHERS = (
     "",
