@@ -7,7 +7,7 @@ stopped continues, whatever it was that stopped it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
 from ..ledger.given import Points, nothing, points_of, read_points
-from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
+from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
 from .entry_task import Entry, make_entry
@@ -83,7 +83,7 @@ def _built(
     if not kept:
         name, reason = next(iter(work.skipped.items()))
         raise InputError(f"nothing is left on any grid that it asks for; {name}: {reason}")
-    keep(ledger)
+    write_ledger(ledger)
     progress("index and checksums")
     write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
     return read_library(folder)
@@ -117,10 +117,10 @@ def _sweep(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _ledger(spec: Spec, plans: Iterable[InstancePlan], folder: Path) -> Ledger:
+def _ledger(spec: Spec, plans: Sequence[InstancePlan], folder: Path) -> Ledger:
     entries = [entry.name for each in plans for entry in each.entries]
     given = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
-    return merged(folder, given, entries)
+    return merged(folder, given, entries, [each.recipe.name for each in plans])
 
 
 class _Build:

@@ -49,7 +49,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         import distributed
     except ModuleNotFoundError as error:
         raise InputError(
-            "--scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
+            "a scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
         ) from error
     try:
         client: Any = distributed.Client(  # type: ignore[no-untyped-call]

@@ -45,12 +45,7 @@ def write_index(
     written = general(spec, sidecars, skipped or {}) | {INDEX: as_bytes(index)}
     for name, data in written.items():
         write_bytes(folder / name, data)
-    beside = (
-        name
-        for record in read_ledger(folder).records
-        for name in (record.point, record.log)
-        if name is not None
-    )
+    beside = read_ledger(folder).files
     present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *beside]
     _remove_stale(folder, set(present))
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ....models.storage import read_bytes
+from ..ledger.certificates import METHOD
 from ..ledger.given import Points, nothing
 from ..ledger.ledger import Ledger, Record
-from ..ledger.points import Provenance
+from ..ledger.points import Provenance, ours
 from ..plan.recipe import InstancePlan
 from .entry_task import Entry
-from .instance_task import Preparation, Submitted
+from .instance_task import Evidence, Preparation, Submitted
 
 
 class Inputs:
@@ -26,7 +28,8 @@ class Inputs:
 
     def preparation(self, each: InstancePlan) -> Preparation:
         """The task of an instance. Raises InputError, InstanceError for a damaged field of the ledger."""
-        return Preparation(each.recipe, self._submitted(each), self.points(each.recipe.name))
+        name = each.recipe.name
+        return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificate(name))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
         """The tasks of its entries. Raises as `preparation`, InputError for a file that is missing."""
@@ -46,9 +49,17 @@ class Inputs:
         return tuple(self._submission(record) for record in records if record is not None)
 
     def _submission(self, record: Record) -> Submitted:
-        self.ledger.field(record)  # damage is told here, with the file's name
+        self.ledger.field(record)  # an error here names the file
         provenance = Provenance(record.solver, record.version, record.seconds, record.by)
-        return Submitted(read_bytes(self.ledger.path(record)), provenance)
+        return Submitted(self.ledger.content(str(record.point), record.point_sha256), provenance)
+
+    def _certificate(self, instance: str) -> Evidence | None:
+        """The certificate that the ledger keeps for an instance."""
+        kept = self.ledger.certificate(instance)
+        if kept is None:
+            return None
+        data = self.ledger.content(kept.file, kept.sha256)
+        return Evidence(kept.file, data, kept.instance_sha256, replace(ours(METHOD), by=kept.by))
 
 
 def _relation(each: InstancePlan) -> str:

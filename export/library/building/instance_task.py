@@ -19,7 +19,7 @@ from ....models.search.pinned import pinned
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
-from ..ledger.certificates import certified
+from ..ledger.certificates import Certified, certified, certified_by
 from ..ledger.given import Given
 from ..ledger.points import (
     Known,
@@ -53,12 +53,31 @@ class Submitted:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """The certificate of a ledger.
+
+    file, data: name and bytes of its file; instance_sha256: the instance that it is on; provenance: who
+    submitted it.
+    """
+
+    file: str
+    data: bytes
+    instance_sha256: str
+    provenance: Provenance
+
+    def certified(self, instance: Instance) -> Certified:
+        """Return what it proves of an instance. Raises InputError unless the checker accepts it there."""
+        return certified_by(self.data, self.file, instance, self.provenance)
+
+
+@dataclass(frozen=True)
 class Preparation:
-    """The task of an instance: its recipe, the fields that the ledger has for its entries, given points."""
+    """The task of an instance: its recipe, fields and certificate of the ledger, and given points."""
 
     recipe: InstanceRecipe
     submitted: tuple[Submitted, ...] = ()
     given: Given | None = None
+    evidence: Evidence | None = None
 
     @property
     def name(self) -> str:
@@ -72,16 +91,17 @@ class Preparation:
             [hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted
         ]
         given = [] if self.given is None else [self.given.sha256]
-        return digest([generator(), self.recipe.document(), submitted, *given])
+        proof = [] if self.evidence is None else [[self.evidence.file, asdict(self.evidence.provenance)]]
+        return digest([generator(), self.recipe.document(), submitted, *given, *proof])
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was found of an instance: the baseline, fields of low energy, bytes and facts of a certificate."""
+    """What was found of an instance: the baseline, fields of low energy, and a certificate."""
 
     baseline: Known
     low: list[Known]
-    certificate: tuple[bytes, dict[str, Any]] | None
+    certificate: Certified | None
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
@@ -96,8 +116,10 @@ def prepare(task: Preparation) -> Files:
     """The files of an instance: itself, fields, and last what is known of it; or InputError."""
     instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
-    found = _searched(instance, task.recipe) if given is None else _given(given, instance, task.recipe)
-    chosen = _chosen(instance, task, found)
+    evidence = task.evidence
+    sent = evidence.certified(instance) if evidence and evidence.instance_sha256 == instance.sha256 else None
+    found = _given(given, instance, task.recipe) if given else _searched(instance, task.recipe, sent)
+    chosen = _chosen(instance, task, found, sent)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(ROLES):
@@ -108,19 +130,20 @@ def prepare(task: Preparation) -> Files:
             files[name] = field_to_json(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    certificate = _certificate(found, task, files)
+    certificate = _certificate(found.certificate, sent, files)
     about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
     return files | {about_file(task.name): as_bytes(about)}
 
 
-def _searched(instance: Instance, recipe: InstanceRecipe) -> _Found:
-    """What a search, a proof where the recipe wants it, and HiGHS in the 1-norm find."""
+def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None) -> _Found:
+    """What a search, a proof unless one was submitted, and HiGHS in the 1-norm find."""
     searched = searched_field(instance)
-    proven = certified(searched.field) if recipe.prove else None
+    name = f"{recipe.name}.certificate.npz"
+    proven = certified(searched.field, name) if recipe.prove and sent is None else None
     found = better_in_1norm(searched.field, recipe.rung)
     staged = [Known(pinned(each.field), ours("two stages")) for each in found]
     low = [searched, *([proven.known] if proven else []), *found, *staged]
-    return _Found(baseline_field(instance), low, (proven.data, proven.facts) if proven else None)
+    return _Found(baseline_field(instance), low, proven)
 
 
 def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
@@ -129,22 +152,27 @@ def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
     return _Found(given.field("baseline"), low, given.certificate(instance) if recipe.prove else None)
 
 
-def _certificate(found: _Found, task: Preparation, files: Files) -> dict[str, Any]:
-    """What is told of the certificate, which is among the files now; nothing where there is none."""
-    if found.certificate is None:
+def _certificate(found: Certified | None, sent: Certified | None, files: Files) -> dict[str, Any]:
+    """Facts of the certificate with the greatest bound, if there is one, whose file is added to the files."""
+    known = [each for each in (sent, found) if each is not None]
+    if not known:
         return {}
-    name = f"{task.name}.certificate.npz"
-    files[name], facts = found.certificate
-    return {"certificate": {"file": name, **facts}}
+    best = max(known, key=lambda each: each.facts["bound"])
+    files[best.file] = best.data
+    return {"certificate": {"file": best.file, **best.facts}}
 
 
-def _chosen(instance: Instance, task: Preparation, found: _Found) -> dict[str, Known]:
-    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`."""
+def _chosen(instance: Instance, task: Preparation, found: _Found, sent: Certified | None) -> dict[str, Known]:
+    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`.
+
+    The field of a submitted certificate comes last, so that an equal one that was submitted before it stays.
+    """
     submitted = [each.known() for each in task.submitted]
     known = [
         found.baseline,
         *found.low,
         *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
+        *([sent.known] if sent else []),
     ]
     return {"baseline": found.baseline, "least_1": least_energy(known, 1), "least_2": least_energy(known, 2)}
 

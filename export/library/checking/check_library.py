@@ -306,6 +306,15 @@ class _Verification:
             if record.log is not None:
                 self.known.add(record.log)
             yield from run_findings(ledger, record)
+        instances = {entry.rpartition("_")[0] for entry in library.document["entries"]}
+        for each in ledger.certificates:
+            self.known.add(each.file)
+            if each.instance not in instances:
+                yield Finding(LEDGER, f"has a certificate of {each.instance}, which is not in the library")
+            try:
+                ledger.content(each.file, each.sha256)
+            except CrossfieldError as error:
+                yield of_error(error, each.file)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
         """Every instance and its fields are as its own document and the sidecars of its entries say."""

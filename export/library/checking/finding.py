@@ -33,6 +33,11 @@ def of_error(error: CrossfieldError, file: str) -> Finding:
     return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message)
 
 
+def is_better(objective: float, known: float) -> bool:
+    """Whether an objective is lower than the best known one by more than rounding."""
+    return known - objective > SAME * max(abs(known), SAME)
+
+
 def close(first: float, second: float) -> bool:
     """Whether two objectives are the same up to rounding."""
     try:

@@ -110,6 +110,7 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
         if not same(about.get(key), value):
             yield Finding(name, f"tells another {key} than follows from the specification")
     known = {each.provenance for each in task.submitted}
+    known |= {task.evidence.provenance} if task.evidence else set()
     for role, facts in about["fields"].items():
         found = Provenance.of(facts)
         if "given" not in about and found not in known and not _is_of_a_build(found):

@@ -31,6 +31,7 @@ from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
+from ..checking.finding import is_better
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
 from ..ledger.dual_bounds import contradicts
@@ -45,7 +46,6 @@ from ..ledger.ledger import (
 )
 from ..ledger.points import complete_point, field_of
 from ..plan.spec import RUNGS
-from .submit import is_better
 
 GAP: Final = 1e-7
 """Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""

@@ -9,22 +9,21 @@ from __future__ import annotations
 
 import io
 import math
-import tempfile
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
-from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, write_bytes
 from ..documents.archive import opened
 from ..documents.documents import about_file, are_whole, read_about, read_library
 from ..plan.recipe import digest
-from .points import Known, Provenance
+from .certificates import METHOD, Certified, certified_by
+from .points import Known, Provenance, ours
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
@@ -49,27 +48,24 @@ class Given:
         facts = self.about["fields"][role]
         return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
-    def certificate(self, instance: Instance) -> tuple[bytes, dict[str, Any]] | None:
-        """Return the bytes of the certificate, and what it says, where there is one.
+    def certificate(self, instance: Instance) -> Certified | None:
+        """Return the certificate, checked, if there is one.
 
-        Raises InputError where the checker refuses it, it is of another instance, or it says something else
-        than the document does.
+        Raises InputError if the checker refuses it, if it is of another instance, or if the document states
+        another status, bound or energy.
         """
         facts = dict(self.about.get("certificate", {}))
         if not facts:
             return None
-        data = self.files[name := facts.pop("file")]
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-            path = Path(folder) / name
-            path.write_bytes(data)
-            found = read_certificate(path, on=instance)
-        same = (facts["status"], facts["bound"]) == (found.status, found.bound)
-        if not same or not math.isclose(facts["energy"], found.energy, rel_tol=_SAME, abs_tol=_SAME):
+        name = facts.pop("file")
+        found = certified_by(self.files[name], name, instance, ours(METHOD))
+        same = (facts["status"], facts["bound"]) == (found.facts["status"], found.facts["bound"])
+        if not same or not math.isclose(facts["energy"], found.facts["energy"], rel_tol=_SAME, abs_tol=_SAME):
             raise InputError(
                 f"{about_file(self.about['name'])} states another status, bound or energy than {name}; "
                 "make the points again with `crossfield library points`"
             )
-        return data, facts
+        return replace(found, file=f"{self.about['name']}.certificate.npz", facts=facts)
 
 
 Points = Callable[[str], Given | None]

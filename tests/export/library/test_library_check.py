@@ -17,7 +17,6 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents import archive, check_point, tar_stream
 from crossfield.export.library.documents.archive import opened
 from crossfield.export.library.documents.documents import problem_of, read_library
@@ -27,6 +26,7 @@ from crossfield.models.field.file import read_field
 from crossfield.models.formulations.problem import with_integers_fixed
 from forging import change, seal
 from loops import for_each
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -690,20 +690,18 @@ def solved(built, tmp_path_factory):
     folder = tmp_path_factory.mktemp("solved")
     objective = better_point(built, ENTRY, folder / "found.sol")
     lib = shutil.copytree(built, folder / "lib")
-    happened = submit_point(
-        folder / "found.sol", lib, entry=ENTRY, solver="HiGHS", version="1.15", seconds=0.5, by="A. Body"
-    )
-    return folder / "found.sol", objective, lib, happened
+    return folder / "found.sol", objective, lib, submit(folder / "found.sol", lib)
 
 
 def submit(file, lib):
-    return submit_point(file, lib, entry=ENTRY, solver="HiGHS", version="1.15", seconds=0.5, by="A. Body")
+    facts = {"solver": "HiGHS", "version": "1.15", "seconds": 0.5, "by": "A. Body"}
+    return submit_one(lib, file, entry=ENTRY, **facts)
 
 
 def test_a_better_point_is_kept_with_its_provenance(built, solved):
     _, objective, lib, happened = solved
     before = json.loads((built / f"{ENTRY}.json").read_text())["best"]
-    assert happened.better
+    assert happened.better_point
     assert happened.known == before["objective"]
     assert happened.objective == pytest.approx(objective, rel=1e-9)
     assert objective < before["objective"] * (1 - 1e-3)
@@ -735,7 +733,7 @@ def test_a_point_that_is_no_better_changes_nothing(solved, tmp_path, capsys):
     before = everything_below(lib)
     shutil.copy(lib / f"{ENTRY}.sol", tmp_path / f"{ENTRY}.sol")
     for path in (file, tmp_path / f"{ENTRY}.sol"):
-        assert invoke(["library", "submit-point", str(path), "--library", str(lib), "--entry", ENTRY]) == 0
+        assert invoke(["library", "submit", str(lib), str(path), "--entry", ENTRY]) == 0
         assert "not better" in capsys.readouterr().out
     assert everything_below(lib) == before
 
@@ -744,7 +742,7 @@ def test_the_entry_is_found_by_the_name_of_the_file_or_by_its_columns(built, sol
     lib = solved[2]
     for name in (f"{ENTRY}.sol", f"{ENTRY}.of-highs.sol", "anything.sol"):
         shutil.copy(solved[0], tmp_path / name)
-        assert submit_point(tmp_path / name, lib).entry == ENTRY
+        assert submit_one(lib, tmp_path / name).entries == (ENTRY,)
 
 
 def states(before, after):
@@ -813,7 +811,7 @@ def test_a_point_that_cannot_be_is_one_line_and_changes_nothing(
     lib = shutil.copytree(built, tmp_path / "lib")
     before = everything_below(lib)
     file = spoiled(solved, tmp_path, old, new)
-    assert invoke(["library", "submit-point", str(file), "--library", str(lib), "--entry", ENTRY]) == 1
+    assert invoke(["library", "submit", str(lib), str(file), "--entry", ENTRY]) == 1
     said = capsys.readouterr()
     assert complaints(said.err).startswith(f"crossfield: {file}: ")
     assert words in said.err
@@ -844,13 +842,13 @@ def test_wrong_options_are_refused_before_anything_is_written(options, words, so
     lib = shutil.copytree(built, tmp_path / "lib")
     before = everything_below(lib)
     with pytest.raises(CrossfieldError, match=words):
-        submit_point(solved[0], lib, **options)
+        submit_one(lib, solved[0], **options)
     assert everything_below(lib) == before
 
 
 def test_a_file_without_a_point_is_one_line(built, capsys):
     file = SOLUTIONS / "highs-1.15.1_infeasible_style0.sol"
-    assert invoke(["library", "submit-point", str(file), "--library", str(built), "--entry", ENTRY]) == 1
+    assert invoke(["library", "submit", str(built), str(file), "--entry", ENTRY]) == 1
     assert "holds no point" in capsys.readouterr().err
 
 
@@ -858,7 +856,7 @@ def test_a_point_of_another_instance_fits_no_entry(built, solved, tmp_path):
     lines = [line.replace("_00_00", "_07_07") for line in solved[0].read_text().splitlines()]
     (tmp_path / "other.sol").write_text("\n".join(lines) + "\n")
     with pytest.raises(SolutionError, match="fits no entry"):
-        submit_point(tmp_path / "other.sol", built)
+        submit_one(built, tmp_path / "other.sol")
 
 
 def test_a_point_below_a_dual_bound_is_a_contradiction_that_is_told(solved, lib):

@@ -11,13 +11,13 @@ import crossfield as cf
 import pytest
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents.documents import problem_of, read_library, read_sidecar
 from crossfield.export.library.ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.ledger.ledger import Record, add_record
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
 from forging import seal
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -189,9 +189,9 @@ def test_auxiliary_variables_are_computed_again(built, tmp_path):
     for name in ("s", "t", "gamma", "psi"):
         point[problem.blocks[name].slice] -= 1e-6
     assert problem.violation(point).worst > 1e-7
-    told = submit_point(written(problem, point, tmp_path), lib, entry=MILP)
-    assert told.objective == pytest.approx(told.known, abs=1e-8)
-    assert not told.better
+    result = submit_one(lib, written(problem, point, tmp_path), entry=MILP)
+    assert result.objective == pytest.approx(result.known, abs=1e-8)
+    assert result.outcome == "not better"
 
 
 @pytest.mark.parametrize("block", ["alpha", "beta", "p1", "p2"])
@@ -202,7 +202,7 @@ def test_angles_and_jumps_are_not_mended(block, built, tmp_path):
     at = problem.blocks[block].slice
     point[at] = problem.blocks[block].upper + (1.0 if block.startswith("p") else 1e-6)
     with pytest.raises(SolutionError, match="not a feasible point"):
-        submit_point(written(problem, point, tmp_path), lib, entry=MILP)
+        submit_one(lib, written(problem, point, tmp_path), entry=MILP)
 
 
 def test_fractional_jumps_are_refused(built, tmp_path):
@@ -210,7 +210,7 @@ def test_fractional_jumps_are_refused(built, tmp_path):
     problem, point = point_of(lib)
     point[problem.blocks["p1"].slice] = 0.4
     with pytest.raises(SolutionError, match=r"integrality 0\.4"):
-        submit_point(written(problem, point, tmp_path), lib, entry=MILP)
+        submit_one(lib, written(problem, point, tmp_path), entry=MILP)
 
 
 def point_of(lib):

@@ -15,7 +15,7 @@ from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents import lock
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.documents.lock import locked
-from crossfield.export.library.ledger.ledger import Record, add_record, keep, merged, read_ledger
+from crossfield.export.library.ledger.ledger import Record, add_record, merged, read_ledger, write_ledger
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
@@ -77,11 +77,11 @@ def test_submissions_at_one_moment_are_all_kept(tmp_path):
     copy = tmp_path / "library"
     files = list(better_points(build(write_spec(tmp_path, size=6), copy), tmp_path))
     assert len(files) == len(SEEDS)
-    command = [sys.executable, "-m", "crossfield", "library", "submit-point", "--library", str(copy)]
+    command = [sys.executable, "-m", "crossfield", "library", "submit", str(copy)]
     others = [subprocess.Popen([*command, str(file)], stdout=subprocess.PIPE, text=True) for file in files]
     said = [other.communicate()[0] for other in others]
     assert [other.returncode for other in others] == [0] * len(files)
-    better = [file.stem for file, words in zip(files, said, strict=True) if "better, and now" in words]
+    better = [file.stem for file, words in zip(files, said, strict=True) if "accepted" in words]
     assert len(better) == len(files)
     assert {record.entry for record in read_ledger(copy).records if record.point} == set(better)
     assert verify_library(copy) == []
@@ -199,9 +199,9 @@ def test_a_ledger_is_merged_before_it_is_written(built, copy, tmp_path):
     record = Record(document["name"], document["problem_sha256"], "S", "1", "feasible", primal=1.0)
     kept = add_record(copy, record, field)
     (tmp_path / "new").mkdir()
-    found = merged(tmp_path / "new", read_ledger(copy), [document["name"]])
+    found = merged(tmp_path / "new", read_ledger(copy), [document["name"]], [])
     assert list((tmp_path / "new").iterdir()) == []
     assert found.field(kept).instance.sha256 == field.instance.sha256
-    keep(found)
+    write_ledger(found)
     assert read_ledger(tmp_path / "new").records == (kept,)
     assert (tmp_path / "new" / kept.point).read_bytes() == (copy / kept.point).read_bytes()

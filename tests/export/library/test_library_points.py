@@ -11,7 +11,6 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents.documents import read_about, read_library
 from crossfield.export.library.ledger.difficulty import EASY, difficulty
 from crossfield.export.library.ledger.given import ROLES, read_points
@@ -21,6 +20,7 @@ from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import InputError
 from processors import PROCESSORS
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -167,7 +167,7 @@ def test_a_submission_keeps_what_was_given_and_another_build_comes_to_the_same(s
     worsened(known / f"{SADDLE}.about.json")
     spec = write_spec(tmp_path, 'points = "known"')
     made = build(read_spec(spec), tmp_path / "lib").folder
-    assert submit_point(searched / f"{SADDLE}_exact.sol", made).better
+    assert submit_one(made, searched / f"{SADDLE}_exact.sol").better_point
     assert verify_library(made) == []
     other = tmp_path / "other"
     other.mkdir()
