@@ -220,7 +220,7 @@ def test_a_better_field_counts_for_every_entry_of_its_instance(lib, sent, suffix
 
 
 def test_a_field_of_another_instance_or_entry_is_refused(lib, sent, tmp_path):
-    write_field(cf.greedy(cf.sample("mouse", 4)), tmp_path / "other.json")
+    write_field(cf.greedy_field(cf.sample("mouse", 4)), tmp_path / "other.json")
     with pytest.raises(InputError, match=r"other\.json: is a field of an instance that is not in the"):
         submit_one(lib, tmp_path / "other.json")
     with pytest.raises(InstanceError, match=rf"{STEM}_exact\.json: "):
