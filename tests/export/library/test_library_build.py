@@ -27,7 +27,8 @@ from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.contributions.solve import solve_library
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.documents.statistics import tangent_bound
-from crossfield.export.library.ledger.given import read_points
+from crossfield.export.library.ledger import points as known_points
+from crossfield.export.library.ledger.given import read_points, write_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point, field_of
 from crossfield.export.library.ledger.search_1norm import better_in_1norm
@@ -93,13 +94,25 @@ def write_spec(folder, text=SPEC):
 
 
 @pytest.fixture(scope="module")
-def spec(tmp_path_factory):
-    return write_spec(tmp_path_factory.mktemp("spec"))
+def searched(tmp_path_factory):
+    """A library whose points come from short searches; not to be changed."""
+    folder = tmp_path_factory.mktemp("searched")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(known_points, "_ROUNDS", 1)
+        return build(read_spec(write_spec(folder)), folder / "library")
+
+
+@pytest.fixture(scope="module")
+def spec(searched, tmp_path_factory):
+    """The specification with those points, so that no build searches again, in whichever process."""
+    folder = tmp_path_factory.mktemp("spec")
+    write_points(searched.folder, folder / "points.zip")
+    return write_spec(folder, 'points = "points.zip"\n' + SPEC)
 
 
 @pytest.fixture(scope="module")
 def built(spec, tmp_path_factory):
-    """The library of the specification, built in this process; nobody may change it."""
+    """The library of the specification, built in this process; not to be changed."""
     return build(read_spec(spec), tmp_path_factory.mktemp("built") / "library")
 
 
@@ -572,12 +585,14 @@ def test_random_instances_follow_size_and_seed_alone():
 
 
 @pytest.mark.slow
-def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(built, spec, tmp_path):
+def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(tmp_path):
+    """Searches included, which the points of the other tests' specification leave out."""
+    spec = write_spec(tmp_path)
     command = build_command(spec, tmp_path / "again")
     environment = os.environ | {"PYTHONHASHSEED": "7"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, complaints(done.stderr)) == (0, "")
-    assert content(tmp_path / "again") == content(built.folder)
+    assert content(tmp_path / "again") == content(build(read_spec(spec), tmp_path / "library").folder)
 
 
 @pytest.mark.slow
@@ -621,13 +636,14 @@ def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, 
 
 
 @pytest.mark.slow
-def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
+def test_a_library_is_brought_up_to_date_from_itself_alone(searched, tmp_path, short_searches):
+    copy = shutil.copytree(searched.folder, tmp_path / "library")
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_own_n004.about.json").unlink()
     with pytest.raises(InputError, match=r"cf_own_n004_milp\.json: cannot be read"):
         _ = read_library(copy).entries
     rebuild(copy)
-    assert content(copy) == content(built.folder)
+    assert content(copy) == content(searched.folder)
 
 
 @pytest.mark.slow

@@ -125,7 +125,7 @@ def test_a_forged_certificate_is_found(lib):
 @pytest.mark.parametrize("key, value", [("bound", 99.0), ("status", "gap"), ("energy", 99.0)])
 def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, value):
     instance = cf.read_instance(lib / f"{STEM}.instance.json")
-    assert read_points(lib)(STEM).certificate(instance)[1]["status"] == "optimal"
+    assert read_points(lib)(STEM).certificate(instance).facts["status"] == "optimal"
     change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
     with pytest.raises(InputError, match=f"{STEM}.about.json states another status, bound or energy"):
         read_points(lib)(STEM).certificate(instance)
