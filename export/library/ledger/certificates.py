@@ -1,4 +1,4 @@
-"""Certificates of 2-norm optima, by a fixed amount of work: every build makes the same."""
+"""Certificates of 2-norm optima, by a fixed amount of work: every build makes the same one."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class _Effort:
         self.labels += labels
 
     def spent(self) -> bool:
-        """Whether that is enough."""
+        """Whether the work is enough."""
         return self.labels > _MOST_WORK
 
 

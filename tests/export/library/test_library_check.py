@@ -544,7 +544,7 @@ SEALED = {
     "a fact in library.solu": (
         lambda lib: rewrite(lib / "library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
         "library.solu",
-        "not what its sidecar says",
+        "not what its sidecar states",
     ),
     "a line in library.solu": (
         lambda lib: rewrite(lib / "library.solu", b"=", b"~"),
@@ -623,7 +623,7 @@ def test_sealing_alone_changes_nothing(lib):
 
 def test_a_library_as_it_was_built_is_as_it_should_be(built, capsys):
     assert invoke(["library", "verify", str(built)]) == 0
-    assert "everything is as it should be" in capsys.readouterr().out
+    assert "no defects found" in capsys.readouterr().out
     assert invoke(["library", "verify", str(built), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == []
 
@@ -642,7 +642,7 @@ def test_findings_are_one_line_each_and_the_exit_code_is_1(lib, capsys):
     said = capsys.readouterr()
     assert complaints(said.err).splitlines() == [
         (
-            "crossfield: README.md: has another SHA-256 than SHA256SUMS says; fetch it again, "
+            "crossfield: README.md: has another SHA-256 than SHA256SUMS states; fetch it again, "
             "or build the library again"
         ),
         "crossfield: notes.txt: is not in SHA256SUMS; remove it, or build the library again",

@@ -163,12 +163,12 @@ def test_another_origin_makes_an_instance_again_and_a_forged_one_is_found(mixed,
         path = folder / name
         whole = path.read_text()
         path.write_text(json.dumps(json.loads(whole) | {"origin": {"license": "CC0-1.0"}}))
-        assert "tells another origin" in " ".join(str(each) for each in verify_library(folder))
+        assert "states another origin" in " ".join(str(each) for each in verify_library(folder))
         path.write_text(whole)
     index = json.loads((folder / "library.json").read_text())
     index["release"]["authors"] = ["M. Allory"]
     (folder / "library.json").write_text(json.dumps(index))
-    assert "tells another release" in " ".join(str(each) for each in verify_library(folder))
+    assert "states another release" in " ".join(str(each) for each in verify_library(folder))
 
 
 def test_what_is_no_origin_or_release_is_refused(tmp_path):

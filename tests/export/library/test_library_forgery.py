@@ -12,8 +12,8 @@ import pytest
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents.documents import problem_of, read_library, read_sidecar
-from crossfield.export.library.ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.ledger.ledger import Record, add_record
+from crossfield.export.library.ledger.standing import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
 from forging import seal
@@ -127,7 +127,7 @@ def test_a_forged_bound_does_not_pass_as_optimal(built, tmp_path):
     solu = [line for line in (lib / "library.solu").read_text().splitlines() if MILP not in line]
     (lib / "library.solu").write_text("\n".join([*solu, f"=opt= {MILP} {best!r}"]) + "\n")
     found = changed(lib, bounds=bounds, bound=best, status="optimal", gap=0.0)
-    assert any("tells another bounds than follows" in each for each in found)
+    assert any("states another bounds than follows" in each for each in found)
 
 
 def test_a_text_that_was_changed_is_found(built, tmp_path):

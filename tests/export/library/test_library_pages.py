@@ -129,7 +129,7 @@ def text_of(site, entry):
 
 
 def ways_of(site, entry):
-    """The lines by which a page says that the entry is loaded, by program."""
+    """The lines by which a page states that the entry is loaded, by program."""
     part = re.search(r'<section aria-labelledby="loading">(.*?)</section>', text_of(site, entry), re.DOTALL)[
         1
     ]

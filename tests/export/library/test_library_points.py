@@ -12,9 +12,9 @@ from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents.documents import read_about, read_library
-from crossfield.export.library.ledger.difficulty import EASY, difficulty
 from crossfield.export.library.ledger.given import ROLES, read_points
 from crossfield.export.library.ledger.ledger import Record
+from crossfield.export.library.ledger.standing import EASY, difficulty
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
@@ -301,5 +301,5 @@ def test_two_processes_find_what_one_finds(searched, tmp_path):
     assert verify_library(lib, jobs=2, progress=two.append) == found
     assert one == two
     told = {(finding.file, finding.what) for finding in found}
-    words = "tells another difficulty than follows from its instance and the ledger"
+    words = "states another difficulty than follows from its instance and the ledger"
     assert (f"{STEM}_cubic.json", words) in told

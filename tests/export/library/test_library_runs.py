@@ -315,11 +315,11 @@ def test_a_forged_run_is_found(built, lib, tmp_path):
     def in_log(folder):
         (folder / log).write_text((folder / log).read_text() + "\n")
 
-    assert "tells another bound" in in_ledger(bound=0.1)()
+    assert "states another bound" in in_ledger(bound=0.1)()
     assert "and names none" in in_ledger(evidence="log", log=None, log_sha256=None)()
-    assert "does not say whether" in in_ledger(evidence=None)()
+    assert "does not state whether" in in_ledger(evidence=None)()
     assert "another course of the run" in in_ledger(trace=[[0.0, 0.1, 0.2]])()
-    assert f"says that {log} is of SCIP" in in_ledger(solver="SCIP")()
+    assert f"states that {log} is of SCIP" in in_ledger(solver="SCIP")()
     assert "is another file than the one its ledger names" in forged(in_log)
     assert verify_library(lib) == []
 
@@ -334,7 +334,7 @@ def test_a_status_that_does_not_follow_is_found(built, lib):
     seal(lib)
     found = " ".join(map(str, verify_library(lib)))
     for key in ("status", "solved", "claimed"):
-        assert f"tells another {key} than follows" in found
+        assert f"states another {key} than follows" in found
 
 
 # the command, and solving with every program

@@ -42,10 +42,10 @@ def test_a_size_that_does_not_suit_is_left_out_with_a_line(spec, tmp_path, capfd
     assert invoke(["library", "build", str(spec), "-o", str(folder)]) == 0
     shown = capfd.readouterr()
     names = ["cf_bottle_n003", "cf_bottle_n003_box"]
-    assert shown.out == f"{folder}: 8 entries, 2 instances left out\n"
+    assert shown.out == f"{folder}: 8 entries, 2 instances skipped\n"
     told = complaints(shown.err).splitlines()
-    assert [line for line in told if "is left out" in line] == told
-    assert all(f"{name} is left out: {COARSE}" in line for name, line in zip(names, told, strict=True))
+    assert [line for line in told if "is skipped" in line] == told
+    assert all(f"{name} is skipped: {COARSE}" in line for name, line in zip(names, told, strict=True))
     index = json.loads((folder / "library.json").read_text())
     assert index["skipped"] == dict.fromkeys(names, COARSE)
     assert {name.split("_")[1] for name in index["entries"]} == {"mouse"}
