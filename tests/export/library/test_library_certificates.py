@@ -1,4 +1,4 @@
-"""Optima of a library by certificates: shipped, told of all equivalent entries, and never believed."""
+"""Certificates of a library: shipped, valid for all equivalent entries, and always checked."""
 
 import json
 import shutil
