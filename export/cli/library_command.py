@@ -48,10 +48,9 @@ def build_command(
 ) -> None:
     """Build a library: every instance that the specification asks for, in its formulations and formats.
 
-    Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file of all
-    that is known of it.
-    What is whole in the folder is kept, so that a build that was stopped continues.
-    A size at which nothing of a sketch is left is left out, which is said.
+    Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file with all
+    facts about it. Whole files in the folder are kept, so that a build that was stopped continues.
+    A size that is too small for a sketch is skipped with a message.
     """
     from dataclasses import replace
 
@@ -66,10 +65,10 @@ def build_command(
     if as_json:
         print_json(built.document)
     elif not quiet:
-        left_out = f", {len(built.skipped)} instances left out" if built.skipped else ""
+        left_out = f", {len(built.skipped)} instances skipped" if built.skipped else ""
         print_line(f"{output}: {len(built.document['entries'])} entries{left_out}")
     for name, reason in built.skipped.items():
-        print_notice(f"{name} is left out: {reason}")
+        print_notice(f"{name} is skipped: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
         print_notice(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
@@ -96,13 +95,16 @@ def solve_command(
         typer.Option("--up-to", metavar="RUNG", help="Largest rung (class of sizes) to solve: {rungs}."),
     ] = None,
     by: Annotated[
-        str | None, typer.Option("--by", metavar="TEXT", help="Who measures, as the ledger is to say.")
+        str | None,
+        typer.Option("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
     ] = None,
-    machine: Annotated[str | None, typer.Option("--machine", metavar="TEXT", help="On what machine.")] = None,
+    machine: Annotated[
+        str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
+    ] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the installed solvers on a library; its ledger.json keeps their bounds, times and better points."""
+    """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
     from ..library.contributions.solve import solve_library
 
     with progress(quiet=quiet) as show:
@@ -136,9 +138,9 @@ def verify_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Check a library: every entry is made again and compared, with its points, files and checksums.
+    """Check a library: make every entry again and compare it, with its points, files and checksums.
 
-    The exit code is 1 when something is wrong.
+    The exit code is 1 if there is a defect.
     """
     from dataclasses import asdict
 
@@ -149,7 +151,7 @@ def verify_command(
     if as_json:
         print_json([asdict(finding) for finding in findings])
     elif not quiet and not findings:
-        print_line(f"{folder}: everything is as it should be")
+        print_line(f"{folder}: no defects found")
     for finding in findings:
         print_notice(str(finding))
     if findings:
@@ -167,10 +169,10 @@ def release_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Freeze a library that verifies as one archive, to be published; its checksum lies beside it.
+    """Verify a library and write it as one archive for publication, with its checksum beside it.
 
-    The library states its version and day: the table [release] of its specification. The same library gives
-    the same archive.
+    Version and day are those in the table [release] of its specification. The same library gives the same
+    archive.
     """
     from ..library.checking.release import release_library
 
@@ -271,9 +273,9 @@ def points_command(
     *,
     quiet: Quiet = False,
 ) -> None:
-    """Keep the points of a library: an archive of fields and certificates that a specification may name.
+    """Write the points of a library: an archive of fields and certificates for a specification.
 
-    A build of that specification then searches for nothing, and its bytes are the same on every processor.
+    A build of a specification that names it does not search, and its bytes are the same on every processor.
     """
     from ..library.ledger.given import write_points
 

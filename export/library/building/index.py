@@ -35,7 +35,7 @@ _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 def write_index(
     folder: Path, spec: Spec, plans: Iterable[InstancePlan], skipped: Mapping[str, str] | None = None
 ) -> None:
-    """Write all that is about the library as a whole; files of entries that left it are removed.
+    """Write the files about the library as a whole and remove those of entries that left it.
 
     skipped: names of instances that the specification asks for and that are not in the plans, and why.
     """
@@ -53,7 +53,7 @@ def write_index(
 
 
 def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]) -> dict[str, bytes]:
-    """The files that tell of the library as a whole, by name: texts, drawings, checker and library.solu."""
+    """Return the files about the library as a whole: texts, drawings, checkers and library.solu."""
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
@@ -64,7 +64,7 @@ def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, st
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell."""
+    """The context of the templates."""
     rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
     written = {file["format"] for each in sidecars for file in each["files"]}
     return {
@@ -88,13 +88,13 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell of a rung: sizes, share of strokes, numbers of entries, optima and grades."""
+    """Facts about a rung: sizes, share of strokes, numbers of entries, optima and grades."""
     sizes = sorted({each["source"]["size"] for each in sidecars})
     proven = sum(each["status"] == "optimal" for each in sidecars)
     density = sum(each["density"] for each in sidecars) / max(len(sidecars), 1)
     grades = Counter(each["difficulty"] for each in sidecars)
-    told = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
-    return told | {"density": f"{density:.2f}"}
+    stated = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
+    return stated | {"density": f"{density:.2f}"}
 
 
 def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:
@@ -136,7 +136,7 @@ def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
 
 
 def _remove_stale(folder: Path, present: set[str]) -> None:
-    """Remove files that an earlier build listed and this one does not have; nobody else's."""
+    """Remove files that an earlier build listed and this one lacks; other files stay."""
     sums = folder / SUMS
     if not sums.is_file():
         return

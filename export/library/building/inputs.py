@@ -1,4 +1,4 @@
-"""What each file of a library is made from, for building and verifying alike."""
+"""Inputs of each file of a library, for building and verifying alike."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .instance_task import Evidence, Preparation, Submitted
 
 
 class Inputs:
-    """The tasks of a library of these plans with this ledger and given points."""
+    """Tasks of a library with these plans, this ledger and given points."""
 
     def __init__(self, ledger: Ledger, plans: Iterable[InstancePlan], points: Points = nothing) -> None:
         self.ledger, self.plans, self.points = ledger, tuple(plans), points
@@ -27,12 +27,12 @@ class Inputs:
             self._relatives.setdefault(_relation(each), []).extend(entry.name for entry in each.entries)
 
     def preparation(self, each: InstancePlan) -> Preparation:
-        """The task of an instance. Raises InputError, InstanceError for a damaged field of the ledger."""
+        """Return the task of an instance. Raises InputError, InstanceError for a damaged file."""
         name = each.recipe.name
         return Preparation(each.recipe, self._submitted(each), self.points(name), self._certificate(name))
 
     def entries(self, each: InstancePlan, about: dict[str, Any], folder: Path) -> Iterator[Entry]:
-        """The tasks of its entries. Raises as `preparation`, InputError for a file that is missing."""
+        """Yield the tasks of its entries. Raises as `preparation`, and InputError for a missing file."""
         files = {facts["name"]: read_bytes(folder / facts["name"]) for facts in about["files"]}
         relatives, submitted = tuple(self._relatives[_relation(each)]), self._submitted(each)
         records = self._records(each)
@@ -63,5 +63,5 @@ class Inputs:
 
 
 def _relation(each: InstancePlan) -> str:
-    """What instances share whose entries may be related: everything but the gauge."""
+    """The name without the gauge, which instances with related entries share."""
     return each.recipe.name.removesuffix("_box")

@@ -1,7 +1,7 @@
-"""The first task of each instance: the instance itself and the fields that are known of it, as files.
+"""The first task of each instance: files of the instance and of its known fields.
 
-A task is a function from values to the bytes of files, so that it runs in any process on any machine; who
-started it writes the files.
+A task is a function from values to the bytes of files, so that it runs in any process on any machine. The
+caller writes the files.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ Files = dict[str, bytes]
 """Files by name, in the order in which they are to be written."""
 
 ROLES: Final = {"baseline": ".baseline.field.json", "least_1": ".l1.field.json", "least_2": ".field.json"}
-"""Fields of an instance and the ends of their files' names; equal ones share the last file."""
+"""Roles of fields and the suffixes of their files; equal fields share the last file."""
 
 
 @dataclass(frozen=True)
 class Submitted:
-    """The field of a ledger: bytes of its file, and who found it."""
+    """A field of the ledger: bytes of its file and provenance."""
 
     data: bytes
     provenance: Provenance
 
     def known(self) -> Known:
-        """The field."""
+        """Return the field."""
         return Known(field_of_json(self.data), self.provenance)
 
 
@@ -86,7 +86,7 @@ class Preparation:
 
     @property
     def sha256(self) -> str:
-        """Stands for all that its files depend on."""
+        """Digest of everything that its files depend on."""
         submitted = [
             [hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted
         ]
@@ -97,7 +97,7 @@ class Preparation:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was found of an instance: the baseline, fields of low energy, and a certificate."""
+    """Search result for an instance: the baseline, fields of low energy, and a certificate."""
 
     baseline: Known
     low: list[Known]
@@ -105,7 +105,7 @@ class _Found:
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
-    """The files of an instance as `prepare` has them, or why its size does not suit its sketch."""
+    """Return the files of an instance, or the error that its size does not suit its sketch."""
     try:
         return prepare(task)
     except NoStrokeError as error:
@@ -113,7 +113,7 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
 
 
 def prepare(task: Preparation) -> Files:
-    """The files of an instance: itself, fields, and last what is known of it; or InputError."""
+    """Return the files of an instance: itself, its fields, and last its document. Raises InputError."""
     instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
     evidence = task.evidence
@@ -136,7 +136,7 @@ def prepare(task: Preparation) -> Files:
 
 
 def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None) -> _Found:
-    """What a search, a proof unless one was submitted, and HiGHS in the 1-norm find."""
+    """Results of a search, of a proof unless one was submitted, and of HiGHS in the 1-norm."""
     searched = searched_field(instance)
     name = f"{recipe.name}.certificate.npz"
     proven = certified(searched.field, name) if recipe.prove and sent is None else None
@@ -147,7 +147,7 @@ def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None
 
 
 def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
-    """What is given, without any search; a certificate is checked."""
+    """The given points, without any search; a certificate is checked."""
     low = [given.field("least_2"), given.field("least_1")]
     return _Found(given.field("baseline"), low, given.certificate(instance) if recipe.prove else None)
 
@@ -209,13 +209,13 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
 
 
 def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
-    """What the specification states of an instance: origin and the day on which it came into the library."""
+    """Return origin and day of addition as the specification states them."""
     stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
     return {key: value for key, value in stated.items() if value}
 
 
 def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
-    """What is told of where an instance comes from."""
+    """Return the facts about the source of an instance."""
     parameters: dict[str, Any] = {
         "w_strokes": instance.stroke_coefficient,
         "w_beta": instance.skew_coefficient,

@@ -15,9 +15,8 @@ from ...formats.registry import FORMATS, carried
 from ...solutions.logs.registry import parse_log
 from ...solutions.logs.run_log import RunLog
 from ...solvers_table import SOLVERS
-from ..ledger.dual_bounds import contradicts, slack
 from ..ledger.ledger import Evidence, Record, RunStatus, log_file
-from ..ledger.standing import MAKERS
+from ..ledger.standing import MAKERS, contradicts, slack
 
 UNKNOWN: Final = "unknown"
 _ADDED: Final = 2  # columns that a program adds: for a constant, for an objective that is not linear
@@ -25,7 +24,7 @@ _ADDED: Final = 2  # columns that a program adds: for a constant, for an objecti
 
 @dataclass(frozen=True)
 class RunFacts:
-    """Facts that a submitter states about a run; None for what its log states or nobody knows.
+    """Facts that a submitter states about a run; None for what its log states or is unknown.
 
     solver, version: program; status: result; bound: dual bound; seconds: duration; threads: number of
     threads; limit: time limit in seconds; machine: processor and memory; by: submitter; date: as YYYY-MM-DD.

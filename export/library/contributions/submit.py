@@ -29,11 +29,10 @@ from ..building.index import SUMS
 from ..checking.finding import FEASIBLE, is_better
 from ..documents.documents import Library, about_file, read_about, read_library
 from ..documents.lock import locked
-from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
-from ..ledger.standing import best_of_each
+from ..ledger.standing import best_of_each, contradicts
 from .matching import Entries, Kind, kinds_of
 from .run_record import LogFile, RunFacts, run_record
 

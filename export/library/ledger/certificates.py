@@ -1,4 +1,4 @@
-"""Certificates of 2-norm optima, by a fixed amount of work: every build makes the same."""
+"""Certificates of 2-norm optima, by a fixed amount of work: every build makes the same one."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Points that a specification brings: what is known of its instances, found once and kept.
+"""Given points of a specification: results for its instances, found once and kept.
 
-A folder or an archive that holds of each instance what a library holds: INSTANCE.about.json, and the fields
-and the certificate that it lists. A build with them searches for nothing, so that its bytes do not depend on
-the processor. What is about another instance than the one that is built does not count.
+A folder or an archive holds the same files per instance as a library: INSTANCE.about.json, and the fields
+and the certificate that it lists. A build with them does not search, so that its bytes do not depend on the
+processor. Results for another instance than the built one do not count.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _DATE: Final = (1980, 1, 1, 0, 0, 0)  # of every member of an archive, so that i
 
 @dataclass(frozen=True)
 class Given:
-    """What is known of an instance: its document, the files that this lists, a digest of both."""
+    """Results for an instance: its document, the listed files, a digest of both."""
 
     about: dict[str, Any]
     files: dict[str, bytes]
@@ -44,7 +44,7 @@ class Given:
         return str(self.about["instance"]["sha256"])
 
     def field(self, role: str) -> Known:
-        """The field of a role of ROLES. Raises InstanceError for a damaged one."""
+        """Return the field of a role of ROLES. Raises InstanceError for a damaged one."""
         facts = self.about["fields"][role]
         return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
@@ -69,22 +69,22 @@ class Given:
 
 
 Points = Callable[[str], Given | None]
-"""What is known of the instance of a name, None where nothing is."""
+"""Results for the instance of a name, None without any."""
 
 
 def nothing(_instance: str) -> None:
-    """Nothing is known of any instance."""
+    """Return no results for any instance."""
 
 
 def read_points(path: str | Path) -> Points:
-    """The points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
+    """Read the points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
     with opened(path) as folder:
         known = dict(_named(folder, each) for each in sorted(folder.glob("*.about.json")))
     return known.get
 
 
 def _named(folder: Path, path: Path) -> tuple[str, Given]:
-    """The name of the instance that a document is about, which the file is named after, and what is known."""
+    """The name of a document's instance and the results for it."""
     about = read_about(path)
     if path.name != about_file(about["name"]):
         raise InputError(f"is about {about['name']}; its name must be {about_file(about['name'])}", file=path)
@@ -92,7 +92,7 @@ def _named(folder: Path, path: Path) -> tuple[str, Given]:
 
 
 def points_of(folder: Path) -> Points:
-    """The points of a library that was built with given ones: its own are at least as good."""
+    """Return the points of a library that was built with given ones, which are at least as good."""
 
     def of(instance: str) -> Given | None:
         try:
@@ -105,7 +105,7 @@ def points_of(folder: Path) -> Points:
 
 
 def write_points(folder: str | Path, path: str | Path) -> int:
-    """The number of instances of a library whose points are now in an archive (.zip).
+    """Write the points of a library to an archive (.zip) and return the number of instances.
 
     The same points give the same bytes. Raises InputError where there is no library or a file is damaged,
     InstanceError, OutputError.
@@ -123,7 +123,7 @@ def write_points(folder: str | Path, path: str | Path) -> int:
 
 
 def _given(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Given:
-    """What a folder holds of an instance. Raises InputError for a file that is missing or another one."""
+    """The results for an instance in a folder. Raises InputError for a missing or another file."""
     listed = [each for each in about["files"] if each["name"] != about["instance"]["file"]]
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
         raise InputError(

@@ -1,4 +1,4 @@
-"""The ledger: what solvers found, measured once and kept. An input of every build, never made by one.
+"""The ledger: results of solvers, measured once and kept. It is an input of every build.
 
 ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A
 record carries the SHA-256 of the problem it is about, and counts for that problem alone.
@@ -27,9 +27,9 @@ FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-"""What a run came to; of a submitted point `feasible`."""
+"""Result of a run; `feasible` for a submitted point."""
 Evidence = Literal["log", "word"]
-"""What a submitted bound rests on: the log beside the ledger, or the word of whoever sent it."""
+"""Evidence of a submitted bound: the log beside the ledger, or the word of its submitter."""
 _LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
@@ -239,12 +239,12 @@ def _document(record: Record) -> dict[str, Any]:
 
 
 def log_file(entry: str, solver: str, sha256: str) -> str:
-    """Name of the file that holds the log of a run of a solver, by its name in the table."""
+    """Return the name of the file of a log. solver: its name in the table of solvers."""
     return f"{entry}.{solver}.{sha256[:12]}.log"
 
 
 def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
-    """The ledger of a folder, empty when there is none. Raises InputError, InstanceError, naming the file."""
+    """Read the ledger of a folder; an empty one without a file. Raises InputError, InstanceError."""
     path = Path(folder) / name
     if not path.exists():
         return Ledger(Path(folder))

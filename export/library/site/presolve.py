@@ -1,4 +1,4 @@
-"""What HiGHS's presolve leaves of a model file."""
+"""Size of a model file before and after the presolve of HiGHS."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Presolved:
 
 
 def presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
-    """What HiGHS's presolve leaves of an entry's .mps or .lp; None for classes that it does not presolve.
+    """Return the size of an entry's .mps or .lp before and after presolve; None for other classes.
 
     None, too, where there is no such file, or HiGHS does not read it.
     """

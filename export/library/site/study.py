@@ -1,4 +1,4 @@
-"""What the page of an entry shows beside its sidecar: structure, presolve, a plot of runs, how to load it."""
+"""Content of an entry's page beyond its sidecar: structure, presolve, a plot of runs, loading."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .structure import Blocks, blocks, hessian, matrix
 
 @dataclass(frozen=True)
 class Study:
-    """What is worked out of an entry. matrix, hessian: None without any entry; blocks: of the Hessian.
+    """Results computed from an entry. matrix, hessian: None if empty; blocks: of the Hessian.
 
-    plot: the picture of runs over time, empty where no run tells of them.
+    plot: the picture of runs over time, empty without traces.
     """
 
     matrix: Pattern | None
@@ -31,7 +31,7 @@ class Study:
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
-    """What is worked out of an entry; its pictures, NAME.matrix.svg and so on, are written.
+    """Compute the content of an entry's page and write its pictures, NAME.matrix.svg and so on.
 
     Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
     names, and OutputError when a picture cannot be written.
@@ -55,7 +55,7 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
 
 
 def _plot(entry: dict[str, Any], pictures: Path) -> str:
-    """The name of the plot of an entry's runs, which is written; empty where none has a trace."""
+    """Write the plot of an entry's runs and return its name; empty without traces."""
     curves = [
         curve(f"{run['solver']} {run.get('version', '')}".strip(), run["trace"])
         for run in entry.get("runs", ())

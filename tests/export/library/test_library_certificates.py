@@ -1,4 +1,4 @@
-"""Optima of a library by certificates: shipped, told of all equivalent entries, and never believed."""
+"""Certificates of a library: shipped, valid for all equivalent entries, and always checked."""
 
 import json
 import shutil
@@ -94,9 +94,9 @@ def test_the_same_certificate_is_made_twice(built, tmp_path):
 @pytest.mark.parametrize(
     "key, value, words",
     [
-        ("bound", 99.0, "tells another status, bound or energy of its certificate"),
-        ("status", "gap", "tells another status, bound or energy of its certificate"),
-        ("energy", 99.0, "tells another status, bound or energy of its certificate"),
+        ("bound", 99.0, "states another status, bound or energy of its certificate"),
+        ("status", "gap", "states another status, bound or energy of its certificate"),
+        ("energy", 99.0, "states another status, bound or energy of its certificate"),
         ("file", "cf_rand_n003_s2.certificate.npz", "as its certificate and does not list it"),
     ],
 )
@@ -116,7 +116,7 @@ def test_a_forged_certificate_is_found(lib):
     proof = cf.prove(worse.instance, jobs=1)
     weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
     assert write_certificate(weak, lib / CERTIFICATE).status == "gap"
-    assert "tells another status, bound or energy" in found(lib)[name]
+    assert "states another status, bound or energy" in found(lib)[name]
     half = len(good) // 2
     (lib / CERTIFICATE).write_bytes(good[:half] + bytes([good[half] ^ 1]) + good[half + 1 :])
     assert CERTIFICATE in found(lib)
@@ -125,7 +125,7 @@ def test_a_forged_certificate_is_found(lib):
 @pytest.mark.parametrize("key, value", [("bound", 99.0), ("status", "gap"), ("energy", 99.0)])
 def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, value):
     instance = cf.read_instance(lib / f"{STEM}.instance.json")
-    assert read_points(lib)(STEM).certificate(instance)[1]["status"] == "optimal"
+    assert read_points(lib)(STEM).certificate(instance).facts["status"] == "optimal"
     change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
     with pytest.raises(InputError, match=f"{STEM}.about.json states another status, bound or energy"):
         read_points(lib)(STEM).certificate(instance)

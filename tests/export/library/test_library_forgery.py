@@ -1,6 +1,4 @@
-"""Every field of a library, forged in turn under new checksums, is found:
-nothing is believed that can be computed again.
-"""
+"""Every forged value of a library is found, also under new checksums, because it is recomputed."""
 
 import copy
 import json
@@ -12,8 +10,8 @@ import pytest
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents.documents import problem_of, read_library, read_sidecar
-from crossfield.export.library.ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.ledger.ledger import Record, add_record
+from crossfield.export.library.ledger.standing import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
 from forging import seal
@@ -67,7 +65,7 @@ def built(tmp_path_factory):
 
 
 def forgeries(value, path=()):
-    """Copies of a document, each with one value changed to another of its type, and where."""
+    """Copies of a document with one value changed to another of its type, and its place."""
     if isinstance(value, dict):
         for key, part in value.items():
             for where, changed in forgeries(part, (*path, key)):
@@ -119,7 +117,7 @@ def changed(lib: Path, **given):
 
 
 def test_a_forged_bound_does_not_pass_as_optimal(built, tmp_path):
-    """All that follows from it is forged along: bounds, status, gap, library.solu and the checksums."""
+    """Bounds, status, gap, library.solu and the checksums are forged consistently."""
     lib = shutil.copytree(built, tmp_path / "lib")
     sidecar = json.loads((lib / f"{MILP}.json").read_text())
     best = sidecar["best"]["objective"]
@@ -127,7 +125,7 @@ def test_a_forged_bound_does_not_pass_as_optimal(built, tmp_path):
     solu = [line for line in (lib / "library.solu").read_text().splitlines() if MILP not in line]
     (lib / "library.solu").write_text("\n".join([*solu, f"=opt= {MILP} {best!r}"]) + "\n")
     found = changed(lib, bounds=bounds, bound=best, status="optimal", gap=0.0)
-    assert any("tells another bounds than follows" in each for each in found)
+    assert any("states another bounds than follows" in each for each in found)
 
 
 def test_a_text_that_was_changed_is_found(built, tmp_path):
@@ -196,7 +194,7 @@ def test_auxiliary_variables_are_computed_again(built, tmp_path):
 
 @pytest.mark.parametrize("block", ["alpha", "beta", "p1", "p2"])
 def test_angles_and_jumps_are_not_mended(block, built, tmp_path):
-    """What the answer is about has to be feasible as it stands."""
+    """Angles and jumps of a solution have to be feasible without corrections."""
     lib = shutil.copytree(built, tmp_path / "lib")
     problem, point = point_of(lib)
     at = problem.blocks[block].slice

@@ -1,4 +1,4 @@
-"""Runs that others send in: what is kept of them, what is refused, and what they show."""
+"""Submitted runs: records, refusals, and the status of entries that follows."""
 
 import json
 import re
@@ -56,7 +56,7 @@ def built(tmp_path_factory):
         for option, value in (
             ("output_flag", True), ("log_to_console", False), ("log_file", str(folder / f"{entry}.log")),
             ("threads", 1), ("mip_rel_gap", 0.0), ("mip_abs_gap", 0.0), ("mip_feasibility_tolerance", 1e-9),
-            ("primal_feasibility_tolerance", 1e-9),
+            ("primal_feasibility_tolerance", 1e-9)
         ):  # fmt: skip
             highs.setOptionValue(option, value)
         highs.readModel(str(library.folder / f"{entry}.mps"))
@@ -81,7 +81,7 @@ def record_of(lib, solver, name=MILP, **given):
     return Record(name, sidecar["problem_sha256"], solver, "1", **facts)
 
 
-# what is kept
+# records
 
 
 def test_a_run_is_kept_with_its_log_and_claims_the_optimum(built, lib):
@@ -143,10 +143,10 @@ def test_a_build_takes_runs_and_logs_of_its_ledger_over(built, lib, tmp_path):
     assert verify_library(again) == []
 
 
-# what is refused
+# refusals
 
 
-def test_what_cannot_be_is_refused_in_one_line_and_nothing_changes(built, lib, tmp_path):
+def test_an_invalid_run_is_refused_in_one_line_and_changes_nothing(built, lib, tmp_path):
     best = entry_of(lib)["best"]["objective"]
     log = (built / f"{MILP}.log").read_text()
     higher = re.sub(r"(Dual bound +)\S+", rf"\g<1>{2 * best}", log)
@@ -223,7 +223,7 @@ def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib
     assert submit_one(lib, entry=MILP, solver="scip", bound=0.0).outcome == "accepted"
 
 
-def test_what_is_stated_of_a_log_takes_the_place_of_what_it_says(lib, tmp_path):
+def test_stated_facts_replace_those_of_the_log(lib, tmp_path):
     (tmp_path / "a.log").write_text(GUROBI.replace("TimeLimit  60", "TimeLimit  -8"))
     submit_one(lib, tmp_path / "a.log", entry=MILP, limit=8.0)
     assert entry_of(lib)["runs"][0]["limit"] == 8.0
@@ -239,7 +239,7 @@ def test_a_point_with_a_time_that_cannot_be_is_refused_before_anything_is_writte
     assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
 
 
-# what shows an optimum
+# optima
 
 
 def test_words_and_unknown_programs_never_solve_an_entry(lib):
@@ -284,7 +284,7 @@ def test_agreement_needs_three_makers_whatever_the_order():
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
 
-# what a verification finds
+# findings
 
 
 @pytest.mark.slow
@@ -315,11 +315,11 @@ def test_a_forged_run_is_found(built, lib, tmp_path):
     def in_log(folder):
         (folder / log).write_text((folder / log).read_text() + "\n")
 
-    assert "tells another bound" in in_ledger(bound=0.1)()
+    assert "states another bound" in in_ledger(bound=0.1)()
     assert "and names none" in in_ledger(evidence="log", log=None, log_sha256=None)()
-    assert "does not say whether" in in_ledger(evidence=None)()
+    assert "does not state whether" in in_ledger(evidence=None)()
     assert "another course of the run" in in_ledger(trace=[[0.0, 0.1, 0.2]])()
-    assert f"says that {log} is of SCIP" in in_ledger(solver="SCIP")()
+    assert f"states that {log} is of SCIP" in in_ledger(solver="SCIP")()
     assert "is another file than the one its ledger names" in forged(in_log)
     assert verify_library(lib) == []
 
@@ -334,13 +334,13 @@ def test_a_status_that_does_not_follow_is_found(built, lib):
     seal(lib)
     found = " ".join(map(str, verify_library(lib)))
     for key in ("status", "solved", "claimed"):
-        assert f"tells another {key} than follows" in found
+        assert f"states another {key} than follows" in found
 
 
 # the command, and solving with every program
 
 
-def test_the_command_says_in_one_line_what_happened(built, lib, capfd):
+def test_the_command_reports_results_and_refusals(built, lib, capfd):
     given = ["library", "submit", str(lib)]
     assert invoke([*given, str(built / f"{MILP}.log"), "--by", "me"]) == 0
     assert "claimed" in capfd.readouterr().out
@@ -351,7 +351,7 @@ def test_the_command_says_in_one_line_what_happened(built, lib, capfd):
 
 
 @pytest.mark.slow
-def test_every_installed_program_solves_what_it_takes(lib):
+def test_every_installed_program_solves_its_problems(lib):
     names = [
         name for name in ("gurobi", "cplex", "xpress", "scip", "cbc", "glpk") if not SOLVERS[name].missing
     ]
@@ -393,7 +393,7 @@ def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch, hidden):
 
 
 def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(built, lib):
-    """The library goes on to be built after a solver's tolerances went too far."""
+    """The library can still be built after a solver has exceeded its tolerances."""
     submit_one(lib, built / f"{OTHER}.sol")
     best = entry_of(lib, OTHER)["best"]["objective"]
     wrong = record_of(lib, "Xpress", OTHER, bound=best + 2e-5)

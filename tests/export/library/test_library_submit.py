@@ -152,13 +152,7 @@ def test_files_of_all_kinds_in_one_call_are_one_rebuild_with_the_result_of_singl
     assert [(each.outcome, each.entries, each.objective) for each in found] == [
         (each.outcome, each.entries, each.objective) for each in expected
     ]
-    assert [each.outcome for each in found] == [
-        "accepted",
-        "not better",
-        "accepted",
-        "accepted",
-        "accepted",
-    ]
+    assert [each.outcome for each in found] == ["accepted", "not better", "accepted", "accepted", "accepted"]
     differing = [name for name, data in content(single).items() if content(lib)[name] != data]
     assert (differing, len(list(lib.iterdir()))) == ([], len(list(single.iterdir())))
     assert verify_library(lib) == []
@@ -254,7 +248,7 @@ def test_kinds_are_recognised_by_content(sent, lib, tmp_path):
     assert kinds_of(both) == {"solution", "log"}
 
 
-def test_what_belongs_to_no_single_run_is_refused_as_a_whole(lib, sent):
+def test_a_submission_without_files_or_with_a_bound_for_several_is_refused(lib, sent):
     before = content(lib)
     for files, facts, words in (
         ([], {}, "there is nothing to submit"),
