@@ -60,7 +60,7 @@ def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, st
     checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
-    return texts | drawings | checkers | {SOLU: "".join(_solu(sidecars)).encode()}
+    return texts | drawings | checkers | {SOLU: _optima(sidecars)}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -97,13 +97,15 @@ def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
     return stated | {"density": f"{density:.2f}"}
 
 
-def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:
-    """Lines as MINLPLib and SCIP have them: =opt= where the optimum is proven, else =best= and =bestdual=."""
+def _optima(sidecars: list[dict[str, Any]]) -> bytes:
+    """The content of library.solu as MINLPLib and SCIP have it: =opt= or =best=, and =bestdual=."""
+    lines = []
     for each in sidecars:
         tag = "=opt=" if each["status"] == "optimal" else "=best="
-        yield f"{tag} {each['name']} {number(each['best']['objective'])}\n"
+        lines.append(f"{tag} {each['name']} {number(each['best']['objective'])}\n")
         if each["status"] != "optimal" and each["bound"] is not None:
-            yield f"=bestdual= {each['name']} {number(each['bound'])}\n"
+            lines.append(f"=bestdual= {each['name']} {number(each['bound'])}\n")
+    return "".join(lines).encode()
 
 
 def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:

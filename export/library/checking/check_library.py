@@ -11,14 +11,12 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field
 from ....models.processes.progress import Progress, silent
-from ....models.proof import check_certificate
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
@@ -26,7 +24,6 @@ from ..building.entry_task import Entry
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..documents import check_point
 from ..documents.archive import opened
 from ..documents.citation import cited
 from ..documents.documents import INDEX, Library, about_file, read_about, read_library, read_sidecar
@@ -50,7 +47,6 @@ Checked = tuple[dict[str, Any] | None, list[Finding]]
 
 _AHEAD: Final = 16  # entries a process that are handed out at once: the first one may be the slowest
 _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
-_FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
@@ -163,7 +159,6 @@ class _Verification:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
-        yield from self._checker(CHECKER, check_point, library)
 
     def _release(self, library: Library) -> Iterator[Finding]:
         """A release that does not follow from the specification."""
@@ -183,14 +178,8 @@ class _Verification:
                 if str(error) != f"{name}: {stated}":
                     yield Finding(INDEX, f"states another reason for leaving {name} out than there is")
 
-    def _checker(self, name: str, ours: ModuleType, library: Library) -> Iterator[Finding]:
-        """A checker that differs from that of the version which made the library."""
-        known = name in self.present and library.document["generator"] == generator()
-        if known and read_bytes(self.folder / name) != read_bytes(Path(str(ours.__file__))):
-            yield Finding(name, f"is not the checker of {generator()}")
-
     def _entries(self, library: Library) -> Iterator[Finding]:
-        """Findings about ledger, instances, entries and library.solu."""
+        """Findings about ledger, instances and entries, and about texts if there are none before."""
         try:
             ledger = read_ledger(self.folder)
         except CrossfieldError as error:
@@ -204,9 +193,6 @@ class _Verification:
             sidecars += [] if sidecar is None else [sidecar]
             sound = sound and not wrong
         yield from self._instances(sidecars, inputs)
-        if CERTIFICATES in self.known:
-            yield from self._checker(CERTIFICATES, check_certificate, library)
-        yield from self._solu(sidecars)
         if sound and len(sidecars) == len(names):
             yield from self._texts(library, sidecars)
 
@@ -231,14 +217,14 @@ class _Verification:
         return None
 
     def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Texts and drawings that differ from those made of the sidecars."""
+        """Texts, drawings, checkers and library.solu that differ from those made of sound sidecars."""
         if library.document["generator"] != generator():
             return
         try:
             made = general(library.spec, sidecars, library.skipped)
         except CrossfieldError:
             return  # reported with the index
-        for name in sorted({*made} - {CHECKER, CERTIFICATES, SOLU}):
+        for name in sorted(made):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")
 
@@ -395,27 +381,6 @@ class _Verification:
         field = read_field(self.folder / name)
         return field if field.instance.sha256 == about["instance"]["sha256"] else None
 
-    def _solu(self, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Lines of library.solu that differ from the sidecars."""
-        if SOLU not in self.present:
-            return
-        stated: dict[tuple[str, str], float] = {}
-        for number, line in enumerate(_text(self.folder / SOLU).splitlines(), 1):
-            fact = _FACT.fullmatch(line)
-            if fact is None or (fact[2], fact[1]) in stated or not _is_number(fact[3]):
-                yield Finding(SOLU, f"line {number} is no fact, or there twice")
-            else:
-                stated[fact[2], fact[1]] = float(fact[3])
-        expected = {}
-        for sidecar in sidecars:
-            proven = sidecar["status"] == "optimal"
-            if sidecar["best"] is not None:
-                expected[sidecar["name"], "opt" if proven else "best"] = sidecar["best"]["objective"]
-            if not proven and sidecar["bound"] is not None:
-                expected[sidecar["name"], "bestdual"] = sidecar["bound"]
-        for name, tag in sorted({key for key, _ in stated.items() ^ expected.items()}):
-            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar states")
-
 
 def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None) -> list[Finding]:
     """Findings about an entry, even if its sidecar holds nonsense."""
@@ -435,11 +400,3 @@ def _ended(known: Checked, future: Future[list[Finding]] | None) -> Checked:
 
 def _text(path: Path) -> str:
     return read_bytes(path).decode("utf-8", "replace")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

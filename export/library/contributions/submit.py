@@ -408,7 +408,10 @@ class _Session:
         if path.suffix.lower() in (".rawfield", ".npz"):
             return read_field(path, on=on)
         with naming(path):
-            found = field_of_json(read_bytes(path))
+            data = read_bytes(path)
+            if data.startswith(b"PK"):
+                raise InputError("is an .npz by its content; let its name end in .npz")
+            found = field_of_json(data)
             if on is not None:
                 found.check_instance(on)
             return found

@@ -156,7 +156,7 @@ def test_points_with_a_damaged_document_are_refused(lib, change_it, words):
 
 def test_a_forged_or_missing_checker_is_found(lib):
     (lib / "check_certificate.py").write_text("print('the certificate is valid')\n")
-    assert "is not the checker" in found(lib)["check_certificate.py"]
+    assert "is not what follows" in found(lib)["check_certificate.py"]
     (lib / "check_certificate.py").unlink()
     assert "is missing" in found(lib)["check_certificate.py"]
 

@@ -497,10 +497,14 @@ SEALED = {
     "a fact in library.solu": (
         text("library.solu", b"= " + MILP[:-5].encode(), b"= " + MIQP[:-5].encode()),
         "library.solu",
-        "not what its sidecar states",
+        "is not what follows",
     ),
-    "a line in library.solu": (text("library.solu", b"=", b"~"), "library.solu", "no fact"),
-    "another checker": (text("check_point.py", b"1e-8", b"1e-1"), "check_point.py", "is not the checker"),
+    "a line in library.solu": (
+        text("library.solu", b"=", b"~"),
+        "library.solu",
+        "is not what follows",
+    ),
+    "another checker": (text("check_point.py", b"1e-8", b"1e-1"), "check_point.py", "is not what follows"),
     "a field of another energy": (
         edit(f"{STEM}.about.json", fields__least_2__energy_2norm=0.0),
         f"{STEM}.about.json",
