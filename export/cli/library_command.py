@@ -234,8 +234,7 @@ def submit_command(
     if as_json:
         print_json([_submitted(each) for each in found])
     elif not quiet:
-        columns = ("file", "result", "entry", "objective", "bound", "now")
-        show_table(str(folder), columns, list(map(_row, found)), numbers=("objective", "bound"))
+        show_table(str(folder), ("file", "result", "entry", "now"), list(map(_row, found)))
     refused = [each for each in found if each.error is not None]
     for each in refused:
         print_notice(str(each.error))
@@ -254,14 +253,12 @@ def _submitted(result: Submission) -> dict[str, object]:
 
 
 def _row(result: Submission) -> list[str]:
-    """A row of the table of results."""
+    """A row of the table of results, which leaves numbers to JSON so that it fits 80 columns."""
     more = f" +{len(result.entries) - 1}" if result.entries[1:] else ""
-    numbers = ("" if value is None else f"{value:.6g}" for value in (result.objective, result.bound))
     return [
         " ".join(path.name for path in result.files),
         result.outcome,
         f"{result.entries[0]}{more}" if result.entries else "",
-        *numbers,
         result.status or "",
     ]
 

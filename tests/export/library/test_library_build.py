@@ -601,7 +601,8 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
 
 
 @pytest.mark.slow
-def test_a_library_is_brought_up_to_date_from_itself_alone(searched, tmp_path, short_searches):
+def test_a_library_is_brought_up_to_date_from_itself_alone(searched, tmp_path, monkeypatch):
+    monkeypatch.setattr(known_points, "_ROUNDS", 1)
     copy = shutil.copytree(searched.folder, tmp_path / "library")
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_own_n004.about.json").unlink()
@@ -699,9 +700,11 @@ def better_field(library, name):
 
 @pytest.mark.slow
 def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_elsewhere(
-    built, spec, copy, tmp_path
+    searched, tmp_path, monkeypatch
 ):
-    document, problem, field = better_field(built, "cf_rand_n006_s2_miqp")
+    monkeypatch.setattr(known_points, "_ROUNDS", 1)
+    copy = shutil.copytree(searched.folder, tmp_path / "library")
+    document, problem, field = better_field(searched, "cf_rand_n006_s2_miqp")
     objective = problem.objective_value(complete_point(problem, field))
     assert objective < document["best"]["objective"] - 1e-6
     record = Record(
@@ -717,7 +720,7 @@ def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_else
     assert library.entry("cf_rand_n006_s2_bilin")["best"]["objective"] <= objective + 1e-9
     assert all("cf_rand_n006_s2" in line for line in made[:-1])
     models = [name for name in content(copy) if re.search(r"\.(nl|mps|gms|lp)(\.gz)?$", name)]
-    assert all((copy / name).read_bytes() == (built.folder / name).read_bytes() for name in models)
+    assert all((copy / name).read_bytes() == (searched.folder / name).read_bytes() for name in models)
 
     beside = tmp_path / "beside"
     beside.mkdir()

@@ -108,7 +108,7 @@ def test_a_forged_claim_is_found(lib, key, value, words):
 
 
 def test_a_forged_certificate_is_found(lib):
-    """Of another instance, of a worse field that claims the same, and with bytes that were changed."""
+    """The certificate of another instance, one of a worse field with the same claim, and changed bytes."""
     good, name = (lib / CERTIFICATE).read_bytes(), f"{STEM}.about.json"
     shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
     assert found(lib)[CERTIFICATE] == f"is not a certificate of {STEM}"
