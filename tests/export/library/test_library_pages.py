@@ -99,7 +99,7 @@ def site(library, tmp_path_factory):
 @pytest.fixture(scope="module")
 def detailed(library, tmp_path_factory):
     """The site of a library with one entry that has every optional fact, and others without any."""
-    folder = Path(shutil.copytree(library.folder, tmp_path_factory.mktemp("stated") / "library"))
+    folder = Path(shutil.copytree(library.folder, tmp_path_factory.mktemp("detailed") / "library"))
     path = folder / f"{ENTRY}.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | TOLD))
     about = folder / f"{INSTANCE}.about.json"
@@ -298,8 +298,8 @@ def test_the_table_of_entries_is_filtered_by_difficulty_where_it_is_known(librar
 
 
 @pytest.fixture(scope="module")
-def address(stated):
-    with served(stated) as address:
+def address(detailed):
+    with served(detailed) as address:
         yield address
 
 
