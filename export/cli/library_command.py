@@ -1,19 +1,19 @@
-"""The commands of `library`: build, solve, verify, release, points, submit-point, submit-run, site."""
+"""The commands of `library`: build, solve, verify, release, submit, points, site."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .help_texts import Command
 from .options import Folder, Json, Processes, Quiet, Seconds
-from .output import print_json as say_json
-from .output import print_line as say
-from .output import print_notice as complain
-from .output import progress
+from .output import print_json, print_line, print_notice, progress, show_table
+
+if TYPE_CHECKING:
+    from ..library.contributions.submit import Submission
 
 library = typer.Typer(
     help="Build, check, solve and show a library: instances in every formulation, with best known points.",
@@ -48,10 +48,9 @@ def build_command(
 ) -> None:
     """Build a library: every instance that the specification asks for, in its formulations and formats.
 
-    Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file of all
-    that is known of it.
-    What is whole in the folder is kept, so that a build that was stopped continues.
-    A size at which nothing of a sketch is left is left out, which is said.
+    Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file with all
+    facts about it. Whole files in the folder are kept, so that a build that was stopped continues.
+    A size that is too small for a sketch is skipped with a message.
     """
     from dataclasses import replace
 
@@ -64,14 +63,14 @@ def build_command(
         wanted = replace(wanted, points=None) if search else wanted
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
     if as_json:
-        say_json(built.document)
+        print_json(built.document)
     elif not quiet:
-        left_out = f", {len(built.skipped)} instances left out" if built.skipped else ""
-        say(f"{output}: {len(built.document['entries'])} entries{left_out}")
+        left_out = f", {len(built.skipped)} instances skipped" if built.skipped else ""
+        print_line(f"{output}: {len(built.document['entries'])} entries{left_out}")
     for name, reason in built.skipped.items():
-        complain(f"{name} is left out: {reason}")
+        print_notice(f"{name} is skipped: {reason}")
     if stale := sorted({record.entry for record in unmatched(built)}):
-        complain(
+        print_notice(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
             f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
             " `crossfield library solve`"
@@ -96,13 +95,16 @@ def solve_command(
         typer.Option("--up-to", metavar="RUNG", help="Largest rung (class of sizes) to solve: {rungs}."),
     ] = None,
     by: Annotated[
-        str | None, typer.Option("--by", metavar="TEXT", help="Who measures, as the ledger is to say.")
+        str | None,
+        typer.Option("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
     ] = None,
-    machine: Annotated[str | None, typer.Option("--machine", metavar="TEXT", help="On what machine.")] = None,
+    machine: Annotated[
+        str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
+    ] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the installed solvers on a library; its ledger.json keeps their bounds, times and better points."""
+    """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
     from ..library.contributions.solve import solve_library
 
     with progress(quiet=quiet) as show:
@@ -116,10 +118,10 @@ def solve_command(
             progress=show,
         )
     if as_json:
-        say_json(records)
+        print_json(records)
     elif not quiet:
         failed = sum(record["status"] == "no point" for record in records)
-        say(
+        print_line(
             f"{folder / 'ledger.json'}: {len(records)} new records"
             + (f", {failed} of them of runs that found no point" if failed else "")
         )
@@ -136,9 +138,9 @@ def verify_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Check a library: every entry is made again and compared, with its points, files and checksums.
+    """Check a library: make every entry again and compare it, with its points, files and checksums.
 
-    The exit code is 1 when something is wrong.
+    The exit code is 1 if there is a defect.
     """
     from dataclasses import asdict
 
@@ -147,11 +149,11 @@ def verify_command(
     with progress(quiet=quiet) as show:
         findings = verify_library(folder, jobs=jobs, progress=show)
     if as_json:
-        say_json([asdict(finding) for finding in findings])
+        print_json([asdict(finding) for finding in findings])
     elif not quiet and not findings:
-        say(f"{folder}: everything is as it should be")
+        print_line(f"{folder}: no defects found")
     for finding in findings:
-        complain(str(finding))
+        print_notice(str(finding))
     if findings:
         raise typer.Exit(1)
 
@@ -167,100 +169,98 @@ def release_command(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Freeze a library that verifies as one archive, to be published; its checksum lies beside it.
+    """Verify a library and write it as one archive for publication, with its checksum beside it.
 
-    The library states its version and day: the table [release] of its specification. The same library gives
-    the same archive.
+    Version and day are those in the table [release] of its specification. The same library gives the same
+    archive.
     """
     from ..library.checking.release import release_library
 
     with progress(quiet=quiet) as show:
         frozen = release_library(folder, output, jobs=jobs, progress=show)
     if as_json:
-        say_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
+        print_json({"file": str(frozen.file), "sha256": frozen.sha256, "files": frozen.files})
     elif not quiet:
-        say(f"{frozen.file}: {frozen.files} files, SHA-256 {frozen.sha256}")
+        print_line(f"{frozen.file}: {frozen.files} files, SHA-256 {frozen.sha256}")
 
 
-@command("submit-point")
+@command("submit")
 def submit_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Solution file of {answers}.")],
-    folder: Annotated[Path, typer.Option("--library", metavar="DIR", help="The library.")],
+    folder: Library,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILE...", help="Files and folders; none with --entry and --bound."),
+    ] = None,
     *,
     entry: Annotated[
         str | None,
         typer.Option(
-            "--entry", metavar="NAME", help="The entry that it solves; by default as the file is named."
+            "--entry", metavar="NAME", help="Entry of all files; by default each file shows its own."
         ),
     ] = None,
     solver: Annotated[
-        str | None, typer.Option("--solver", metavar="NAME", help="The solver that found the point.")
+        str | None, typer.Option("--solver", metavar="NAME", help="Solver that found the points.")
     ] = None,
-    version: Annotated[
-        str | None, typer.Option("--version", metavar="TEXT", help="The solver's version.")
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.0, help="How long the solver took.")
-    ] = None,
-    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Who submits the point.")] = None,
-    quiet: Quiet = False,
-) -> None:
-    """Check a solver's solution of an entry, and keep it with who found it when it is the best so far."""
-    from ..library.contributions.submit import submit_point
-
-    with progress(quiet=quiet) as show:
-        happened = submit_point(
-            file, folder, entry=entry, solver=solver, version=version, seconds=seconds, by=by, progress=show
-        )
-    if not quiet:
-        say(str(happened))
-
-
-@command("submit-run")
-def submit_run_command(
-    folder: Annotated[Path, typer.Option("--library", metavar="DIR", help="The library.")],
-    *,
-    point: Annotated[
-        Path | None, typer.Option("--point", metavar="FILE", help="The solver's solution file.")
-    ] = None,
-    log: Annotated[Path | None, typer.Option("--log", metavar="FILE", help="The log of {logs}.")] = None,
-    entry: Annotated[
-        str | None,
-        typer.Option("--entry", metavar="NAME", help="The entry that it is of; by default as the files say."),
-    ] = None,
-    bound: Annotated[
-        float | None, typer.Option("--bound", help="The dual bound; by default as the log tells it.")
-    ] = None,
-    status: Annotated[
-        str | None, typer.Option("--status", help="What the run came to: {run statuses}.")
-    ] = None,
-    solver: Annotated[str | None, typer.Option("--solver", metavar="NAME", help="The solver.")] = None,
     version: Annotated[str | None, typer.Option("--version", metavar="TEXT", help="Its version.")] = None,
-    seconds: Annotated[float | None, typer.Option("--seconds", help="How long it took.")] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads it used.")] = None,
-    limit: Annotated[float | None, typer.Option("--limit", help="Seconds it was allowed.")] = None,
+    status: Annotated[str | None, typer.Option("--status", help="Result of the run: {run statuses}.")] = None,
+    bound: Annotated[
+        float | None, typer.Option("--bound", help="Dual bound of the run; by default that of its log.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="Duration of the run.")] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Number of threads.")] = None,
+    limit: Annotated[float | None, typer.Option("--limit", help="Time limit in seconds.")] = None,
     machine: Annotated[
-        str | None, typer.Option("--machine", metavar="TEXT", help="What it ran on: processor, memory.")
+        str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
     ] = None,
-    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Who submits the run.")] = None,
-    date: Annotated[
-        str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="The day of the run.")
-    ] = None,
+    by: Annotated[str | None, typer.Option("--by", metavar="TEXT", help="Name of the submitter.")] = None,
+    date: Annotated[str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
     quiet: Quiet = False,
+    as_json: Json = False,
 ) -> None:
-    """Check a run of a solver (bound, point or both) and keep it, with its log, when it is its solver's best.
+    """Check files against a library, keep what improves it, and rebuild what depends on them once.
 
-    Of --point, --log and --bound at least one is needed. A bound above a feasible point is refused. An
-    entry is solved by a certificate, or when three programs of different makers agree; until then a proof is
-    told as claimed.
+    Accepted are solution files of {answers}; logs of {logs}; fields; certificates of `crossfield prove`; and
+    the ledger.json of another copy of the library. Their kind is detected from their content.
+
+    A solution and a log whose names differ in the suffix alone are one run. The exit code is 1 if a file is
+    refused; the others are kept.
     """
-    from ..library.contributions.submit_run import Told, submit_run
+    from ..library.contributions.run_record import RunFacts
+    from ..library.contributions.submit import submit
 
-    told = Told(solver, version, status, bound, seconds, threads, limit, machine, by, date)  # type: ignore[arg-type]
+    facts = RunFacts(solver, version, status, bound, seconds, threads, limit, machine, by, date)  # type: ignore[arg-type]
     with progress(quiet=quiet) as show:
-        happened = submit_run(folder, point=point, log=log, entry=entry, told=told, progress=show)
-    if not quiet:
-        say(str(happened))
+        found = submit(folder, files or [], entry=entry, facts=facts, progress=show)
+    if as_json:
+        print_json([_submitted(each) for each in found])
+    elif not quiet:
+        show_table(str(folder), ("file", "result", "entry", "now"), list(map(_row, found)))
+    refused = [each for each in found if each.error is not None]
+    for each in refused:
+        print_notice(str(each.error))
+    if refused:
+        raise typer.Exit(1)
+
+
+def _submitted(result: Submission) -> dict[str, object]:
+    """A result as JSON."""
+    from dataclasses import asdict
+
+    return asdict(result) | {
+        "files": [str(path) for path in result.files],
+        "error": None if result.error is None else str(result.error),
+    }
+
+
+def _row(result: Submission) -> list[str]:
+    """A row of the table of results, which leaves numbers to JSON so that it fits 80 columns."""
+    more = f" +{len(result.entries) - 1}" if result.entries[1:] else ""
+    return [
+        " ".join(path.name for path in result.files),
+        result.outcome,
+        f"{result.entries[0]}{more}" if result.entries else "",
+        result.status or "",
+    ]
 
 
 @command("points")
@@ -270,15 +270,15 @@ def points_command(
     *,
     quiet: Quiet = False,
 ) -> None:
-    """Keep the points of a library: an archive of fields and certificates that a specification may name.
+    """Write the points of a library: an archive of fields and certificates for a specification.
 
-    A build of that specification then searches for nothing, and its bytes are the same on every processor.
+    A build of a specification that names it does not search, and its bytes are the same on every processor.
     """
     from ..library.ledger.given import write_points
 
     number = write_points(folder, output)
     if not quiet:
-        say(f"{output}: points of {number} instances")
+        print_line(f"{output}: points of {number} instances")
 
 
 @command("site")
@@ -289,4 +289,4 @@ def site_command(folder: Library, output: Folder, *, quiet: Quiet = False) -> No
     with progress(quiet=quiet) as show:
         pages = write_site(folder, output, progress=show)
     if not quiet:
-        say(f"{output}: {len(pages)} pages; open index.html")
+        print_line(f"{output}: {len(pages)} pages; open index.html")

@@ -1,13 +1,13 @@
-"""Building a library: what is missing is made, what is whole stays.
+"""Build of a library: missing files are made, and whole ones are kept.
 
 Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written
-here and nowhere else, each file beside and renamed, the one that says "done" last. So a build that was
-stopped continues, whatever it was that stopped it.
+here and nowhere else, each file beside and renamed, and the file that marks completion last. So a build that
+was stopped continues, whatever stopped it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ....models.storage import make_folder, write_bytes
 from ..documents.documents import Library, about_file, are_whole, read_about, read_library, read_sidecar
 from ..documents.lock import locked
 from ..ledger.given import Points, nothing, points_of, read_points
-from ..ledger.ledger import Ledger, Record, keep, merged, read_ledger
+from ..ledger.ledger import Ledger, Record, merged, read_ledger, write_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.spec import Spec
 from .entry_task import Entry, make_entry
@@ -36,7 +36,7 @@ def build(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> Library:
-    """The library of a specification, now in the folder.
+    """Build the library of a specification in a folder and return it.
 
     jobs: processes; scheduler: address of a dask scheduler whose workers do the work instead.
     progress: called with a line for each entry that is made. The same specification and ledger give the same
@@ -68,7 +68,7 @@ def _built(
     scheduler: str | None,
     progress: Progress,
 ) -> Library:
-    """The library, by a caller who holds its lock; the ledger comes last, so a refused build has none."""
+    """Build it under the lock of the caller; the ledger is written last, so a refused build has none."""
     _sweep(folder)
     ledger = _ledger(spec, plans, folder)
     with executor(jobs, scheduler) as chosen:
@@ -83,28 +83,28 @@ def _built(
     if not kept:
         name, reason = next(iter(work.skipped.items()))
         raise InputError(f"nothing is left on any grid that it asks for; {name}: {reason}")
-    keep(ledger)
+    write_ledger(ledger)
     progress("index and checksums")
     write_index(folder, spec, kept, dict(sorted(work.skipped.items())))
     return read_library(folder)
 
 
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
-    """A library brought up to date after its ledger changed; only what the change touches is made again."""
+    """Bring a library up to date with its ledger; only files that the change affects are made again."""
     folder = read_library(folder).folder
     with locked(folder, "a build of the library", progress):
         return rebuilt(folder, jobs=jobs, progress=progress)
 
 
 def rebuilt(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
-    """As `rebuild`, for a caller who holds the lock of the library."""
+    """Bring a library up to date as `rebuild` does, under the lock of the caller."""
     spec = read_library(folder).spec
     points = points_of(folder)
     return _built(spec, plan(spec), folder, points, jobs=jobs, scheduler=None, progress=progress)
 
 
 def unmatched(library: Library) -> list[Record]:
-    """Records of a library's ledger that count for nothing: their entry's problem has changed since."""
+    """Return the ledger's records that no longer count because the problem of their entry has changed."""
     records = read_ledger(library.folder).records
     names = {record.entry for record in records} & set(library.document["entries"])
     problems = {name: library.entry(name)["problem_sha256"] for name in names}
@@ -112,28 +112,28 @@ def unmatched(library: Library) -> list[Record]:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what a build that was killed while it wrote has left."""
+    """Remove temporary files of a build that was killed."""
     for path in folder.glob(".*.part"):
         path.unlink(missing_ok=True)
 
 
-def _ledger(spec: Spec, plans: Iterable[InstancePlan], folder: Path) -> Ledger:
+def _ledger(spec: Spec, plans: Sequence[InstancePlan], folder: Path) -> Ledger:
     entries = [entry.name for each in plans for entry in each.entries]
     given = Ledger(folder) if spec.ledger is None else read_ledger(spec.ledger.parent, spec.ledger.name)
-    return merged(folder, given, entries)
+    return merged(folder, given, entries, [each.recipe.name for each in plans])
 
 
 class _Build:
-    """A build under way: what is to be made, and how far it is."""
+    """A build in progress: its tasks and the number of finished entries."""
 
     def __init__(self, folder: Path, inputs: Inputs, tasks: Tasks, progress: Progress) -> None:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(each.entries) for each in self.inputs.plans), 0
         self.skipped: dict[str, str] = {}
-        """Instances whose size leaves nothing of their sketch, and what was said of them."""
+        """Instances whose size is too small for their sketch, and the reasons."""
 
     def begin(self, each: InstancePlan) -> None:
-        """Have an instance made, unless it is whole, and then its entries."""
+        """Schedule an instance unless it is whole, and then its entries."""
         task = self.inputs.preparation(each)
         about = self._whole(task.name, task.sha256)
         if about is not None:
@@ -153,14 +153,14 @@ class _Build:
         self.tasks.add(prepared, task, finish)
 
     def _skip(self, each: InstancePlan, error: NoStrokeError) -> None:
-        """Leave an instance out with its entries."""
+        """Skip an instance and its entries."""
         name = each.recipe.name
         self.total -= len(each.entries)
         self.skipped[name] = str(error).removeprefix(f"{name}: ")
         self.progress(f"left out: {error}")
 
     def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
-        """What is known of an instance, when it was made from the same and its files are whole."""
+        """The document of an instance if it was made from the same recipe and its files are whole."""
         try:
             about = read_about(self.folder / about_file(instance))
         except CrossfieldError:

@@ -30,12 +30,19 @@ from ..documents.citation import REFERENCES
 from ..documents.documents import FORMAT, VERSION, as_bytes, listed_jumps
 from ..documents.statistics import counts, curvature, density, ranges, tangent_bound
 from ..ledger.certificates import METHOD
-from ..ledger.difficulty import difficulty
-from ..ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Record
 from ..ledger.points import Best, Known, Provenance, best_point, complete_point, ours
-from ..ledger.standing import best_of_each, runs_of, standing
+from ..ledger.standing import (
+    best_of_each,
+    contradicts,
+    cut,
+    difficulty,
+    is_proven,
+    relative_gap,
+    runs_of,
+    standing,
+)
 from ..plan.equivalence import equivalent, not_equivalent, notes_of, siblings, transformations
 from ..plan.recipe import EntryRecipe, digest
 from .instance_task import Files, Submitted
@@ -46,7 +53,7 @@ _SOLVED, _NOT_PROVEN = 0, 100  # AMPL's solve codes: solved; solved, but not for
 
 @dataclass(frozen=True)
 class Entry:
-    """The task of an entry: its recipe, and what is known of its instance.
+    """The task of an entry: its recipe and the facts about its instance.
 
     records and submitted: what the ledger has of all entries of the instance, records and kept fields;
     relatives: names of the entries that may be related.
@@ -66,14 +73,14 @@ class Entry:
 
     @property
     def sha256(self) -> str:
-        """Stands for all that its files depend on."""
+        """Digest of everything that its files depend on."""
         submitted = [hashlib.sha256(each.data).hexdigest() for each in self.submitted]
         records = [asdict(record) for record in self.records]
         return digest([generator(), asdict(self.recipe), self.about, records, submitted, self.relatives])
 
 
 def make_entry(task: Entry) -> Files:
-    """The files of an entry, the sidecar last."""
+    """Return the files of an entry, the sidecar last."""
     with (
         tempfile.TemporaryDirectory(prefix="crossfield-") as given,
         tempfile.TemporaryDirectory(prefix="crossfield-") as made,
@@ -95,7 +102,7 @@ def make_entry(task: Entry) -> Files:
 
 
 def _read(task: Entry, folder: Path) -> tuple[Instance, dict[str, Known]]:
-    """The instance, and the fields that are known of it, by their role."""
+    """The instance and its known fields by role."""
     for name, data in task.files.items():
         (folder / name).write_bytes(data)
     known = {}
@@ -118,7 +125,7 @@ def _formulated(instance: Instance, formulation: str, facet: str, jumps: Ints) -
 def _models(
     problem: Problem, recipe: EntryRecipe, folder: Path
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Facts of the model files that are now in the folder, and why the other formats are refused."""
+    """Facts of the model files written to the folder, and why the other formats are refused."""
     listed: list[dict[str, Any]] = []
     refused = {}
     for name in recipe.formats:
@@ -135,7 +142,7 @@ def _models(
 
 
 def _points(task: Entry, best: Best, folder: Path, *, proven: bool) -> list[dict[str, Any]]:
-    """Facts of the best point's files, now in the folder: MIPLIB's kind, and AMPL's beside a .nl."""
+    """Facts of the best point's files written to the folder: MIPLIB's kind, and AMPL's for a .nl."""
     path = folder / f"{task.name}.sol"
     path.write_bytes(b"".join(_miplib(best)))
     listed = [_listed(path, "miplib", ["columns as in the .mps and .lp; those at 0 are left out"])]
@@ -164,7 +171,7 @@ def _listed(path: Path, dialect: str, notes: list[str]) -> dict[str, Any]:
 
 
 def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, Any]]:
-    """The best dual bound of each solver with a record of this optimum, and what the point implies."""
+    """The best dual bound of each solver for this optimum, and the bounds of tangent and certificate."""
     having = [each for each in records if each.bound is not None]
     found = [_bound(record, task.name) for record in best_of_each(having, task.name)]
     tangent = tangent_bound(best.problem, best.point)
@@ -176,21 +183,21 @@ def _bounds(task: Entry, best: Best, records: list[Record]) -> list[dict[str, An
     return [each | {"bound": _within(each, best, task.name)} for each in found]
 
 
-def _within(told: dict[str, Any], best: Best, entry: str) -> float:
-    """A bound, cut to the best point's objective. Raises InputError where the point contradicts it."""
-    bound, computed = float(told["bound"]), told["status"] == "computed"
+def _within(stated: dict[str, Any], best: Best, entry: str) -> float:
+    """The bound, at most the best objective. Raises InputError if the point contradicts it."""
+    bound, computed = float(stated["bound"]), stated["status"] == "computed"
     if contradicts(bound, best.objective):
         raise InputError(
-            f"has the bound {bound!r} of {told['via'] or entry} by {told['solver']}, "
+            f"has the bound {bound!r} of {stated['via'] or entry} by {stated['solver']}, "
             f"but {entry} has a feasible point of {best.objective!r}; "
             f"that bound is wrong, {'build again without it' if computed else 'take its record out'}",
-            file=told.get("certificate", LEDGER),
+            file=stated.get("certificate", LEDGER),
         )
     return cut(bound, best.objective)
 
 
 def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
-    """The records that are about this very problem, or about one with the same optimum."""
+    """The records about this problem or another one with the same optimum."""
     shas = {task.name: best.problem.sha256}
     for name, formulation in siblings(task.recipe, task.relatives).items():
         shas[name] = _formulated(instance, formulation, "hull", best.known.field.p).sha256
@@ -198,9 +205,9 @@ def _records(task: Entry, best: Best, instance: Instance) -> list[Record]:
 
 
 def _bound(record: Record, entry: str) -> dict[str, Any]:
-    told = ("solver", "version", "bound", "status", "seconds", "threads")
+    stated = ("solver", "version", "bound", "status", "seconds", "threads")
     via = None if record.entry == entry else record.entry
-    return {key: getattr(record, key) for key in told} | {"via": via}
+    return {key: getattr(record, key) for key in stated} | {"via": via}
 
 
 def _computed(method: str, bound: float) -> dict[str, Any]:
@@ -210,14 +217,14 @@ def _computed(method: str, bound: float) -> dict[str, Any]:
 
 
 def _gap(best: Best, bounds: list[dict[str, Any]], status: str) -> dict[str, Any]:
-    """The dual bounds, the greatest, and how far it is below the best point."""
+    """The dual bounds, the greatest one, and the gap to the best point."""
     bound = max((each["bound"] for each in bounds), default=None)
     gap = None if bound is None else relative_gap(best.objective, bound)
     return {"bounds": bounds, "bound": bound, "status": status, "gap": gap}
 
 
 def _grade(task: Entry, best: Best, bounds: list[dict[str, Any]], status: str) -> str:
-    """How hard the entry is, by the runs on itself and by the tangent at its point."""
+    """The grade of the entry, from its own runs and the tangent at its point."""
     runs = [
         each for each in task.records if (each.entry, each.problem_sha256) == (task.name, best.problem.sha256)
     ]

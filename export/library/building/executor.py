@@ -1,8 +1,7 @@
-"""Where tasks run: in this process, in processes of this machine, or on the workers of a dask scheduler.
+"""Executors of tasks: this process, processes of this machine, or the workers of a dask scheduler.
 
 All three are executors of `concurrent.futures`. A task is a function from values to values that writes
-nothing, so that a worker may die in the middle of it: it is then done again elsewhere, and its result is used
-once.
+nothing. If a worker dies during a task, another one repeats it, and its result is used once.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ _PATIENCE: Final = "10s"  # to reach a scheduler
 
 
 class BuildError(CrossfieldError):
-    """Workers that died or went away."""
+    """Loss of workers."""
 
 
 def ahead(jobs: int, scheduler: str | None) -> int:
-    """How many tasks are handed out at once; a build that is killed loses those that are not done."""
+    """Return the number of tasks submitted at once; a killed build loses the unfinished ones."""
     return _AHEAD if scheduler else 1 if jobs == 1 else 2 * jobs
 
 
 @contextmanager
 def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
-    """Where tasks run. Raises InputError without a scheduler or dask; BuildError when workers die."""
+    """Yield an executor. Raises InputError without a scheduler or dask; BuildError when workers die."""
     try:
         with _cluster(scheduler) if scheduler else workers(jobs) as chosen:
             yield chosen
@@ -49,7 +48,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         import distributed
     except ModuleNotFoundError as error:
         raise InputError(
-            "--scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
+            "a scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
         ) from error
     try:
         client: Any = distributed.Client(  # type: ignore[no-untyped-call]
@@ -76,7 +75,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 class Tasks:
-    """Tasks under way, a limited number at once: function, value, and what to do with the result."""
+    """Tasks in progress, a limited number at once: function, value, and callback for the result."""
 
     def __init__(self, chosen: Executor, most: int) -> None:
         self._executor, self._most = chosen, most
@@ -84,14 +83,14 @@ class Tasks:
         self._running: dict[Future[Any], Callable[[Any], None]] = {}
 
     def add(self, function: Callable[[Any], T], value: Any, finish: Callable[[T], None]) -> None:
-        """Have the function called with the value somewhere, and `finish` here with its result.
+        """Schedule a call of the function, and of `finish` in this process with its result.
 
-        `finish` may add more, which goes first.
+        Tasks that `finish` adds run first.
         """
         self._waiting.append((function, value, finish))
 
     def run(self) -> None:
-        """Come back when all tasks are done. Raises what a task raises."""
+        """Run all tasks. Raises what a task raises."""
         while self._waiting or self._running:
             while self._waiting and len(self._running) < self._most:
                 function, value, finish = self._waiting.pop()

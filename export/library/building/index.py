@@ -35,7 +35,7 @@ _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 def write_index(
     folder: Path, spec: Spec, plans: Iterable[InstancePlan], skipped: Mapping[str, str] | None = None
 ) -> None:
-    """Write all that is about the library as a whole; files of entries that left it are removed.
+    """Write the files about the library as a whole and remove those of entries that left it.
 
     skipped: names of instances that the specification asks for and that are not in the plans, and why.
     """
@@ -45,12 +45,7 @@ def write_index(
     written = general(spec, sidecars, skipped or {}) | {INDEX: as_bytes(index)}
     for name, data in written.items():
         write_bytes(folder / name, data)
-    beside = (
-        name
-        for record in read_ledger(folder).records
-        for name in (record.point, record.log)
-        if name is not None
-    )
+    beside = read_ledger(folder).files
     present = [*written, LEDGER, *_of_instances(folder, plans), *_of_entries(sidecars), *beside]
     _remove_stale(folder, set(present))
     sums = "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(set(present)))
@@ -58,18 +53,18 @@ def write_index(
 
 
 def general(spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]) -> dict[str, bytes]:
-    """The files that tell of the library as a whole, by name: texts, drawings, checker and library.solu."""
+    """Return the files about the library as a whole: texts, drawings, checkers and library.solu."""
     context = _context(spec, sidecars) | {"skipped": skipped}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: read_bytes(Path(check_point.__file__))}
     if context["certified"]:
         checkers[CERTIFICATES] = read_bytes(Path(check_certificate.__file__))
-    return texts | drawings | checkers | {SOLU: "".join(_solu(sidecars)).encode()}
+    return texts | drawings | checkers | {SOLU: _optima(sidecars)}
 
 
 def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell."""
+    """The context of the templates."""
     rungs = [_rung(name, [each for each in sidecars if each["rung"] == name]) for name in RUNGS]
     written = {file["format"] for each in sidecars for file in each["files"]}
     return {
@@ -93,22 +88,24 @@ def _context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _rung(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the texts tell of a rung: sizes, share of strokes, numbers of entries, optima and grades."""
+    """Facts about a rung: sizes, share of strokes, numbers of entries, optima and grades."""
     sizes = sorted({each["source"]["size"] for each in sidecars})
     proven = sum(each["status"] == "optimal" for each in sidecars)
     density = sum(each["density"] for each in sidecars) / max(len(sidecars), 1)
     grades = Counter(each["difficulty"] for each in sidecars)
-    told = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
-    return told | {"density": f"{density:.2f}"}
+    stated = {"name": name, "sizes": sizes, "entries": len(sidecars), "optimal": proven, "grades": grades}
+    return stated | {"density": f"{density:.2f}"}
 
 
-def _solu(sidecars: list[dict[str, Any]]) -> Iterable[str]:
-    """Lines as MINLPLib and SCIP have them: =opt= where the optimum is proven, else =best= and =bestdual=."""
+def _optima(sidecars: list[dict[str, Any]]) -> bytes:
+    """The content of library.solu as MINLPLib and SCIP have it: =opt= or =best=, and =bestdual=."""
+    lines = []
     for each in sidecars:
         tag = "=opt=" if each["status"] == "optimal" else "=best="
-        yield f"{tag} {each['name']} {number(each['best']['objective'])}\n"
+        lines.append(f"{tag} {each['name']} {number(each['best']['objective'])}\n")
         if each["status"] != "optimal" and each["bound"] is not None:
-            yield f"=bestdual= {each['name']} {number(each['bound'])}\n"
+            lines.append(f"=bestdual= {each['name']} {number(each['bound'])}\n")
+    return "".join(lines).encode()
 
 
 def _index(folder: Path, spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -141,7 +138,7 @@ def _of_entries(sidecars: list[dict[str, Any]]) -> list[str]:
 
 
 def _remove_stale(folder: Path, present: set[str]) -> None:
-    """Remove files that an earlier build listed and this one does not have; nobody else's."""
+    """Remove files that an earlier build listed and this one lacks; other files stay."""
     sums = folder / SUMS
     if not sums.is_file():
         return

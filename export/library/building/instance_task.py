@@ -1,7 +1,7 @@
-"""The first task of each instance: the instance itself and the fields that are known of it, as files.
+"""The first task of each instance: files of the instance and of its known fields.
 
-A task is a function from values to the bytes of files, so that it runs in any process on any machine; who
-started it writes the files.
+A task is a function from values to the bytes of files, so that it runs in any process on any machine. The
+caller writes the files.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ....models.search.pinned import pinned
 from ...formats.registry import generator
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, as_bytes
 from ..documents.statistics import sizes
-from ..ledger.certificates import certified
+from ..ledger.certificates import Certified, certified, certified_by
 from ..ledger.given import Given
 from ..ledger.points import (
     Known,
@@ -37,28 +37,47 @@ Files = dict[str, bytes]
 """Files by name, in the order in which they are to be written."""
 
 ROLES: Final = {"baseline": ".baseline.field.json", "least_1": ".l1.field.json", "least_2": ".field.json"}
-"""Fields of an instance and the ends of their files' names; equal ones share the last file."""
+"""Roles of fields and the suffixes of their files; equal fields share the last file."""
 
 
 @dataclass(frozen=True)
 class Submitted:
-    """The field of a ledger: bytes of its file, and who found it."""
+    """A field of the ledger: bytes of its file and provenance."""
 
     data: bytes
     provenance: Provenance
 
     def known(self) -> Known:
-        """The field."""
+        """Return the field."""
         return Known(field_of_json(self.data), self.provenance)
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """The certificate of a ledger.
+
+    file, data: name and bytes of its file; instance_sha256: the instance that it is on; provenance: who
+    submitted it.
+    """
+
+    file: str
+    data: bytes
+    instance_sha256: str
+    provenance: Provenance
+
+    def certified(self, instance: Instance) -> Certified:
+        """Return what it proves of an instance. Raises InputError unless the checker accepts it there."""
+        return certified_by(self.data, self.file, instance, self.provenance)
+
+
+@dataclass(frozen=True)
 class Preparation:
-    """The task of an instance: its recipe, the fields that the ledger has for its entries, given points."""
+    """The task of an instance: its recipe, fields and certificate of the ledger, and given points."""
 
     recipe: InstanceRecipe
     submitted: tuple[Submitted, ...] = ()
     given: Given | None = None
+    evidence: Evidence | None = None
 
     @property
     def name(self) -> str:
@@ -67,25 +86,26 @@ class Preparation:
 
     @property
     def sha256(self) -> str:
-        """Stands for all that its files depend on."""
+        """Digest of everything that its files depend on."""
         submitted = [
             [hashlib.sha256(each.data).hexdigest(), asdict(each.provenance)] for each in self.submitted
         ]
         given = [] if self.given is None else [self.given.sha256]
-        return digest([generator(), self.recipe.document(), submitted, *given])
+        proof = [] if self.evidence is None else [[self.evidence.file, asdict(self.evidence.provenance)]]
+        return digest([generator(), self.recipe.document(), submitted, *given, *proof])
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was found of an instance: the baseline, fields of low energy, bytes and facts of a certificate."""
+    """Search result for an instance: the baseline, fields of low energy, and a certificate."""
 
     baseline: Known
     low: list[Known]
-    certificate: tuple[bytes, dict[str, Any]] | None
+    certificate: Certified | None
 
 
 def prepared(task: Preparation) -> Files | NoStrokeError:
-    """The files of an instance as `prepare` has them, or why its size does not suit its sketch."""
+    """Return the files of an instance, or the error that its size does not suit its sketch."""
     try:
         return prepare(task)
     except NoStrokeError as error:
@@ -93,11 +113,13 @@ def prepared(task: Preparation) -> Files | NoStrokeError:
 
 
 def prepare(task: Preparation) -> Files:
-    """The files of an instance: itself, fields, and last what is known of it; or InputError."""
+    """Return the files of an instance: itself, its fields, and last its document. Raises InputError."""
     instance = instance_from(task.recipe)
     given = task.given if task.given and task.given.instance == instance.sha256 else None
-    found = _searched(instance, task.recipe) if given is None else _given(given, instance, task.recipe)
-    chosen = _chosen(instance, task, found)
+    evidence = task.evidence
+    sent = evidence.certified(instance) if evidence and evidence.instance_sha256 == instance.sha256 else None
+    found = _given(given, instance, task.recipe) if given else _searched(instance, task.recipe, sent)
+    chosen = _chosen(instance, task, found, sent)
     files: Files = {f"{task.name}.instance.json": to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
     for role in reversed(ROLES):
@@ -108,43 +130,49 @@ def prepare(task: Preparation) -> Files:
             files[name] = field_to_json(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in (2, 1)}
         fields[role] = {"file": name, **asdict(known.provenance), **energies}
-    certificate = _certificate(found, task, files)
+    certificate = _certificate(found.certificate, sent, files)
     about = _about(instance, task, {role: fields[role] for role in ROLES}, files) | certificate
     return files | {about_file(task.name): as_bytes(about)}
 
 
-def _searched(instance: Instance, recipe: InstanceRecipe) -> _Found:
-    """What a search, a proof where the recipe wants it, and HiGHS in the 1-norm find."""
+def _searched(instance: Instance, recipe: InstanceRecipe, sent: Certified | None) -> _Found:
+    """Results of a search, of a proof unless one was submitted, and of HiGHS in the 1-norm."""
     searched = searched_field(instance)
-    proven = certified(searched.field) if recipe.prove else None
+    name = f"{recipe.name}.certificate.npz"
+    proven = certified(searched.field, name) if recipe.prove and sent is None else None
     found = better_in_1norm(searched.field, recipe.rung)
     staged = [Known(pinned(each.field), ours("two stages")) for each in found]
     low = [searched, *([proven.known] if proven else []), *found, *staged]
-    return _Found(baseline_field(instance), low, (proven.data, proven.facts) if proven else None)
+    return _Found(baseline_field(instance), low, proven)
 
 
 def _given(given: Given, instance: Instance, recipe: InstanceRecipe) -> _Found:
-    """What is given, without any search; a certificate is checked."""
+    """The given points, without any search; a certificate is checked."""
     low = [given.field("least_2"), given.field("least_1")]
     return _Found(given.field("baseline"), low, given.certificate(instance) if recipe.prove else None)
 
 
-def _certificate(found: _Found, task: Preparation, files: Files) -> dict[str, Any]:
-    """What is told of the certificate, which is among the files now; nothing where there is none."""
-    if found.certificate is None:
+def _certificate(found: Certified | None, sent: Certified | None, files: Files) -> dict[str, Any]:
+    """Facts of the certificate with the greatest bound, if there is one, whose file is added to the files."""
+    known = [each for each in (sent, found) if each is not None]
+    if not known:
         return {}
-    name = f"{task.name}.certificate.npz"
-    files[name], facts = found.certificate
-    return {"certificate": {"file": name, **facts}}
+    best = max(known, key=lambda each: each.facts["bound"])
+    files[best.file] = best.data
+    return {"certificate": {"file": best.file, **best.facts}}
 
 
-def _chosen(instance: Instance, task: Preparation, found: _Found) -> dict[str, Known]:
-    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`."""
+def _chosen(instance: Instance, task: Preparation, found: _Found, sent: Certified | None) -> dict[str, Known]:
+    """The field of each role; the ledger does not decide on the baseline, for `qp-fixed`.
+
+    The field of a submitted certificate comes last, so that an equal one that was submitted before it stays.
+    """
     submitted = [each.known() for each in task.submitted]
     known = [
         found.baseline,
         *found.low,
         *(each for each in submitted if each.field.instance.sha256 == instance.sha256),
+        *([sent.known] if sent else []),
     ]
     return {"baseline": found.baseline, "least_1": least_energy(known, 1), "least_2": least_energy(known, 2)}
 
@@ -181,13 +209,13 @@ def _about(instance: Instance, task: Preparation, fields: dict[str, Any], files:
 
 
 def stated_of(recipe: InstanceRecipe) -> dict[str, Any]:
-    """What the specification states of an instance: origin and the day on which it came into the library."""
+    """Return origin and day of addition as the specification states them."""
     stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
     return {key: value for key, value in stated.items() if value}
 
 
 def source_of(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
-    """What is told of where an instance comes from."""
+    """Return the facts about the source of an instance."""
     parameters: dict[str, Any] = {
         "w_strokes": instance.stroke_coefficient,
         "w_beta": instance.skew_coefficient,

@@ -1,6 +1,6 @@
-"""Checking a library as a whole: files, checksums, schemas, and every entry by its sidecar.
+"""Checks of a library as a whole: files, checksums, schemas, and every entry by its sidecar.
 
-Nothing that a file says is believed: problems are formulated again from their instances (`verify_entry`).
+Everything is recomputed: problems are formulated again from their instances (`verify_entry`).
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.field import CrossField
 from ....models.field.file import read_field
 from ....models.processes.progress import Progress, silent
-from ....models.proof import check_certificate
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, sha256_of
 from ...formats.registry import generator
@@ -26,7 +24,6 @@ from ..building.entry_task import Entry
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..documents import check_point
 from ..documents.archive import opened
 from ..documents.citation import cited
 from ..documents.documents import INDEX, Library, about_file, read_about, read_library, read_sidecar
@@ -37,8 +34,7 @@ from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, read_ledger
 from ..plan.recipe import InstancePlan, plan
 from ..plan.sources import instance_from
-from .check_entry import verify_entry
-from .check_run import run_findings
+from .check_entry import run_findings, verify_entry
 from .finding import BUILD, Finding, close, of_error
 from .made_again import instance_findings
 
@@ -51,14 +47,13 @@ Checked = tuple[dict[str, Any] | None, list[Finding]]
 
 _AHEAD: Final = 16  # entries a process that are handed out at once: the first one may be the slowest
 _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
-_FACT: Final = re.compile(r"=(opt|best|bestdual)= (\S+) (\S+)")
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
-    """What is wrong with a library in a folder or an archive; nothing when all is as it should be.
+    """Return the findings about a library in a folder or an archive; an empty list if it is sound.
 
-    jobs: processes; progress: called with a line for each step. Nobody changes the folder meanwhile. Raises
-    InputError when there is no library, OutputError when another process works on it for too long.
+    jobs: processes; progress: called with a line per step. The folder is locked meanwhile. Raises InputError
+    without a library, OutputError if another process holds the lock for too long.
     """
     with opened(folder) as place:
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():
@@ -68,12 +63,12 @@ def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = si
 
 
 def findings_in(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Iterator[Finding]:
-    """As `verify_library`, of a folder whose lock the caller holds."""
+    """Yield the findings about a folder whose lock the caller holds."""
     return _Verification(folder, jobs, progress).findings()
 
 
 class _Verification:
-    """A verification under way: files that are there, that are damaged, and that belong."""
+    """A verification in progress: present, damaged and known files."""
 
     def __init__(self, folder: Path, jobs: int, progress: Progress) -> None:
         self.folder, self.jobs, self.progress = folder, jobs, progress
@@ -82,7 +77,7 @@ class _Verification:
         self.known = {SUMS, INDEX, LEDGER, SOLU, CHECKER, *TEXTS}
 
     def findings(self) -> Iterator[Finding]:
-        """Everything that is wrong, in the order in which it is looked for."""
+        """Yield all findings in the order of the checks."""
         self.progress("files and checksums")
         yield from self._files()
         listed: set[str] = set()
@@ -95,13 +90,13 @@ class _Verification:
         yield from self._index(library)
         yield from self._entries(library)
         for name in sorted(self.present - self.known):
-            if name in listed:  # else it was told already
+            if name in listed:  # else it was reported already
                 yield Finding(name, "belongs to nothing in the library", REMOVE)
 
     def _files(self) -> Iterator[Finding]:
-        """Everything in the folder is a plain file."""
+        """Findings about links, folders and temporary files."""
         for path in sorted(self.folder.iterdir()):
-            if path.name == LOCK:  # of a change under way, or of one that was killed
+            if path.name == LOCK:  # of a change in progress or a killed process
                 continue
             if path.is_symlink() or not path.is_file():
                 kind = "a link" if path.is_symlink() else "a folder, or no plain file"
@@ -112,7 +107,7 @@ class _Verification:
                 self.present.add(path.name)
 
     def _checksums(self, listed: set[str]) -> Iterator[Finding]:
-        """Every file is in SHA256SUMS and has that checksum; `listed` gets the names there."""
+        """Files that are not in SHA256SUMS or differ from it; adds the names there to `listed`."""
         if SUMS not in self.present:
             yield Finding(SUMS, "is missing", FETCH)
             return
@@ -137,10 +132,10 @@ class _Verification:
             yield Finding(name, "is missing", FETCH)
         elif sha256_of(self.folder / name) != expected:
             self.damaged.add(name)
-            yield Finding(name, "has another SHA-256 than SHA256SUMS says", FETCH)
+            yield Finding(name, "has another SHA-256 than SHA256SUMS states", FETCH)
 
     def _index(self, library: Library) -> Iterator[Finding]:
-        """The index names the sidecars of its specification; texts and checker are there."""
+        """Findings about the index, and missing texts and checkers."""
         document = library.document
         names = document["entries"]
         if document["generator"] == generator():
@@ -150,7 +145,7 @@ class _Verification:
         for name in names:
             path = self.folder / f"{name}.json"
             if path.name in self.present and sha256_of(path) != document["sha256"].get(name):
-                yield Finding(path.name, f"has another SHA-256 than {INDEX} says")
+                yield Finding(path.name, f"has another SHA-256 than {INDEX} states")
         try:
             spec = library.spec
             plans = plan(spec)
@@ -164,34 +159,27 @@ class _Verification:
                 yield Finding(INDEX, "lists other entries than its specification asks for")
         for name in sorted({*TEXTS, SOLU, CHECKER, LEDGER} - self.present):
             yield Finding(name, "is missing", FETCH)
-        yield from self._checker(CHECKER, check_point, library)
 
     def _release(self, library: Library) -> Iterator[Finding]:
-        """What is told of the release follows from the specification."""
-        with suppress(CrossfieldError):  # told with the specification
+        """A release that does not follow from the specification."""
+        with suppress(CrossfieldError):  # reported with the specification
             if library.document.get("release") != cited(library.spec):
-                yield Finding(INDEX, "tells another release than follows from the specification")
+                yield Finding(INDEX, "states another release than follows from the specification")
 
     def _skipped(self, library: Library, plans: tuple[InstancePlan, ...]) -> Iterator[Finding]:
-        """What is left out cannot be made, for the reason that is told."""
+        """Skipped instances that can be made, or that have another reason."""
         recipes = {each.recipe.name: each.recipe for each in plans}
-        for name, told in library.skipped.items():
+        for name, stated in library.skipped.items():
             try:
                 if name in recipes:
                     instance_from(recipes[name])
                 yield Finding(INDEX, f"leaves out {name}, which can be made or is not asked for")
             except CrossfieldError as error:
-                if str(error) != f"{name}: {told}":
-                    yield Finding(INDEX, f"tells another reason for leaving {name} out than there is")
-
-    def _checker(self, name: str, ours: ModuleType, library: Library) -> Iterator[Finding]:
-        """A checker is that of the version which made the library."""
-        known = name in self.present and library.document["generator"] == generator()
-        if known and read_bytes(self.folder / name) != read_bytes(Path(str(ours.__file__))):
-            yield Finding(name, f"is not the checker of {generator()}")
+                if str(error) != f"{name}: {stated}":
+                    yield Finding(INDEX, f"states another reason for leaving {name} out than there is")
 
     def _entries(self, library: Library) -> Iterator[Finding]:
-        """Ledger, instances, entries and library.solu."""
+        """Findings about ledger, instances and entries, and about texts if there are none before."""
         try:
             ledger = read_ledger(self.folder)
         except CrossfieldError as error:
@@ -205,21 +193,18 @@ class _Verification:
             sidecars += [] if sidecar is None else [sidecar]
             sound = sound and not wrong
         yield from self._instances(sidecars, inputs)
-        if CERTIFICATES in self.known:
-            yield from self._checker(CERTIFICATES, check_certificate, library)
-        yield from self._solu(sidecars)
         if sound and len(sidecars) == len(names):
             yield from self._texts(library, sidecars)
 
     def _inputs(self, library: Library, ledger: Ledger) -> Inputs:
-        """What the library was made of; None when its specification is damaged, told with the index."""
+        """The inputs of the library; without plans if its specification is damaged."""
         try:
             return Inputs(ledger, plan(library.spec), points_of(self.folder))
         except CrossfieldError:
             return Inputs(ledger, ())
 
     def _task(self, name: str, inputs: Inputs) -> Entry | None:
-        """What an entry was made of; None where that is damaged or missing, which is told elsewhere."""
+        """The inputs of an entry; None if they are damaged or missing, which is reported elsewhere."""
         for each in inputs.plans:
             if name in {entry.name for entry in each.entries}:
                 try:
@@ -232,19 +217,19 @@ class _Verification:
         return None
 
     def _texts(self, library: Library, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Texts and drawings are those that this version makes of sound sidecars."""
+        """Texts, drawings, checkers and library.solu that differ from those made of sound sidecars."""
         if library.document["generator"] != generator():
             return
         try:
             made = general(library.spec, sidecars, library.skipped)
         except CrossfieldError:
-            return  # told with the index
-        for name in sorted({*made} - {CHECKER, CERTIFICATES, SOLU}):
+            return  # reported with the index
+        for name in sorted(made):
             if name in self.present - self.damaged and read_bytes(self.folder / name) != made[name]:
                 yield Finding(name, "is not what follows from the specification and the sidecars")
 
     def _each(self, names: list[str], ledger: Ledger, inputs: Inputs) -> Iterator[Checked]:
-        """Each entry in order: its sidecar, None where it is damaged, and what is wrong with it."""
+        """The sidecar of each entry in order, None if it is damaged, and the findings."""
         most = 1 if self.jobs == 1 else _AHEAD * self.jobs
         under_way: deque[tuple[Checked, Future[list[Finding]] | None]] = deque()
         with executor(self.jobs, None) as chosen:
@@ -262,7 +247,7 @@ class _Verification:
                 yield _ended(*under_way.popleft())
 
     def _sidecar(self, name: str) -> Checked:
-        """The sidecar of an entry, and what is wrong with it by itself."""
+        """The sidecar of an entry, and the findings about it alone."""
         self.known.add(f"{name}.json")
         try:
             sidecar = read_sidecar(self.folder / f"{name}.json")
@@ -270,16 +255,16 @@ class _Verification:
             return None, [of_error(error, f"{name}.json")]
         self.known |= {file["name"] for file in sidecar["files"]}
         of = sidecar["name"]
-        return sidecar, [] if of == name else [Finding(f"{name}.json", f"says that it is of {of}")]
+        return sidecar, [] if of == name else [Finding(f"{name}.json", f"states that it is of {of}")]
 
     def _has_all(self, name: str, sidecar: dict[str, Any], wrong: list[Finding]) -> bool:
-        """Whether all files of an entry are there as listed; those that are not are told."""
+        """Whether all files of an entry are there as listed; adds findings about the others."""
         lost = list(self._listed(f"{name}.json", sidecar["files"]))
         wrong += lost
         return not lost
 
     def _listed(self, by: str, files: list[dict[str, Any]]) -> Iterator[Finding]:
-        """Every file that a document lists is there, with the size and the checksum that it says."""
+        """Listed files that are missing or have another size or checksum."""
         for file in files:
             name = file["name"]
             if not PLAIN.fullmatch(name):
@@ -293,7 +278,7 @@ class _Verification:
                 yield Finding(name, f"is not the file that {by} lists")
 
     def _ledger(self, ledger: Ledger, library: Library) -> Iterator[Finding]:
-        """Every record is about an entry of the library, and its field is there."""
+        """Records and certificates of other libraries, and missing or damaged files of the ledger."""
         for record in ledger.records:
             if record.entry not in library.document["sha256"]:
                 yield Finding(LEDGER, f"has a record of {record.entry}, which is not in the library")
@@ -306,9 +291,18 @@ class _Verification:
             if record.log is not None:
                 self.known.add(record.log)
             yield from run_findings(ledger, record)
+        instances = {entry.rpartition("_")[0] for entry in library.document["entries"]}
+        for each in ledger.certificates:
+            self.known.add(each.file)
+            if each.instance not in instances:
+                yield Finding(LEDGER, f"has a certificate of {each.instance}, which is not in the library")
+            try:
+                ledger.content(each.file, each.sha256)
+            except CrossfieldError as error:
+                yield of_error(error, each.file)
 
     def _instances(self, sidecars: list[dict[str, Any]], inputs: Inputs) -> Iterator[Finding]:
-        """Every instance and its fields are as its own document and the sidecars of its entries say."""
+        """Findings about each instance, its document and its fields."""
         self.progress("instances")
         wanted = {sidecar["instance"]["file"]: sidecar["instance"] for sidecar in sidecars}
         for file, instance in sorted(wanted.items()):
@@ -330,7 +324,7 @@ class _Verification:
                 yield from self._recipe(name, about, inputs)
 
     def _recipe(self, name: str, about: dict[str, Any], inputs: Inputs) -> Iterator[Finding]:
-        """An instance is told to be what its recipe says, made by the same version."""
+        """Statements about an instance that do not follow from its recipe."""
         planned = [each for each in inputs.plans if about_file(each.recipe.name) == name]
         if about["generator"] != generator() or not planned:
             return
@@ -340,7 +334,7 @@ class _Verification:
             yield of_error(error, Path(error.file or name).name)
 
     def _fields(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """Every field is on its instance and has the energies told of it; the least ones are least."""
+        """Fields on other instances or of other energies, and least fields that are not least."""
         fields = about["fields"]
         for role, facts in fields.items():
             try:
@@ -348,69 +342,48 @@ class _Verification:
             except CrossfieldError as error:
                 yield of_error(error, facts["file"])
                 continue
-            told = (facts["energy_2norm"], facts["energy_1norm"])
+            stated = (facts["energy_2norm"], facts["energy_1norm"])
             if field is None:
                 yield Finding(facts["file"], f"is not a field of {about['name']}")
-            elif not all(map(close, told, (field.energy(2).total, field.energy(1).total))):
-                yield Finding(name, f"tells other energies of its field {role} than it has")
+            elif not all(map(close, stated, (field.energy(2).total, field.energy(1).total))):
+                yield Finding(name, f"states other energies of its field {role} than it has")
         for role, energy in (("least_2", "energy_2norm"), ("least_1", "energy_1norm")):
             if fields[role][energy] > min(facts[energy] for facts in fields.values()):
                 yield Finding(name, f"its field {role} is not the one of least energy")
 
     def _certificate(self, name: str, about: dict[str, Any]) -> Iterator[Finding]:
-        """What is told of a certificate is what the checker computes from it, on this very instance."""
-        told = about.get("certificate")
-        if told is None:
+        """A certificate that is refused, of another instance, or of another claim than stated."""
+        stated = about.get("certificate")
+        if stated is None:
             return
         self.known.add(CERTIFICATES)
         if CERTIFICATES not in self.present:
-            yield Finding(CERTIFICATES, f"is missing, which checks {told['file']}", FETCH)
-        if told["file"] not in {each["name"] for each in about["files"]}:
-            yield Finding(name, f"names {told['file']} as its certificate and does not list it")
+            yield Finding(CERTIFICATES, f"is missing, which checks {stated['file']}", FETCH)
+        if stated["file"] not in {each["name"] for each in about["files"]}:
+            yield Finding(name, f"names {stated['file']} as its certificate and does not list it")
             return
         try:
-            found = read_certificate(self.folder / told["file"])
+            found = read_certificate(self.folder / stated["file"])
         except CrossfieldError as error:
-            yield of_error(error, told["file"])
+            yield of_error(error, stated["file"])
             return
         if found.field.instance.sha256 != about["instance"]["sha256"]:
-            yield Finding(told["file"], f"is not a certificate of {about['name']}")
-        elif (told["status"], told["bound"]) != (found.status, found.bound) or not close(
-            told["energy"], found.energy
+            yield Finding(stated["file"], f"is not a certificate of {about['name']}")
+        elif (stated["status"], stated["bound"]) != (found.status, found.bound) or not close(
+            stated["energy"], found.energy
         ):
-            yield Finding(name, "tells another status, bound or energy of its certificate than it shows")
+            yield Finding(name, "states another status, bound or energy of its certificate than it shows")
 
     def _field(self, name: str, about: dict[str, Any]) -> CrossField | None:
-        """The field in a file that belongs to an instance, None when it does not."""
+        """The field in a file, None if it does not belong to the instance."""
         if name not in {each["name"] for each in about["files"]}:
             return None
         field = read_field(self.folder / name)
         return field if field.instance.sha256 == about["instance"]["sha256"] else None
 
-    def _solu(self, sidecars: list[dict[str, Any]]) -> Iterator[Finding]:
-        """library.solu says of each entry what its sidecar says, and no more."""
-        if SOLU not in self.present:
-            return
-        told: dict[tuple[str, str], float] = {}
-        for number, line in enumerate(_text(self.folder / SOLU).splitlines(), 1):
-            fact = _FACT.fullmatch(line)
-            if fact is None or (fact[2], fact[1]) in told or not _is_number(fact[3]):
-                yield Finding(SOLU, f"line {number} is no fact, or there twice")
-            else:
-                told[fact[2], fact[1]] = float(fact[3])
-        expected = {}
-        for sidecar in sidecars:
-            proven = sidecar["status"] == "optimal"
-            if sidecar["best"] is not None:
-                expected[sidecar["name"], "opt" if proven else "best"] = sidecar["best"]["objective"]
-            if not proven and sidecar["bound"] is not None:
-                expected[sidecar["name"], "bestdual"] = sidecar["bound"]
-        for name, tag in sorted({key for key, _ in told.items() ^ expected.items()}):
-            yield Finding(SOLU, f"={tag}= of {name} is not what its sidecar says")
-
 
 def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry | None) -> list[Finding]:
-    """What is wrong with an entry, whatever its sidecar says."""
+    """Findings about an entry, even if its sidecar holds nonsense."""
     found: list[Finding] = []
     try:
         found.extend(verify_entry(folder, sidecar, ledger, task))
@@ -420,18 +393,10 @@ def _verified(folder: Path, sidecar: dict[str, Any], ledger: Ledger, task: Entry
 
 
 def _ended(known: Checked, future: Future[list[Finding]] | None) -> Checked:
-    """The same with what a process found, once it has."""
+    """The sidecar with the findings of the process, after it has ended."""
     sidecar, wrong = known
     return sidecar, [*wrong, *(future.result() if future else [])]
 
 
 def _text(path: Path) -> str:
     return read_bytes(path).decode("utf-8", "replace")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -1,4 +1,4 @@
-"""Findings of a verification, and when two numbers count as the same."""
+"""Findings of a verification, and the comparison of objectives."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ....models.errors import CrossfieldError
 
 BUILD: Final = "build the library again"
 FEASIBLE: Final = 1e-8
-"""The greatest violation of a point that a library takes."""
+"""The greatest violation of a point that a library accepts."""
 SAME: Final = 1e-9
 """Objectives this close, relative to their size or absolute, are the same."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong with a library: in which file, what, and what helps."""
+    """A defect of a library: file, description and remedy."""
 
     file: str
     what: str
@@ -27,10 +27,15 @@ class Finding:
 
 
 def of_error(error: CrossfieldError, file: str) -> Finding:
-    """An error about a file as a finding; its message names what is wrong and what helps."""
+    """Return an error about a file as a finding; its message names defect and remedy."""
     message = str(error).removeprefix(f"{error.file}: ")
     what, _, remedy = message.partition("; ")
     return Finding(file, what, remedy) if remedy and "; " not in remedy else Finding(file, message)
+
+
+def is_better(objective: float, known: float) -> bool:
+    """Whether an objective is lower than the best known one by more than rounding."""
+    return known - objective > SAME * max(abs(known), SAME)
 
 
 def close(first: float, second: float) -> bool:

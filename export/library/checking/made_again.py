@@ -1,7 +1,7 @@
-"""What a library should say, made again from its sources and compared with what it says.
+"""Comparison of a library with its documents made again from their sources.
 
-Only what was searched for is taken from the library: the fields of each instance, and the records of the
-ledger. All else follows from these.
+Only search results are taken from the library: the fields of each instance, and the records of the ledger.
+Everything else follows from these.
 """
 
 from __future__ import annotations
@@ -27,41 +27,41 @@ _FROM_EACH_OTHER: Final = {"best", "bound", "gap", "files"}
 
 
 def entry_findings(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """Where an entry's files differ from what its task makes today. Raises CrossfieldError without a task."""
+    """Yield differences between an entry's files and those that its task makes. Raises CrossfieldError."""
     files, name = make_entry(task), f"{task.name}.json"
     made = json.loads(files[name])
     yield from _models(folder, sidecar, files)
     for key in dict.fromkeys((*made, *sidecar)):
         if key not in _FROM_EACH_OTHER and not same(sidecar.get(key), made.get(key)):
-            yield Finding(name, f"tells another {key} than follows from its instance and the ledger")
+            yield Finding(name, f"states another {key} than follows from its instance and the ledger")
     if _described(sidecar["files"]) != _described(made["files"]):
-        yield Finding(name, "tells other files, or other things of them, than are made of its problem")
+        yield Finding(name, "states other files, or other things of them, than are made of its problem")
     for key in ("point", "nl_point"):
         if sidecar["best"][key] != made["best"][key]:
             yield Finding(name, f"names another {key} than is made of its problem")
     if not close(sidecar["best"]["objective"], made["best"]["objective"]):
-        yield Finding(name, "does not tell the best of the known points")
+        yield Finding(name, "does not state the best of the known points")
     if Provenance.of(sidecar["best"]) not in _known(task):
-        yield Finding(name, "says that somebody found its point who found none of the known fields")
+        yield Finding(name, "names a finder of its point who found none of the known fields")
 
 
-def same(told: Any, made: Any) -> bool:
+def same(stated: Any, made: Any) -> bool:
     """Whether two values of JSON are the same, numbers up to rounding."""
     if isinstance(made, dict):
         return (
-            isinstance(told, dict)
-            and told.keys() == made.keys()
-            and all(same(told[key], made[key]) for key in made)
+            isinstance(stated, dict)
+            and stated.keys() == made.keys()
+            and all(same(stated[key], made[key]) for key in made)
         )
     if isinstance(made, list):
-        return isinstance(told, list) and len(told) == len(made) and all(map(same, told, made))
-    if isinstance(made, float) and isinstance(told, int | float) and not isinstance(told, bool):
-        return close(told, made)
-    return type(told) is type(made) and bool(told == made)
+        return isinstance(stated, list) and len(stated) == len(made) and all(map(same, stated, made))
+    if isinstance(made, float) and isinstance(stated, int | float) and not isinstance(stated, bool):
+        return close(stated, made)
+    return type(stated) is type(made) and bool(stated == made)
 
 
 def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Finding]:
-    """The model files are what is written of the problem today."""
+    """Model files that differ from those written of the problem today."""
     for file in sidecar["files"]:
         name = file["name"]
         if file["format"] not in FORMATS:
@@ -81,19 +81,19 @@ def _content(data: bytes, name: str) -> bytes | None:
 
 
 def _described(files: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What is said of files, but for what their bytes decide."""
+    """The descriptions of files without size and checksum."""
     return [{key: file[key] for key in file if key not in {"bytes", "sha256"}} for file in files]
 
 
 def _known(task: Entry) -> set[Provenance]:
-    """Who found the fields that are known of an entry's instance."""
+    """The provenances of the known fields of an entry's instance."""
     return {Provenance.of(facts) for facts in task.about["fields"].values()} | {
         each.provenance for each in task.submitted
     }
 
 
 def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Preparation) -> Iterator[Finding]:
-    """Where what is said of an instance differs from its recipe, its fields aside."""
+    """Yield statements about an instance that do not follow from its recipe, except fields."""
     recipe = task.recipe
     instance = read_instance(folder / about["instance"]["file"])
     expected = {
@@ -108,16 +108,17 @@ def instance_findings(folder: Path, name: str, about: dict[str, Any], task: Prep
     }
     for key, value in expected.items():
         if not same(about.get(key), value):
-            yield Finding(name, f"tells another {key} than follows from the specification")
+            yield Finding(name, f"states another {key} than follows from the specification")
     known = {each.provenance for each in task.submitted}
+    known |= {task.evidence.provenance} if task.evidence else set()
     for role, facts in about["fields"].items():
         found = Provenance.of(facts)
         if "given" not in about and found not in known and not _is_of_a_build(found):
-            yield Finding(name, f"says that somebody found its field {role} of whom the ledger knows nothing")
+            yield Finding(name, f"names a finder of its field {role} whom the ledger does not know")
 
 
 def _is_of_a_build(found: Provenance) -> bool:
-    """Whether a field is one that a build finds itself; the version of HiGHS is that of whoever built."""
+    """Whether a build finds such a field itself, with any version of HiGHS."""
     by_highs = (found.solver, found.seconds, found.by) == ("HiGHS", None, None)
     return by_highs or found in map(ours, _METHODS)
 

@@ -1,7 +1,7 @@
-"""A library frozen as one archive, verified before, with its checksum beside it.
+"""Release of a library as one verified archive, with its checksum beside it.
 
-The same library gives the same bytes, whoever packs it and when: order, times, owners and modes are fixed.
-Only another zlib may compress otherwise.
+The same library gives the same bytes at any time: order, times, owners and modes are fixed. Only another
+zlib may compress differently.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Members = Iterable[tuple[str, bytes]]
 
 @dataclass(frozen=True)
 class Frozen:
-    """A release that was written: its archive, its SHA-256, and how many files are in it."""
+    """A written release: its archive, the SHA-256, and the number of files in it."""
 
     file: Path
     sha256: str
@@ -51,9 +51,9 @@ class Frozen:
 def release_library(
     folder: str | Path, output: str | Path, *, jobs: int = 1, progress: Progress = silent
 ) -> Frozen:
-    """The release of a library as an archive, .tar.gz or .zip, now in `output`, its checksum beside it.
+    """Write the release of a library as a .tar.gz or .zip, with its checksum beside it.
 
-    jobs: processes that verify it first. Nobody changes the library meanwhile. Raises InputError for another
+    jobs: processes that verify it first. The library is locked meanwhile. Raises InputError for another
     suffix, for a library that states no version and day, and for one that does not verify; OutputError where
     nothing can be written.
     """

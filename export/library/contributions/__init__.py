@@ -1,4 +1,4 @@
 """New bounds and better points.
 
-Runs of local solvers on the entries, and points that others send in: checked, compared, kept in the ledger.
+Runs of local solvers on the entries, and files that others submit: checked, compared, kept in the ledger.
 """

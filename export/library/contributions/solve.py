@@ -1,7 +1,7 @@
-"""Runs of the installed solvers on the entries of a library: bounds and times for its ledger, better points.
+"""Runs of the installed solvers on the entries of a library, for its ledger.
 
-Each run uses one thread; HiGHS, Ipopt and Bonmin start from the best known point, the others from nothing.
-What was measured is not measured again.
+Each run uses one thread. HiGHS, Ipopt and Bonmin start from the best known point, the others without a
+start. Runs that the ledger has are not repeated.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, format_for
 from ..building.build import rebuild
+from ..checking.finding import is_better
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import locked
-from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import (
     Ledger,
     Record,
@@ -44,8 +44,8 @@ from ..ledger.ledger import (
     write_ledger,
 )
 from ..ledger.points import complete_point, field_of
+from ..ledger.standing import contradicts
 from ..plan.spec import RUNGS
-from .submit import is_better
 
 GAP: Final = 1e-7
 """Relative gap of a search: less than what counts as proven, for some points are a little infeasible."""
@@ -61,7 +61,7 @@ def solve_library(
     machine: str | None = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
-    """The new records, now in the ledger of the library, which is brought up to date in the end.
+    """Run solvers, add the records to the ledger, bring the library up to date and return the records.
 
     solvers: names of the table of solvers, those that are installed by default, each on the entries that it
     takes. time_limit: seconds of a run; up_to: last rung; by: who runs it; machine: on what. An entry that is
@@ -96,10 +96,10 @@ def solve_library(
 
 
 def drop_refuted(library: Library) -> None:
-    """Take the bounds out of measured records of the ledger that a feasible point lies below.
+    """Remove bounds that lie above a feasible point from measured records of the ledger.
 
-    A run may have found a point since that shows how far a solver's tolerances went. Bounds that somebody
-    sent in stay: who keeps the library decides about them. The caller holds the lock.
+    A later run may find a point that refutes a bound within a solver's tolerances. Submitted bounds stay. The
+    caller holds the lock.
     """
     ledger, dropped = read_ledger(library.folder), {}
     for document in library.entries:
@@ -143,13 +143,13 @@ def _known(names: Sequence[str], table: Any, kind: str) -> list[str]:
 
 
 class _Solving:
-    """Runs on a library, each for so long, with a folder for what they leave."""
+    """Runs on a library with a time limit each, and a folder for their files."""
 
     def __init__(self, library: Library, solvers: Solvers, folder: Path, limit: float) -> None:
         self.library, self.solvers, self.folder, self.limit = library, solvers, folder, limit
 
     def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
-        """Sidecars and solvers of what is to be run: the solver takes it, and the ledger does not have it."""
+        """Yield sidecar and solver of each missing run that the solver supports."""
         ledger = read_ledger(self.library.folder)
         for document in self.library.entries:
             if document["rung"] not in rungs:
@@ -161,15 +161,15 @@ class _Solving:
                     yield document, solver
 
     def _covers(self, record: Record, solver: str) -> bool:
-        """Whether a record stands for a run of the solver for so long."""
+        """Whether a record is of a run of the solver with at least this time limit."""
         if record.solver != SOLVERS[solver].title or record.version != self.solvers.version(solver):
             return False
         return record.status == "optimal" or (record.time_limit or 0.0) >= self.limit
 
     def run(self, document: dict[str, Any], solver: str) -> tuple[Record, CrossField | None]:
-        """The record of a run, and the field that it found when that is better than the best known point.
+        """Return the record of a run, and its field if that is better than the best known point.
 
-        A solver that fails or is not started leaves a record without a point. Raises UnsupportedBySolverError
+        A solver that fails or is not started gives a record without a point. Raises UnsupportedBySolverError
         for a problem that is too large.
         """
         problem = problem_of(self.library, document)
@@ -203,7 +203,7 @@ class _Solving:
     def _solve(
         self, document: dict[str, Any], problem: Problem, solver: str
     ) -> tuple[Solution, tuple[tuple[float | None, ...], ...]]:
-        """Solution of a solver, and bounds and objectives over time where its log states them.
+        """The solution of a solver, and bounds and objectives over time if its log states them.
 
         Raises SolverError when no time was left to start the solver.
         """
@@ -236,7 +236,7 @@ def _run_status(problem: Problem, solver: str, found: Solution) -> RunStatus:
 
 
 def _proves(problem: Problem, solver: str, found: Solution) -> bool:
-    """Whether the solver came to its end, and that is a proof of a global optimum."""
+    """Whether the solver ended with a proof of a global optimum."""
     if found.problem.formulation.weakened or not (problem.convex or SOLVERS[solver].proves == "global"):
         return False
     local = problem.convex and found.status == Status.OPTIMAL_LOCAL
@@ -244,9 +244,9 @@ def _proves(problem: Problem, solver: str, found: Solution) -> bool:
 
 
 def _bound(problem: Problem, solver: str, found: Solution, known: float) -> float | None:
-    """The dual bound that the solver tells, unless a feasible point contradicts it.
+    """The dual bound that the solver reports, unless a feasible point contradicts it.
 
-    Where it tells none and proves an optimum: that less the gap it was allowed.
+    Without one, a proven optimum less the allowed gap.
     """
     if found.bound is not None:
         return None if contradicts(found.bound, known) else found.bound

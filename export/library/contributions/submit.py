@@ -1,111 +1,129 @@
-"""Taking a solver's solution into a library: checked, compared, and kept when it is better.
+"""Submission of files to a library: solutions, fields, certificates, logs of runs and ledgers.
 
-The ledger comes first and the rest of the library follows from it by a rebuild, which SHA256SUMS ends. So a
-submission that was stopped can be told by the checksum of ledger.json, and the next submission or build
-brings it to its end.
+Each file is checked completely, and every improvement is added to the ledger in memory. Then the ledger is
+written, and the rest of the library follows from it by one rebuild, which ends with SHA256SUMS. So the
+checksum of ledger.json shows a submission that was stopped, and the next one or a build completes it.
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from ....models.errors import CrossfieldError, InputError, SolutionError
+from ....models.errors import CrossfieldError, InputError, SolutionError, naming
 from ....models.field.field import CrossField
+from ....models.field.file import field_of_json, read_field
+from ....models.formulations.catalogue import FORMULATIONS, TWO_NORM
 from ....models.formulations.problem import Problem, Violation
 from ....models.processes.progress import Progress, silent
+from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
-from ...formats.registry import FORMATS, generator
+from ...formats.registry import generator
 from ...solutions.readers.registry import read_raw
-from ...solutions.readers.text import RawSolution
-from ...solutions.solution import Solution, read_solution
+from ...solutions.solution import read_solution
 from ..building.build import rebuilt
 from ..building.index import SUMS
-from ..checking.finding import FEASIBLE, SAME
-from ..documents.documents import Library, problem_of, read_library
+from ..checking.finding import FEASIBLE, is_better
+from ..documents.documents import Library, about_file, read_about, read_library
 from ..documents.lock import locked
-from ..ledger.dual_bounds import contradicts
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Record, add_record
+from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
+from ..ledger.standing import best_of_each, contradicts
+from .matching import Entries, Kind, kinds_of
+from .run_record import LogFile, RunFacts, run_record
 
-UNKNOWN: Final = "unknown"
-_TOLD: Final = 4  # names in a message
+Outcome = Literal["accepted", "not better", "refused", "skipped"]
+
+_NOTHING_STATED: Final = RunFacts()
 
 
 @dataclass(frozen=True)
 class Submission:
-    """What happened to a point: its entry, both objectives, whether it was better and is kept."""
+    """Result of submitting a file, or the solution and the log of one run.
 
-    entry: str
-    known: float
-    objective: float
-    better: bool
+    files: empty for a bound without a file. kind: a word of `Kind` or `bound`; empty for an unknown kind.
+    outcome: `skipped` for a file of no known kind in a submitted folder. entries: those that
+    the file improves, or else those that it belongs to. objective, known: of the file's point and the least
+    one before, for the first entry. bound: dual bound. better_point: whether the point is now the best known
+    one. status: of the first entry afterwards. error: reason of a refusal.
+    """
 
-    def __str__(self) -> str:
-        """One line."""
-        if self.better:
-            return (
-                f"{self.entry}: better, and now the best known point: {self.objective!r}, "
-                f"before {self.known!r}"
-            )
-        return f"{self.entry}: not better: {self.objective!r}, and {self.known!r} is known"
+    files: tuple[Path, ...]
+    kind: str
+    outcome: Outcome
+    entries: tuple[str, ...] = ()
+    objective: float | None = None
+    known: float | None = None
+    bound: float | None = None
+    better_point: bool = False
+    status: str | None = None
+    error: CrossfieldError | None = None
 
 
-def submit_point(
-    file: str | Path,
+def submit(
     folder: str | Path,
+    files: Sequence[str | Path] = (),
     *,
     entry: str | None = None,
-    solver: str | None = None,
-    version: str | None = None,
-    seconds: float | None = None,
-    by: str | None = None,
+    facts: RunFacts = _NOTHING_STATED,
     progress: Progress = silent,
-) -> Submission:
-    """What happened to the point in a solution file of any kind that is read.
+) -> list[Submission]:
+    """Check files against a library, keep what improves it, and bring it up to date once.
 
-    entry: name of the entry; by default the one with which the file's name begins, or the only one whose
-    columns the file has. solver, version, seconds, by: who found it, as the ledger keeps it. Angles and jumps
-    are taken as they are, integers rounded, and all else computed again. Raises InputError for a version,
-    text or time that a ledger cannot hold. Raises SolutionError for a point of another entry, one that is not
-    feasible to within 1e-8, and one that a dual bound of the library contradicts.
+    Parameters
+    ----------
+    folder
+        Folder of the library.
+    files
+        Files and folders. A solution and a log whose names differ in the suffix alone are one run. With a
+        bound in `facts` there may be none.
+    entry
+        Name of the entry that all files belong to; by default each file shows its own.
+    facts
+        Facts about the runs.
+    progress
+        Called with a line per step.
+
+    Returns
+    -------
+    list of Submission
+        One result per file or run, in their order. A file that is refused changes nothing and does not stop
+        the others.
+
+    Raises
+    ------
+    InputError
+        For an archive, another version's library, an unknown entry, a bound or status with several files, and
+        for no file and no bound.
+    OutputError
+        If the library cannot be written.
+
     """
-    file = Path(file)
     library = writable_library(folder)
-    with locked(library.folder, f"a submission of {file.name}", progress):
-        library = settled(library, progress)
-        progress("checking the point")
-        sidecar, problem, field, objective = checked_point(file, library, entry)
-        record = Record(
-            entry=sidecar["name"],
-            problem_sha256=problem.sha256,
-            solver=solver or UNKNOWN,
-            version=version or UNKNOWN,
-            status="feasible",
-            primal=objective,
-            seconds=seconds,
-            by=by,
-        )
-        record.check()
-        known = sidecar["best"]["objective"]
-        better = is_better(objective, known)
-        if better:
-            add_record(library.folder, record, field)
-            rebuilt(library.folder, progress=progress)
-        return Submission(sidecar["name"], known, objective, better)
-
-
-def is_better(objective: float, known: float) -> bool:
-    """Whether an objective is lower than the best known one by more than rounding."""
-    return known - objective > SAME * max(abs(known), SAME)
+    with locked(library.folder, "a submission", progress):
+        library = _settled(library, progress)
+        if entry is not None:
+            library.entry(entry)
+        session = _Session(library, entry, facts)
+        found = []
+        for source in _sources(files, facts):
+            progress(f"checking {source.name}")
+            found += session.results(source)
+        if any(each.outcome == "accepted" for each in found):
+            write_ledger(session.ledger)
+            library = rebuilt(library.folder, progress=progress)
+        return [
+            replace(each, status=library.entry(each.entries[0])["status"]) if each.entries else each
+            for each in found
+        ]
 
 
 def writable_library(folder: str | Path) -> Library:
-    """The library in a folder. Raises InputError for an archive, and for a library of another version."""
+    """Return the library in a folder. Raises InputError for an archive or a library of another version."""
     if Path(folder).is_file():
         raise InputError("is a file; unpack the archive and give its folder", file=folder)
     library = read_library(folder)
@@ -115,89 +133,398 @@ def writable_library(folder: str | Path) -> Library:
     return library
 
 
-def settled(library: Library, progress: Progress) -> Library:
-    """The library, after what an earlier submission that was stopped has left to do."""
+def _settled(library: Library, progress: Progress) -> Library:
+    """The library, after the rebuild that an earlier submission was stopped before."""
     digest = hashlib.sha256(read_bytes(library.folder / LEDGER)).hexdigest()
     sums = read_bytes(library.folder / SUMS).decode("utf-8", "replace").splitlines()
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
-def checked_point(
-    file: Path, library: Library, entry: str | None
-) -> tuple[dict[str, Any], Problem, CrossField, float]:
-    """The entry of a solution file, its problem, the field of its point, and the objective of that.
+@dataclass(frozen=True)
+class _Source:
+    """A submitted file, or the solution and the log of one run. error: if the file cannot be read."""
 
-    Raises SolutionError for a point that is not feasible, or that a dual bound of the library contradicts.
-    """
-    sidecar, problem, solution = _found_in(file, library, entry)
-    _check_feasible(file, sidecar["name"], problem, solution)
-    assert solution.point is not None
-    field = field_of(solution.problem, solution.point)
-    objective = problem.objective_value(complete_point(problem, field))
-    _check_bound(file, sidecar, objective)
-    return sidecar, problem, field, objective
+    kind: Kind | Literal["bound", ""]
+    path: Path | None = None
+    log: Path | None = None
+    listed: bool = True
+    error: CrossfieldError | None = None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        return tuple(dict.fromkeys(each for each in (self.path, self.log) if each is not None))
 
-def _found_in(file: Path, library: Library, entry: str | None) -> tuple[dict[str, Any], Problem, Solution]:
-    """The sidecar and the problem of the entry that a file is of, and the solution that it holds."""
-    raw = read_raw(file)
-    if not raw.has_point:
-        raise SolutionError(f"holds no point ({raw.status}); there is nothing to submit", file=file)
-    name = entry or by_name(file, library) or _by_columns(file, raw, library)
-    sidecar = library.entry(name)
-    problem = problem_of(library, sidecar)
-    solution = read_solution(file, problem)
-    if solution.unknown:
-        raise SolutionError(
-            f"{solution.unknown} of its names are not in {name}; it is a point of another entry, "
-            "name that entry",
-            file=file,
-        )
-    return sidecar, problem, solution
+    @property
+    def name(self) -> str:
+        return " and ".join(each.name for each in self.files) or "the bound"
 
 
-def by_name(file: Path, library: Library) -> str:
-    """The entry with whose name a file's name begins, the longest one; empty when there is none."""
-    known = (name for name in library.document["entries"] if re.match(rf"{name}([._-]|$)", file.name))
-    return max(known, key=len, default="")
+def _sources(files: Sequence[str | Path], facts: RunFacts) -> list[_Source]:
+    """The files by kind, solutions with their logs. Raises InputError."""
+    found = [_source(path, listed) for path, listed in _expanded(files)]
+    logs = {each.path.with_suffix(""): each for each in found if each.kind == "log" and each.path}
+    paired = []
+    for each in found:
+        log = logs.get(each.path.with_suffix("")) if each.kind == "solution" and each.path else None
+        paired.append(replace(each, log=log.path) if log and each.log is None else each)
+    used = {each.log for each in paired}
+    left = [
+        replace(each, path=None, log=each.path) if each.kind == "log" else each
+        for each in paired
+        if each.kind != "log" or each.path not in used
+    ]
+    if not files and facts.bound is not None:
+        return [_Source("bound")]
+    if not left:
+        raise InputError("there is nothing to submit; give files, or an entry and a bound")
+    is_run = len(left) == 1 and left[0].kind not in ("field", "certificate", "ledger")
+    if not is_run and (facts.bound, facts.status) != (None, None):
+        raise InputError("a bound or status belongs to one run; submit the files of that run alone")
+    return left
 
 
-def _by_columns(file: Path, raw: RawSolution, library: Library) -> str:
-    """The only entry that has the columns of a file."""
-    fitting = [sidecar["name"] for sidecar in library.entries if _fits(raw, file, sidecar, library)]
-    if len(fitting) == 1:
-        return str(fitting[0])
-    if not fitting:
-        raise SolutionError("fits no entry of the library; name the entry if it should", file=file)
-    told = ", ".join(fitting[:_TOLD]) + (", ..." if len(fitting) > _TOLD else "")
-    raise SolutionError(f"fits {len(fitting)} entries of the library ({told}); name the entry", file=file)
+def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
+    """The files with those in folders, and whether each was listed by itself."""
+    for path in map(Path, files):
+        if path.is_dir():
+            inside = (each for each in sorted(path.rglob("*")) if not each.name.startswith("."))
+            yield from ((each, False) for each in inside if each.is_file())
+        else:
+            yield path, True
 
 
-def _fits(raw: RawSolution, file: Path, sidecar: dict[str, Any], library: Library) -> bool:
-    """Whether a file may be of an entry: it has exactly the columns of one of its model files."""
-    if raw.names is None:
-        return False
-    counts, pairs = sidecar["counts"], sidecar["instance"]["pairs"]
-    most = counts["variables"] + pairs + _TOLD  # products that were lifted, and what solvers add
-    least = 0 if raw.omits_zeros else counts["variables"]
-    if not least <= len(raw.values) <= most:
-        return False
+def _source(path: Path, listed: bool) -> _Source:
     try:
-        problem = problem_of(library, sidecar)
-        found = read_solution(file, problem)
+        kinds = kinds_of(path)
+    except CrossfieldError as error:
+        return _Source("", path, error=error)
+    if kinds == {"solution", "log"}:
+        return _both(path)
+    return _Source(next(iter(kinds), ""), path, listed=listed)
+
+
+def _both(path: Path) -> _Source:
+    """The file as the log of a run, as its solution, or as both, depending on its content."""
+    try:
+        LogFile.read(path)
+        has_log = True
     except CrossfieldError:
-        return False
-    beyond = max(problem.objective_degree, problem.row_degree) > FORMATS["mps"].degree
-    return found.unknown == 0 and (beyond or not found.problem.formulation.lifted)
+        has_log = False
+    try:
+        has_point = read_raw(path).has_point
+    except CrossfieldError:
+        has_point = False
+    if has_log and not has_point:
+        return _Source("log", path)
+    return _Source("solution", path, path if has_log else None)
 
 
-def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution) -> None:
-    """Nothing, when angles and jumps are feasible. Raises SolutionError with the worst violations.
+@dataclass
+class _Session:
+    """A submission in progress: the ledger with what was accepted so far."""
 
-    Every other column follows from them and is computed again, so that a solver's tolerance in those rows
-    does not count.
-    """
-    found = _violation(problem, solution)
+    library: Library
+    entry: str | None
+    facts: RunFacts
+    fields: dict[str, list[CrossField]] = field(default_factory=dict)
+    bounds: dict[str, float] = field(default_factory=dict)
+    certified: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.ledger = read_ledger(self.library.folder)
+        self.entries = Entries(self.library)
+
+    def results(self, source: _Source) -> list[Submission]:
+        """Check a source and add its improvements to the ledger."""
+        before = self.ledger
+        try:
+            if source.error is not None:
+                raise source.error
+            if not source.kind:
+                return [self._unknown(source)]
+            if source.kind == "ledger":
+                return list(self._ledger(source))
+            check = {"field": self._field, "certificate": self._certificate}.get(source.kind, self._run)
+            return [check(source)]
+        except CrossfieldError as error:
+            self.ledger = before
+            return [Submission(source.files, source.kind, "refused", error=error)]
+
+    def _unknown(self, source: _Source) -> Submission:
+        if source.listed:
+            raise InputError(
+                "is no solution, field, certificate, log or ledger; give one of these", file=source.path
+            )
+        return Submission(source.files, "", "skipped")
+
+    def _run(self, source: _Source) -> Submission:
+        """Check the solution, the log and the stated bound of a run."""
+        log = LogFile.read(source.log) if source.log else None
+        name = self.entry or self._name_of(source, log)
+        sidecar = self.entries.sidecar(name)
+        found = None
+        if source.path is not None:
+            found = self._point(source.path, sidecar)
+        return self._kept(source, sidecar, self.facts, log, found)
+
+    def _name_of(self, source: _Source, log: LogFile | None) -> str:
+        name = self.entries.of_log(log.log, log.path) if log else ""
+        if source.path is not None:
+            raw = read_raw(source.path)
+            if not raw.has_point:
+                raise SolutionError(f"holds no point ({raw.status})", file=source.path)
+            return (name if not raw.stamp else "") or self.entries.of_solution(raw, source.path)
+        if not name:
+            raise InputError(
+                "there is nothing that shows the entry of the run; name the entry", file=source.log
+            )
+        return name
+
+    def _kept(
+        self,
+        source: _Source,
+        sidecar: dict[str, Any],
+        facts: RunFacts,
+        log: LogFile | None,
+        found: CrossField | None,
+    ) -> Submission:
+        """Add a run to the ledger if it is the best of its solver or has a better point."""
+        name, problem = sidecar["name"], self.entries.problem(sidecar)
+        if log is not None:
+            log.check_entry(name, problem, self.entries.named_in(log.log.text))
+        known = self.known(sidecar)
+        objective = None if found is None else problem.objective_value(complete_point(problem, found))
+        record = run_record(name, problem, facts, log, objective=objective, known=known)
+        better = objective is not None and is_better(objective, known)
+        is_run = log is not None or record.bound is not None
+        have = self.ledger.of(name, problem.sha256)
+        is_best = is_run and record not in have and record in best_of_each([*have, record], name)
+        if better or is_best:
+            self._add(record, sidecar, found if better else None, log)
+        outcome: Outcome = "accepted" if better or is_best else "not better"
+        return Submission(
+            source.files,
+            source.kind,
+            outcome,
+            (name,),
+            objective=objective,
+            known=None if objective is None else known,
+            bound=record.bound,
+            better_point=better,
+        )
+
+    def _add(
+        self,
+        record: Record,
+        sidecar: dict[str, Any],
+        found: CrossField | None = None,
+        log: LogFile | None = None,
+    ) -> None:
+        self.ledger, _ = self.ledger.added(record, found, log.content if log else None)
+        if found is not None:
+            self.fields.setdefault(sidecar["instance"]["sha256"], []).append(found)
+        if record.bound is not None:
+            relatives = [each["entry"] for each in sidecar["equivalent"] if each["entry"] is not None]
+            self._raise_bounds([sidecar["name"], *relatives], record.bound)
+
+    def _raise_bounds(self, names: Iterable[str], bound: float) -> None:
+        for name in names:
+            self.bounds[name] = max(bound, self.bounds.get(name, bound))
+
+    def known(self, sidecar: dict[str, Any]) -> float:
+        """Return the least objective of an entry at its best point and at fields accepted in this call."""
+        problem = self.entries.problem(sidecar)
+        accepted = self.fields.get(sidecar["instance"]["sha256"], [])
+        values = [problem.objective_value(complete_point(problem, each)) for each in accepted]
+        return float(min([sidecar["best"]["objective"], *values]))
+
+    def _point(self, path: Path, sidecar: dict[str, Any]) -> CrossField:
+        """The field of a solution. Raises SolutionError unless its angles and jumps are feasible."""
+        name, problem = sidecar["name"], self.entries.problem(sidecar)
+        solution = read_solution(path, problem)
+        if solution.point is None or solution.violation is None:
+            raise SolutionError(f"holds no point ({solution.status})", file=path)
+        if solution.unknown:
+            raise SolutionError(
+                f"{solution.unknown} of its names are not in {name}; it is a point of another entry, "
+                "name that entry",
+                file=path,
+            )
+        # Every other column follows from angles and jumps, so a solver's tolerance there does not count.
+        violation = problem.violation(complete_point(problem, solution.field))
+        _check_feasible(path, name, replace(violation, integrality=solution.violation.integrality))
+        found = field_of(solution.problem, solution.point)
+        self._check_bound(path, sidecar, problem, found)
+        return found
+
+    def _check_bound(self, path: Path, sidecar: dict[str, Any], problem: Problem, found: CrossField) -> None:
+        """Raise SolutionError if a dual bound of the entry lies above the objective of a feasible field."""
+        objective = problem.objective_value(complete_point(problem, found))
+        bounds = [sidecar["bound"], self.bounds.get(sidecar["name"])]
+        bound = max((each for each in bounds if each is not None), default=None)
+        if bound is not None and contradicts(bound, objective):
+            raise SolutionError(
+                f"is feasible with objective {objective!r}, "
+                f"but the library has the dual bound {bound!r} of {sidecar['name']}; "
+                f"that bound is wrong, take its record out of {LEDGER} first",
+                file=path,
+            )
+
+    def _field(self, source: _Source) -> Submission:
+        """Check a field on every entry of its instance."""
+        assert source.path is not None
+        found = self._read_field(source.path)
+        sidecars = self._on(source.path, "field", found.instance.sha256, found.instance.summary)
+        improved, checked = [], []
+        for sidecar in sidecars:
+            problem = self.entries.problem(sidecar)
+            point = complete_point(problem, found)
+            _check_feasible(source.path, sidecar["name"], problem.violation(point))
+            self._check_bound(source.path, sidecar, problem, found)
+            known, objective = self.known(sidecar), problem.objective_value(point)
+            checked.append((sidecar, objective, known))
+            if is_better(objective, known):
+                improved.append((sidecar, objective, known))
+        for sidecar, objective, _ in _one_per_optimum(improved):
+            problem = self.entries.problem(sidecar)
+            record = run_record(
+                sidecar["name"], problem, self.facts, None, objective=objective, known=self.known(sidecar)
+            )
+            self._add(record, sidecar, found)
+        chosen = improved or checked
+        return Submission(
+            source.files,
+            source.kind,
+            "accepted" if improved else "not better",
+            tuple(sidecar["name"] for sidecar, _, _ in chosen),
+            objective=chosen[0][1],
+            known=chosen[0][2],
+            better_point=bool(improved),
+        )
+
+    def _read_field(self, path: Path) -> CrossField:
+        name = self.entry or (self.entries.by_file_name(path) if path.suffix.lower() == ".rawfield" else "")
+        on = self.entries.problem(self.entries.sidecar(name)).instance if name else None
+        if path.suffix.lower() in (".rawfield", ".npz"):
+            return read_field(path, on=on)
+        with naming(path):
+            data = read_bytes(path)
+            if data.startswith(b"PK"):
+                raise InputError("is an .npz by its content; let its name end in .npz")
+            found = field_of_json(data)
+            if on is not None:
+                found.check_instance(on)
+            return found
+
+    def _on(self, path: Path, kind: str, instance_sha256: str, summary: str) -> list[dict[str, Any]]:
+        """The sidecars of an instance, or of the one entry that was named. Raises InputError without any."""
+        found = [each for each in self.entries.on(instance_sha256) if self.entry in (None, each["name"])]
+        if not found:
+            raise InputError(f"is a {kind} of an instance that is not in the library: {summary}", file=path)
+        return found
+
+    def _certificate(self, source: _Source) -> Submission:
+        """Check a certificate and keep it if it proves more than the one before."""
+        assert source.path is not None
+        found = read_certificate(source.path)
+        instance = found.field.instance
+        sidecars = [
+            each
+            for each in self._on(source.path, "certificate", instance.sha256, instance.summary)
+            if FORMULATIONS[each["formulation"]].minimises == TWO_NORM
+        ]
+        if not sidecars:
+            raise InputError(
+                f"proves a bound of the 2-norm, which no entry of {instance.name} minimises", file=source.path
+            )
+        names = tuple(each["name"] for each in sidecars)
+        problem = self.entries.problem(sidecars[0])
+        _check_feasible(source.path, names[0], problem.violation(complete_point(problem, found.field)))
+        stem = sidecars[0]["instance"]["file"].removesuffix(".instance.json")
+        known = self.known(sidecars[0])
+        before = self._certified_bound(stem)
+        better_point = is_better(found.energy, known)
+        improves = (
+            before is None or is_better(-found.bound, -before) or (better_point and found.bound >= before)
+        )
+        if improves:
+            data = read_bytes(source.path)
+            self.ledger = self.ledger.certified(stem, instance.sha256, data, self.facts.by)
+            self.certified[stem] = found.bound
+            self.fields.setdefault(instance.sha256, []).append(found.field)
+            self._raise_bounds(names, found.bound)
+        return Submission(
+            source.files,
+            source.kind,
+            "accepted" if improves else "not better",
+            names,
+            objective=found.energy,
+            known=known,
+            bound=found.bound,
+            better_point=improves and better_point,
+        )
+
+    def _certified_bound(self, instance: str) -> float | None:
+        """The bound of the certificate that the library has of an instance."""
+        if instance in self.certified:
+            return self.certified[instance]
+        about = read_about(self.library.folder / about_file(instance))
+        return about["certificate"]["bound"] if "certificate" in about else None
+
+    def _ledger(self, source: _Source) -> Iterator[Submission]:
+        """Check the runs, points and certificates of another ledger, whose files lie beside it."""
+        assert source.path is not None
+        other = read_ledger(source.path.parent, source.path.name)
+        found = 0
+        for record in other.records:
+            if record in self.ledger.records or (record.bound, record.point) == (None, None):
+                continue
+            found += 1
+            try:
+                yield self._of_ledger(source, record, other)
+            except CrossfieldError as error:
+                yield Submission(source.files, source.kind, "refused", (), error=error)
+        for each in other.certificates:
+            if each not in self.ledger.certificates:
+                found += 1
+                yield from self.results(_Source("certificate", other.folder / each.file))
+        if not found:
+            yield Submission(source.files, source.kind, "not better")
+
+    def _of_ledger(self, source: _Source, record: Record, other: Ledger) -> Submission:
+        """Check a record of another ledger, whose bound counts as stated unless its log shows it."""
+        assert source.path is not None
+        sidecar = self.entries.sidecar(record.entry)
+        problem = self.entries.problem(sidecar)
+        if record.problem_sha256 != problem.sha256:
+            raise InputError(f"has a record of another problem than that of {record.entry}", file=source.path)
+        log = LogFile.of(other.folder / str(record.log), other.log(record)) if record.log else None
+        found = other.field(record) if record.point else None
+        if found is not None:
+            found.check_instance(problem.instance)
+            path = other.folder / str(record.point)
+            _check_feasible(path, record.entry, problem.violation(complete_point(problem, found)))
+            self._check_bound(path, sidecar, problem, found)
+        facts = {name: getattr(record, name) for name in RunFacts.__dataclass_fields__ if name != "limit"}
+        return self._kept(source, sidecar, RunFacts(**facts, limit=record.time_limit), log, found)
+
+
+Improved = tuple[dict[str, Any], float, float]
+"""The sidecar of an entry, the objective of a field there, and the least one before."""
+
+
+def _one_per_optimum(improved: Iterable[Improved]) -> list[Improved]:
+    """The first of the entries with the same optimum, for a field counts for all entries of its instance."""
+    chosen: dict[tuple[str, str], Improved] = {}
+    for each in improved:
+        sidecar = each[0]
+        optimum = FORMULATIONS[sidecar["formulation"]].minimises, sidecar["options"]["facet"]
+        chosen.setdefault(optimum, each)
+    return list(chosen.values())
+
+
+def _check_feasible(path: Path, entry: str, found: Violation) -> None:
+    """Raise SolutionError, with the worst violations, unless a point is feasible."""
     if found.worst <= FEASIBLE:
         return
     worst = f" (family {found.worst_family})" if found.rows > FEASIBLE else ""
@@ -205,25 +532,5 @@ def _check_feasible(file: Path, entry: str, problem: Problem, solution: Solution
         f"is not a feasible point of {entry}: violations of rows {found.rows:.3g}{worst}, "
         f"bounds {found.bounds:.3g}, integrality "
         f"{found.integrality:.3g}, and {FEASIBLE:g} is allowed; let the solver use tighter tolerances",
-        file=file,
+        file=path,
     )
-
-
-def _violation(problem: Problem, solution: Solution) -> Violation:
-    """The worst violations of the file's angles and jumps, all other columns derived from them."""
-    assert solution.point is not None
-    assert solution.violation is not None
-    completed = problem.violation(complete_point(problem, solution.field))
-    return replace(completed, integrality=solution.violation.integrality)
-
-
-def _check_bound(file: Path, sidecar: dict[str, Any], objective: float) -> None:
-    """Nothing, when no dual bound lies above the objective of a feasible point. Raises SolutionError."""
-    bound = sidecar["bound"]
-    if bound is not None and contradicts(bound, objective):
-        raise SolutionError(
-            f"is feasible with objective {objective!r}, "
-            f"but the library has the dual bound {bound!r} of {sidecar['name']}; "
-            f"that bound is wrong, take its record out of {LEDGER} first",
-            file=file,
-        )

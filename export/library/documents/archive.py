@@ -1,4 +1,4 @@
-"""Libraries as they are handed around: a folder, or an archive (.zip, .tar, .tar.gz/bz2/xz) of one.
+"""Safe unpacking of libraries: folders, and archives (.zip, .tar, .tar.gz/bz2/xz) of them.
 
 All members are checked before a byte is written. An archive may hold plain files and folders alone, with
 short names inside its own folder that differ in more than case, and no more than fits its size. Its files are
@@ -58,7 +58,7 @@ _DAMAGE: Final = (
 
 @contextmanager
 def opened(path: str | Path) -> Iterator[Path]:
-    """The folder of a library: the path itself, or a temporary folder that holds what an archive holds.
+    """Yield the folder of a library: the path itself, or a temporary folder with an archive's content.
 
     Raises InputError when there is nothing at the path, and for an archive that is damaged, unpacks outside
     of its folder, holds links or is unreasonably large; then nothing was written.
@@ -135,7 +135,7 @@ def _place(member: Member) -> str:
 
 
 class _Names:
-    """The names that an archive has had so far; no two of them differ in case alone."""
+    """The names of an archive so far, no two of which differ in case alone."""
 
     def __init__(self) -> None:
         self._held: dict[str, tuple[str, bool]] = {}
@@ -151,7 +151,7 @@ class _Names:
             place, is_folder = place.rpartition("/")[0], True
 
     def _is_new(self, place: str, *, is_folder: bool) -> bool:
-        """Whether no name is the same as file systems compare them. Raises InputError for a similar one."""
+        """Whether the name is new to file systems that ignore case. Raises InputError for a similar one."""
         folded = unicodedata.normalize("NFKC", place.casefold())
         if folded not in self._held:
             self._held[folded] = (place, is_folder)
@@ -173,7 +173,7 @@ def _members(path: Path, limit: int) -> Iterator[Member]:
 
 
 def _of_zip(path: Path, limit: int) -> Iterator[Member]:
-    """The members of a .zip. Opening one has zipfile compare its name there with that in the directory."""
+    """The members of a .zip. On opening one, zipfile compares its name with the directory."""
     with path.open("rb") as raw:
         limited = _Limited(raw, MOST_FILES * MOST_ENTRY)
         with zipfile.ZipFile(cast("IO[bytes]", limited)) as archive:
@@ -200,7 +200,7 @@ def _head(path: Path) -> bytes:
 
 
 class _Limited:
-    """A stream that refuses to give more than a number of bytes, whichever they are."""
+    """A stream that returns at most a number of bytes in total."""
 
     def __init__(self, stream: IO[bytes], limit: int) -> None:
         self._stream, self.left = stream, limit

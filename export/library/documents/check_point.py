@@ -14,7 +14,7 @@ instance, and pi has 60 digits.
 
 Exit code 0: feasible within the tolerance; 1: not feasible, or the file claims another objective; 2: wrong
 usage or a file that cannot be used. An objective that a file claims is compared with that of an MPS file, to
-1e-5 of its size, or of 1: solvers tell what they have to about 1e-6.
+1e-5 of its size, or of 1: solvers state theirs to about 1e-6.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ class Model:
 
 
 class Finding:
-    """What was found of a point.
+    """Result of the check of a point.
 
     Objective (of an instance the 2-norm energy), lines of the report, the worst violation of each kind, and
     whether the file's own point has the objective that it claims, if it claims one that can be compared.
@@ -192,7 +192,7 @@ def number(text: str) -> Decimal:
 
 
 def _require(condition: object, otherwise: str) -> None:
-    """Nothing, when the condition holds; else the error."""
+    """Raise the error unless the condition holds."""
     if not condition:
         raise BadInputError(otherwise)
 
@@ -467,7 +467,7 @@ def _value(point: Point, words: list[str]) -> None:
 
 
 def check_model(model: Model, point: Point, *, rounded: bool) -> Finding:
-    """What is found of a point against a model, without any rounding error."""
+    """Check a point against a model without rounding errors."""
     foreign = [name for name in point.values if name not in model.number]
     _refuse_foreign([name for name in foreign if not ADDED.fullmatch(name)], len(point.values))
     values = point.of(model.columns)
@@ -729,7 +729,7 @@ def _sign(p: Decimal) -> Decimal:
 
 
 def check_instance(instance: Instance, point: Point) -> Finding:
-    """What is found of the cross field of a point on an instance."""
+    """Check the cross field of a point on an instance."""
     places = {pixel.place for pixel in instance.pixels}, {name for name, _, _ in instance.pairs}
     foreign = [name for name in point.values if not _is_of(name, places) and not ADDED.fullmatch(name)]
     _refuse_foreign(foreign, len(point.values))
@@ -770,7 +770,7 @@ def _brief(value: Decimal) -> str:
 
 
 def check(model: str, point: str, *, rounded: bool = False) -> Finding:
-    """What is found of the point in a file against the model or the instance in another one."""
+    """Check the point in a file against the model or the instance in another one."""
     with decimal.localcontext(EXACT):
         values = _of_file(point, read_point)
         if _of_file(model, _is_json):
@@ -781,7 +781,7 @@ def check(model: str, point: str, *, rounded: bool = False) -> Finding:
 
 
 def _of_file(path: str, read: Callable[[str], Kind]) -> Kind:
-    """What is read from a file, whose name leads every error."""
+    """Read a file, whose name begins every error."""
     try:
         return read(path)
     except BadInputError as error:

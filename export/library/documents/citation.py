@@ -1,7 +1,7 @@
-"""How a library is cited, and under which licence is what.
+"""Citation and licences of a library.
 
-Licences are those that the specification states, sketch by sketch. The paper is cited by its title alone:
-nothing more is known of it for certain.
+Licences are those that the specification states, sketch by sketch. The paper is cited by its title alone,
+because nothing else about it is certain.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ LICENCES: Final = {
     },
     "MIT": ("MIT licence", "https://opensource.org/license/mit"),
 }
-"""Full name and address of licences for which texts have more than what the specification says."""
+"""Full name and address of known licences."""
 
 PAPER: Final = (
     "Extrapolating curvature lines in rough concept sketches using mixed-integer nonlinear optimization"
@@ -55,20 +55,20 @@ REFERENCES: Final = (
         "the problem"
     ),
 )
-"""What every entry refers to."""
+"""References of every entry."""
 
 _SPECIAL: Final = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 _SPECIAL_OF_TEX: Final = _SPECIAL | {letter: f"\\{letter}" for letter in "&%$#_{}"}
 
 
 def cited(spec: Spec) -> dict[str, Any]:
-    """What library.json tells of the release: title, authors, BibTeX, and version and date where stated."""
+    """Return the release as in library.json: title, authors, BibTeX, and stated version and date."""
     stated = {"authors": []} if spec.release is None else spec.release.document()
     return {"title": spec.title, **stated, "bibtex": bibtex(spec)}
 
 
 def bibtex(spec: Spec) -> str:
-    """BibTeX entries of the library, of the paper and of what that builds on."""
+    """Return the BibTeX entries of the library, of the paper and of BendFields."""
     release = spec.release
     fields = {"title": f"{{{_tex(spec.title)}}}"}
     if release is not None:
@@ -97,7 +97,7 @@ def _key(spec: Spec) -> str:
 
 
 def slug(text: str, between: str = "-") -> str:
-    """Letters, digits and points of a text in lower case, other runs of characters as one that is given."""
+    """Return letters, digits and points of a text in lower case, joined by a separator."""
     return re.sub(r"[^a-z0-9.]+", between, text.lower()).strip(between + ".") or "library"
 
 
@@ -112,13 +112,13 @@ def _tex(text: str) -> str:
 
 @dataclass(frozen=True)
 class Terms:
-    """What texts say of the licences in a library."""
+    """Licences in a library, for its texts."""
 
     sketches: tuple[Sketch, ...]
 
     @property
     def licence(self) -> str:
-        """The licence that every sketch states, if it is the same and a known one; else nothing."""
+        """The known licence that all sketches share; empty without one."""
         stated = {each.origin.license for each in self.sketches}
         return next(iter(stated)) if len(stated) == 1 and stated <= {*LICENCES} else ""
 
@@ -135,7 +135,7 @@ class Terms:
 
     @property
     def lines(self) -> Iterator[str]:
-        """A line for each sketch: what is stated of it."""
+        """One line per sketch with its stated origin."""
         for sketch in self.sketches:
             origin = sketch.origin
             licence = origin.license or "no licence is stated; ask its author before you share what is here"

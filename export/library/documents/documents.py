@@ -1,4 +1,4 @@
-"""Sidecars: one JSON document for each entry, and the index of the library. Written, read, checked.
+"""JSON documents of a library: a sidecar per entry, a document per instance, and the index.
 
 Schemas: library-entry.schema.json, library-instance.schema.json and library-index.schema.json beside this
 module.
@@ -34,7 +34,7 @@ INDEX: Final = "library.json"
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """A library that was built: its folder and its index, both checked."""
+    """A built library: its folder and its checked index."""
 
     folder: Path
     document: dict[str, Any]
@@ -45,7 +45,7 @@ class Library:
         return tuple(map(self.entry, self.document["entries"]))
 
     def entry(self, name: str) -> dict[str, Any]:
-        """The sidecar of an entry. Raises InputError for a name that the library does not have."""
+        """Read the sidecar of an entry. Raises InputError for a name that the library does not have."""
         if name not in self.document["sha256"]:
             near = get_close_matches(name, self.document["entries"], 1)
             asked = f" (is it {near[0]}?)" if near else ""
@@ -54,17 +54,17 @@ class Library:
 
     @property
     def skipped(self) -> dict[str, str]:
-        """Names of instances whose size leaves nothing of their sketch, and what was said of each."""
+        """Names of instances whose size is too small for their sketch, and the reasons."""
         return dict(self.document.get("skipped", {}))
 
     @property
     def spec(self) -> Spec:
-        """The specification it was built from; drawings are read from the library itself."""
+        """Its specification, with the drawings in the library."""
         return spec_of(self.document["spec"], self.folder / INDEX)
 
 
 def read_library(folder: str | Path) -> Library:
-    """The library in a folder. Raises InputError without one, InstanceError when its index is damaged."""
+    """Read the library in a folder. Raises InputError without one, InstanceError for a damaged index."""
     path = Path(folder) / INDEX
     if not path.is_file():
         raise InputError(
@@ -74,12 +74,12 @@ def read_library(folder: str | Path) -> Library:
 
 
 def read_sidecar(path: str | Path) -> dict[str, Any]:
-    """The sidecar in a file. Raises InputError, or InstanceError where it breaks its schema."""
+    """Read the sidecar in a file. Raises InputError, or InstanceError if it breaks its schema."""
     return _read(Path(path), FORMAT, "library-entry")
 
 
 def read_about(path: str | Path) -> dict[str, Any]:
-    """What a library knows of an instance. Raises as `read_sidecar`."""
+    """Read the document of an instance. Raises as `read_sidecar`."""
     return _read(Path(path), ABOUT_FORMAT, "library-instance")
 
 
@@ -88,17 +88,17 @@ def _read(path: Path, form: str, schema: str) -> dict[str, Any]:
 
 
 def about_file(instance: str) -> str:
-    """Name of the file that says what is known of an instance; it is written last."""
+    """Return the name of the document of an instance, which is written last."""
     return f"{instance}.about.json"
 
 
 def as_bytes(document: dict[str, Any]) -> bytes:
-    """A document as the bytes of its file."""
+    """Return a document as the bytes of its file."""
     return (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Problem:
-    """The problem of an entry, from its instance's file and its sidecar.
+    """Return the problem of an entry, from its instance's file and its sidecar.
 
     Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
     names.
@@ -119,7 +119,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 def problem_from(
     instance: Instance, formulation: str, options: dict[str, Any], listed: list[list[int]] | None
 ) -> Problem:
-    """The problem of a formulation with options and, where they are data, jumps not zero as [pair, jump]."""
+    """Return the problem of a formulation; listed: nonzero jumps as [pair, jump] if they are data."""
     jumps: Ints | None = None
     if FORMULATIONS[formulation].fixed:
         jumps = np.zeros(len(instance.grid.first), dtype=np.int32)
@@ -133,7 +133,7 @@ def problem_from(
 
 
 def listed_jumps(problem: Problem) -> list[list[int]] | None:
-    """Jumps that are data and not zero as [pair, jump]; None where jumps are variables."""
+    """Return nonzero jumps as [pair, jump] if they are data, None if they are variables."""
     if problem.jumps is None:
         return None
     at = np.nonzero(problem.jumps)[0]

@@ -1,8 +1,8 @@
-"""One process at a time at a library: a lock on its folder, which ends with the process that holds it.
+"""Lock on the folder of a library, which ends with the process that holds it.
 
 The lock is a file `.lock` in the folder that the system locks for its holder (filelock: flock, on Windows
-msvcrt), so that a crash leaves no lock behind; the file tells who holds it. It is removed by the holder, and
-a file that a crash has left is taken over by the next one.
+msvcrt), so that a crash leaves no lock behind. The file names its holder, who removes it. The next process
+takes over the file of one that crashed.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _TICK: Final = 0.1  # seconds between two looks
 
 @contextmanager
 def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
-    """Nothing; meanwhile no other process changes or verifies the library in a folder.
+    """Keep other processes from changing or verifying the library in a folder.
 
-    action: what is done, for others that wait. Raises OutputError when another one does not end within
-    PATIENCE seconds, or the folder cannot be written.
+    action: shown to processes that wait. Raises OutputError if another process does not end within PATIENCE
+    seconds, or if the folder cannot be written.
     """
     path = folder / FILE
     lock = FileLock(path, timeout=PATIENCE, poll_interval=_TICK)
@@ -51,11 +51,11 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
             f"cannot be written: {(error.strerror or str(error)).lower()}; choose another folder", file=folder
         ) from error
     try:
-        with suppress(OSError):  # Windows lets nobody write a file that is locked
+        with suppress(OSError):  # Windows refuses to write a locked file
             path.write_text(f"{action}, process {os.getpid()} on {socket.gethostname()}", "utf-8")
         yield
     finally:
-        # Before the release: those that wait look whether the file that they locked still has its name.
+        # Before the release, because waiting processes check that the file they locked still has its name.
         with suppress(OSError):
             path.unlink()
         lock.release()
@@ -63,15 +63,15 @@ def locked(folder: Path, action: str, progress: Progress = silent) -> Iterator[N
 
 @contextmanager
 def unchanged(folder: Path, action: str, progress: Progress = silent) -> Iterator[None]:
-    """As `locked`, for who only reads; a folder that cannot be written is read without a lock."""
+    """Lock a folder for reading; one that cannot be written is read without a lock."""
     with locked(folder, action, progress) if os.access(folder, os.W_OK) else nullcontext():
         yield
 
 
 def _holder(path: Path) -> str:
-    """Who holds a lock, in words."""
+    """The holder of a lock in words."""
     try:
-        told = path.read_bytes()[:300].decode("utf-8", "replace")
+        holder = path.read_bytes()[:300].decode("utf-8", "replace")
     except OSError:
-        told = ""
-    return shortened(told, 200) or "another process"
+        holder = ""
+    return shortened(holder, 200) or "another process"

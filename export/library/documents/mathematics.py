@@ -1,4 +1,4 @@
-"""A formulation for a browser: MathML made from its LaTeX, in pieces between which lines may break."""
+"""MathML of a formulation, in pieces between which lines may break."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Line:
     """A line of a model.
 
     role: `minimise`, `subject to`, `where`, or empty as on the line before; pieces: of the formula, as
-    MathML, in which no file has a say.
+    MathML made from our declarations alone.
     """
 
     role: str
@@ -40,7 +40,7 @@ class Model:
 
 
 def model(formulation: str, options: dict[str, Any]) -> Model:
-    """The mathematics of a formulation with options. Raises FormulationError for an unknown one."""
+    """Return the mathematics of a formulation with options. Raises FormulationError."""
     return _model(formulation, tuple(sorted(options.items())))
 
 
@@ -64,7 +64,7 @@ def _lines(rows: list[str]) -> Iterator[Line]:
 
 
 def _pieces(formula: str) -> Iterator[str]:
-    """The formula cut before its relation and before the signs between its terms, those in brackets aside."""
+    """The formula cut before its relation and before the signs between its terms, except in brackets."""
     depth, start = 0, 0
     for token in _TOKENS.finditer(formula):
         depth += (token[0] in {"{", r"\left"}) - (token[0] in {"}", r"\right"})

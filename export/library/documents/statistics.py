@@ -1,4 +1,4 @@
-"""What is counted of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
+"""Statistics of a problem: columns, rows and terms by kind, curvature, and ranges of coefficients.
 
 The list of counts is MINLPLib's. Nothing is read from files: all of it comes from the declaration bound to
 the instance.
@@ -22,7 +22,7 @@ MOST_EIGEN: Final = 600
 
 
 def sizes(instance: Instance) -> dict[str, int]:
-    """Numbers of pixels, stroke pixels and pairs."""
+    """Return the numbers of pixels, stroke pixels and pairs."""
     return {
         "pixels": instance.grid.size,
         "strokes": len(instance.theta),
@@ -31,12 +31,12 @@ def sizes(instance: Instance) -> dict[str, int]:
 
 
 def density(instance: Instance) -> float:
-    """The share of the pixels that are strokes, to four decimals."""
+    """Return the share of the pixels that are strokes, to four decimals."""
     return round(len(instance.theta) / instance.grid.size, 4)
 
 
 def counts(problem: Problem) -> dict[str, int]:
-    """Numbers of columns, rows, nonzeros and terms by kind."""
+    """Return the numbers of columns, rows, nonzeros and terms by kind."""
     return _columns(problem) | _rows(problem) | _terms(problem)
 
 
@@ -96,7 +96,7 @@ def _terms(problem: Problem) -> dict[str, int]:
 
 
 def curvature(problem: Problem) -> dict[str, Any]:
-    """Curvature of objective and rows; signs of the Hessian's eigenvalues, or why there are none."""
+    """Return the curvature of objective and rows, and signs of the Hessian's eigenvalues or a reason."""
     objective, reason = of_objective(problem)
     found = _eigenvalue_signs(problem) if problem.objective_degree == 2 else None
     return {

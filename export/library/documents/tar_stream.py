@@ -82,7 +82,7 @@ class _Counted:
 
 
 class _Extended:
-    """What the headers before a member's own say of it."""
+    """Facts about a member from the headers before its own."""
 
     def __init__(self) -> None:
         self.name: bytes | None = None
@@ -141,7 +141,7 @@ def _number(field: bytes) -> int:
 
 
 def _name(block: bytes) -> bytes:
-    """The name in a header; in that of POSIX with the folders before it."""
+    """The name in a header, with the folders before it if the header is of POSIX."""
     name, prefix = block[:100].split(b"\0")[0], block[345:500].split(b"\0")[0]
     return prefix + b"/" + name if prefix and block[257:263] == b"ustar\0" else name
 

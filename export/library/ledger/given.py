@@ -1,30 +1,29 @@
-"""Points that a specification brings: what is known of its instances, found once and kept.
+"""Given points of a specification: results for its instances, found once and kept.
 
-A folder or an archive that holds of each instance what a library holds: INSTANCE.about.json, and the fields
-and the certificate that it lists. A build with them searches for nothing, so that its bytes do not depend on
-the processor. What is about another instance than the one that is built does not count.
+A folder or an archive holds the same files per instance as a library: INSTANCE.about.json, and the fields
+and the certificate that it lists. A build with them does not search, so that its bytes do not depend on the
+processor. Results for another instance than the built one do not count.
 """
 
 from __future__ import annotations
 
 import io
 import math
-import tempfile
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
-from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes, write_bytes
 from ..documents.archive import opened
 from ..documents.documents import about_file, are_whole, read_about, read_library
 from ..plan.recipe import digest
-from .points import Known, Provenance
+from .certificates import METHOD, Certified, certified_by
+from .points import Known, Provenance, ours
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
@@ -33,7 +32,7 @@ _DATE: Final = (1980, 1, 1, 0, 0, 0)  # of every member of an archive, so that i
 
 @dataclass(frozen=True)
 class Given:
-    """What is known of an instance: its document, the files that this lists, a digest of both."""
+    """Results for an instance: its document, the listed files, a digest of both."""
 
     about: dict[str, Any]
     files: dict[str, bytes]
@@ -45,50 +44,47 @@ class Given:
         return str(self.about["instance"]["sha256"])
 
     def field(self, role: str) -> Known:
-        """The field of a role of ROLES. Raises InstanceError for a damaged one."""
+        """Return the field of a role of ROLES. Raises InstanceError for a damaged one."""
         facts = self.about["fields"][role]
         return Known(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
 
-    def certificate(self, instance: Instance) -> tuple[bytes, dict[str, Any]] | None:
-        """Return the bytes of the certificate, and what it says, where there is one.
+    def certificate(self, instance: Instance) -> Certified | None:
+        """Return the certificate, checked, if there is one.
 
-        Raises InputError where the checker refuses it, it is of another instance, or it says something else
-        than the document does.
+        Raises InputError if the checker refuses it, if it is of another instance, or if the document states
+        another status, bound or energy.
         """
         facts = dict(self.about.get("certificate", {}))
         if not facts:
             return None
-        data = self.files[name := facts.pop("file")]
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-            path = Path(folder) / name
-            path.write_bytes(data)
-            found = read_certificate(path, on=instance)
-        same = (facts["status"], facts["bound"]) == (found.status, found.bound)
-        if not same or not math.isclose(facts["energy"], found.energy, rel_tol=_SAME, abs_tol=_SAME):
+        name = facts.pop("file")
+        found = certified_by(self.files[name], name, instance, ours(METHOD))
+        same = (facts["status"], facts["bound"]) == (found.facts["status"], found.facts["bound"])
+        if not same or not math.isclose(facts["energy"], found.facts["energy"], rel_tol=_SAME, abs_tol=_SAME):
             raise InputError(
                 f"{about_file(self.about['name'])} states another status, bound or energy than {name}; "
                 "make the points again with `crossfield library points`"
             )
-        return data, facts
+        return replace(found, file=f"{self.about['name']}.certificate.npz", facts=facts)
 
 
 Points = Callable[[str], Given | None]
-"""What is known of the instance of a name, None where nothing is."""
+"""Results for the instance of a name, None without any."""
 
 
 def nothing(_instance: str) -> None:
-    """Nothing is known of any instance."""
+    """Return no results for any instance."""
 
 
 def read_points(path: str | Path) -> Points:
-    """The points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
+    """Read the points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
     with opened(path) as folder:
         known = dict(_named(folder, each) for each in sorted(folder.glob("*.about.json")))
     return known.get
 
 
 def _named(folder: Path, path: Path) -> tuple[str, Given]:
-    """The name of the instance that a document is about, which the file is named after, and what is known."""
+    """The name of a document's instance and the results for it."""
     about = read_about(path)
     if path.name != about_file(about["name"]):
         raise InputError(f"is about {about['name']}; its name must be {about_file(about['name'])}", file=path)
@@ -96,7 +92,7 @@ def _named(folder: Path, path: Path) -> tuple[str, Given]:
 
 
 def points_of(folder: Path) -> Points:
-    """The points of a library that was built with given ones: its own are at least as good."""
+    """Return the points of a library that was built with given ones, which are at least as good."""
 
     def of(instance: str) -> Given | None:
         try:
@@ -109,7 +105,7 @@ def points_of(folder: Path) -> Points:
 
 
 def write_points(folder: str | Path, path: str | Path) -> int:
-    """The number of instances of a library whose points are now in an archive (.zip).
+    """Write the points of a library to an archive (.zip) and return the number of instances.
 
     The same points give the same bytes. Raises InputError where there is no library or a file is damaged,
     InstanceError, OutputError.
@@ -127,7 +123,7 @@ def write_points(folder: str | Path, path: str | Path) -> int:
 
 
 def _given(folder: Path, about: dict[str, Any], sha256: str | None = None) -> Given:
-    """What a folder holds of an instance. Raises InputError for a file that is missing or another one."""
+    """The results for an instance in a folder. Raises InputError for a missing or another file."""
     listed = [each for each in about["files"] if each["name"] != about["instance"]["file"]]
     if lost := [each["name"] for each in listed if not are_whole(folder, [each])]:
         raise InputError(

@@ -1,4 +1,4 @@
-"""The ledger: what solvers found, measured once and kept. An input of every build, never made by one.
+"""The ledger: results of solvers, measured once and kept. It is an input of every build.
 
 ledger.json holds records; the field of a record that improved a point lies beside it as `ENTRY.field.json`. A
 record carries the SHA-256 of the problem it is about, and counts for that problem alone.
@@ -16,20 +16,20 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from ....models.errors import InputError, InstanceError, shortened
+from ....models.errors import InputError, InstanceError, naming, shortened
 from ....models.field.field import CrossField
-from ....models.field.file import read_field, write_field
+from ....models.field.file import field_of_json, field_to_json
 from ....models.instance.file import read_document, schema_error
-from ....models.storage import read_bytes, sha256_of, write_bytes
+from ....models.storage import read_bytes, write_bytes
 from .. import documents
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
 FILE: Final = "ledger.json"
 RunStatus = Literal["optimal", "feasible", "limit", "no point"]
-"""What a run came to; of a submitted point `feasible`."""
+"""Result of a run; `feasible` for a submitted point."""
 Evidence = Literal["log", "word"]
-"""What a submitted bound rests on: the log beside the ledger, or the word of whoever sent it."""
+"""Evidence of a submitted bound: the log beside the ledger, or the word of its submitter."""
 _LATER: Final = ("machine", "date", "evidence", "log", "log_sha256", "trace")  # left out where there is none
 _LONGEST: Final = 200  # characters of a text
 _VERSION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 .,_+()-]{0,59}")
@@ -104,52 +104,111 @@ class Record:
 
 
 @dataclass(frozen=True)
+class SubmittedCertificate:
+    """A certificate that was submitted.
+
+    instance, instance_sha256: name and SHA-256 of the instance; file, sha256: name and SHA-256 of the file
+    beside the ledger; by: who submitted it.
+    """
+
+    instance: str
+    instance_sha256: str
+    file: str
+    sha256: str
+    by: str | None = None
+
+
+@dataclass(frozen=True)
 class Ledger:
-    """Records in order, and the folder where the files of their fields lie, or are to lie:
-    elsewhere says where those lie that are not there yet.
+    """Records and certificates in order, and the folder that holds their files.
+
+    unwritten: content of files that are not in the folder yet, by name.
     """
 
     folder: Path
     records: tuple[Record, ...] = ()
-    elsewhere: Mapping[str, Path] = field(default_factory=dict)
+    certificates: tuple[SubmittedCertificate, ...] = ()
+    unwritten: Mapping[str, bytes] = field(default_factory=dict)
 
     def of(self, entry: str, problem_sha256: str) -> list[Record]:
-        """The records of an entry that are about this very problem."""
+        """Return the records of an entry that are about this very problem."""
         return [each for each in self.records if (each.entry, each.problem_sha256) == (entry, problem_sha256)]
 
     def with_point(self, entry: str) -> Record | None:
-        """The record whose field is kept for an entry: the last one that has a field."""
+        """Return the record whose field is kept for an entry: the last one that has a field."""
         found = [each for each in self.records if each.entry == entry and each.point is not None]
         return found[-1] if found else None
 
-    def path(self, record: Record) -> Path:
-        """The file of a record's field."""
-        return self.elsewhere.get(str(record.point), self.folder / str(record.point))
+    def certificate(self, instance: str) -> SubmittedCertificate | None:
+        """Return the certificate of the instance of a name."""
+        return next((each for each in self.certificates if each.instance == instance), None)
 
-    def field(self, record: Record) -> CrossField:
-        """The field of a record. Raises InputError, InstanceError for a missing or another file."""
-        path = self.path(record)
-        if path.is_file() and sha256_of(path) != record.point_sha256:
-            raise InstanceError(
-                "is another file than the one its ledger names; restore it, or submit the point again",
-                file=path,
-            )
-        return read_field(path)
+    @property
+    def files(self) -> list[str]:
+        """Names of all files that records and certificates refer to."""
+        names = [name for each in self.records for name in (each.point, each.log)]
+        return [name for name in [*names, *(each.file for each in self.certificates)] if name is not None]
 
-    def log(self, record: Record) -> bytes:
-        """The log of a record. Raises InputError, InstanceError for a missing or another file."""
-        path = self.elsewhere.get(str(record.log), self.folder / str(record.log))
-        data = read_bytes(path)
-        if hashlib.sha256(data).hexdigest() != record.log_sha256:
+    def content(self, name: str, sha256: str | None) -> bytes:
+        """Return the content of a file. Raises InputError if it is missing, InstanceError if it differs."""
+        data = self.unwritten[name] if name in self.unwritten else read_bytes(self.folder / name)
+        if hashlib.sha256(data).hexdigest() != sha256:
             raise InstanceError(
-                "is another file than the one its ledger names; restore it, or submit the run again",
-                file=path,
+                "is another file than the one its ledger names; restore it, or submit it again",
+                file=self.folder / name,
             )
         return data
 
+    def field(self, record: Record) -> CrossField:
+        """Return the field of a record. Raises InputError, InstanceError for a missing or another file."""
+        data = self.content(str(record.point), record.point_sha256)
+        with naming(self.folder / str(record.point)):
+            return field_of_json(data)
+
+    def log(self, record: Record) -> bytes:
+        """Return the log of a record. Raises as `content`."""
+        return self.content(str(record.log), record.log_sha256)
+
+    def added(
+        self, record: Record, field: CrossField | None = None, log: bytes | None = None
+    ) -> tuple[Ledger, Record]:
+        """Return the ledger with one more record, and that record as the ledger has it.
+
+        field: replaces the kept field of the entry if it is better; the records that named the kept field
+        lose it. log: content of the file that the record names. Raises InputError for a record that a ledger
+        cannot hold.
+        """
+        record.check()
+        records, unwritten = list(self.records), dict(self.unwritten)
+        if log is not None:
+            unwritten[str(record.log)] = log
+        if field is not None and _is_better(record, self.with_point(record.entry)):
+            name, data = f"{record.entry}.field.json", field_to_json(field)
+            unwritten[name] = data
+            record = replace(record, point=name, point_sha256=hashlib.sha256(data).hexdigest())
+            records = [_without_point(each) if each.entry == record.entry else each for each in records]
+        records = sorted({*records, record}, key=lambda each: each.rank)
+        return replace(self, records=tuple(records), unwritten=unwritten), record
+
+    def certified(self, instance: str, instance_sha256: str, data: bytes, by: str | None = None) -> Ledger:
+        """Return the ledger with the bytes of a certificate in place of the instance's earlier one."""
+        check_text("by", by)
+        sha256 = hashlib.sha256(data).hexdigest()
+        name = f"{instance}.{sha256[:12]}.certificate.npz"
+        new = SubmittedCertificate(instance, instance_sha256, name, sha256, by)
+        others = [each for each in self.certificates if each.instance != instance]
+        certificates = tuple(sorted([*others, new], key=lambda each: each.instance))
+        return replace(self, certificates=certificates, unwritten={**self.unwritten, name: data})
+
     def document(self) -> dict[str, Any]:
-        """The ledger as JSON."""
-        return {"format": FORMAT, "version": VERSION, "records": list(map(_document, self.records))}
+        """Return the ledger as JSON."""
+        certificates = [_without_none(asdict(each)) for each in self.certificates]
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "records": list(map(_document, self.records)),
+            **({"certificates": certificates} if certificates else {}),
+        }
 
 
 def check_text(name: str, text: str | None) -> None:
@@ -171,61 +230,54 @@ def _as_json(record: Record) -> dict[str, Any]:
     return document
 
 
+def _without_none(document: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in document.items() if value is not None}
+
+
 def _document(record: Record) -> dict[str, Any]:
     return {key: value for key, value in asdict(record).items() if key not in _LATER or value}
 
 
-def field_file(entry: str) -> str:
-    """Name of the file that holds the kept field of an entry."""
-    return f"{entry}.field.json"
-
-
 def log_file(entry: str, solver: str, sha256: str) -> str:
-    """Name of the file that holds the log of a run of a solver, by its name in the table."""
+    """Return the name of the file of a log. solver: its name in the table of solvers."""
     return f"{entry}.{solver}.{sha256[:12]}.log"
 
 
 def read_ledger(folder: str | Path, name: str = FILE) -> Ledger:
-    """The ledger of a folder, empty when there is none. Raises InputError, InstanceError, naming the file."""
+    """Read the ledger of a folder; an empty one without a file. Raises InputError, InstanceError."""
     path = Path(folder) / name
     if not path.exists():
         return Ledger(Path(folder))
     schema, remedy = documents.__name__, "give the ledger.json of a library"
-    given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)["records"]
-    return Ledger(Path(folder), tuple(map(_record, given)))
+    given = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
+    certificates = tuple(SubmittedCertificate(**each) for each in given.get("certificates", ()))
+    return Ledger(Path(folder), tuple(map(_record, given["records"])), certificates)
 
 
 def _record(given: dict[str, Any]) -> Record:
     return Record(**given | {"trace": tuple(map(tuple, given.get("trace", ())))})
 
 
-def write_ledger(ledger: Ledger) -> Path:
-    """The path of the ledger's file, now holding it. Raises OutputError."""
-    data = json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n"
-    return write_bytes(ledger.folder / FILE, data.encode())
+def write_ledger(ledger: Ledger) -> None:
+    """Write a ledger and, before it, the files that are not in its folder yet. Raises OutputError."""
+    for name, data in ledger.unwritten.items():
+        write_bytes(ledger.folder / name, data)
+    path = ledger.folder / FILE
+    data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
+    if not path.exists() or read_bytes(path) != data:
+        write_bytes(path, data)
 
 
 def add_record(
     folder: str | Path, record: Record, field: CrossField | None = None, log: bytes | None = None
 ) -> Record:
-    """The record, now in the ledger of a folder; a better field takes the place of the kept one.
+    """Add a record to the ledger of a folder as `Ledger.added` does, and write that ledger.
 
-    log: the content of the file that the record names. The caller holds the lock of the library. Files are
-    written first, so that the ledger never names what is not there. Records of the same entry that named the
-    field's file before lose their field, which is not there any more. Raises InputError, before anything is
-    written, for a record that a ledger cannot hold; OutputError.
+    The caller holds the lock of the library. Raises InputError, before anything is written, for a record
+    that a ledger cannot hold; OutputError.
     """
-    record.check()
-    ledger = read_ledger(folder)
-    records = list(ledger.records)
-    if log is not None:
-        write_bytes(ledger.folder / str(record.log), log)
-    if field is not None and _is_better(record, ledger.with_point(record.entry)):
-        path = write_field(field, ledger.folder / field_file(record.entry))
-        record = replace(record, point=path.name, point_sha256=sha256_of(path))
-        records = [_without_point(each) if each.entry == record.entry else each for each in records]
-    records = sorted({*records, record}, key=lambda each: each.rank)
-    write_ledger(replace(ledger, records=tuple(records)))
+    ledger, record = read_ledger(folder).added(record, field, log)
+    write_ledger(ledger)
     return record
 
 
@@ -240,34 +292,33 @@ def _without_point(record: Record) -> Record:
     return replace(record, point=None, point_sha256=None)
 
 
-def merged(folder: Path, other: Ledger, entries: Iterable[str]) -> Ledger:
-    """The ledger of a folder with another's records and fields of these entries; nothing is written.
+def merged(folder: Path, other: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
+    """Return the ledger of a folder with another's records and certificates; nothing is written.
 
-    A field that the folder has for an entry already stays.
+    entries, instances: names of those whose records and certificates are taken over. A field or certificate
+    that the folder has already stays.
     """
     ledger, wanted = read_ledger(folder), set(entries)
     have = {_without_point(record) for record in ledger.records}
     fresh: list[Record] = []
-    elsewhere: dict[str, Path] = {}
+    unwritten: dict[str, bytes] = {}
     for record in other.records:
         if record.entry not in wanted or _without_point(record) in have:
             continue
         if record.point is not None and ledger.with_point(record.entry) is None:
             other.field(record)  # checked before it is taken over
-            elsewhere[record.point] = other.path(record)
+            unwritten[record.point] = other.content(record.point, record.point_sha256)
             fresh.append(record)
         else:
             fresh.append(_without_point(record))
         if record.log is not None:
-            other.log(record)
-            elsewhere[record.log] = other.elsewhere.get(record.log, other.folder / record.log)
-    records = sorted({*ledger.records, *fresh}, key=lambda each: each.rank)
-    return replace(ledger, records=tuple(records), elsewhere=elsewhere)
-
-
-def keep(ledger: Ledger) -> None:
-    """Write a ledger that was merged, its fields first. Raises OutputError."""
-    for name, path in ledger.elsewhere.items():
-        write_bytes(ledger.folder / name, read_bytes(path))
-    if not (ledger.folder / FILE).exists() or read_ledger(ledger.folder).records != ledger.records:
-        write_ledger(ledger)
+            unwritten[record.log] = other.log(record)
+    missing = set(instances) - {each.instance for each in ledger.certificates}
+    certificates = [each for each in other.certificates if each.instance in missing]
+    unwritten |= {each.file: other.content(each.file, each.sha256) for each in certificates}
+    return replace(
+        ledger,
+        records=tuple(sorted({*ledger.records, *fresh}, key=lambda each: each.rank)),
+        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda each: each.instance)),
+        unwritten=unwritten,
+    )

@@ -1,4 +1,4 @@
-"""Fields that are known, and the complete points of every formulation that they give.
+"""Known fields, and the complete points of every formulation that follow from them.
 
 A point of any formulation comes from a field (angles and jumps): every other column then has its best value,
 without solver tolerances.
@@ -26,7 +26,7 @@ _ROUNDS: Final = 8
 
 @dataclass(frozen=True)
 class Provenance:
-    """Who found a field: solver and version; seconds and person where somebody submitted it."""
+    """Origin of a field: solver and version, and for a submitted one seconds and submitter."""
 
     solver: str
     version: str
@@ -35,41 +35,41 @@ class Provenance:
 
     @classmethod
     def of(cls, facts: dict[str, Any]) -> Provenance:
-        """Who found a field, by what a document says of it."""
+        """Return the provenance of a field from its facts in a document."""
         return cls(facts["solver"], facts["version"], facts["seconds"], facts["by"])
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A known field, and who found it."""
+    """A known field and its provenance."""
 
     field: CrossField
     provenance: Provenance
 
 
 def ours(method: str) -> Provenance:
-    """That crossfield itself found a field, by a method."""
+    """Return the provenance of a field that crossfield found by a method."""
     name, _, version = generator().partition(" ")
     return Provenance(f"{name} ({method})", version)
 
 
 def baseline_field(instance: Instance) -> Known:
-    """The greedy field: its jumps are the data of `qp-fixed`, so that no search may change them."""
+    """Return the greedy field, whose jumps are the data of `qp-fixed` and therefore fixed."""
     return Known(pinned(greedy_field(instance)), ours("greedy"))
 
 
 def searched_field(instance: Instance) -> Known:
-    """A field of low 2-norm energy, by a fixed amount of work: no clock decides about it."""
+    """Return a field of low 2-norm energy, by a fixed amount of work."""
     return Known(pinned(search(instance, rounds=_ROUNDS, jobs=1).field), ours("search"))
 
 
 def least_energy(known: Sequence[Known], norm: int) -> Known:
-    """The one of least energy in a norm, the first of equal ones."""
+    """Return the field of least energy in a norm, the first of equal ones."""
     return min(known, key=lambda each: each.field.energy(2 if norm == 2 else 1).total)
 
 
 def complete_point(problem: Problem, found: CrossField) -> Floats:
-    """The best point of a problem (columns,) with the angles and jumps of a field.
+    """Return the best point of a problem (columns,) with the angles and jumps of a field.
 
     As `Problem.point`; with the facet as printed, z is free in an interval, and takes the value there that
     makes t least.
@@ -87,7 +87,7 @@ def complete_point(problem: Problem, found: CrossField) -> Floats:
 
 
 def field_of(problem: Problem, point: Floats) -> CrossField:
-    """The field of a point (columns,), angles clipped into their windows and jumps into their ranges."""
+    """Return the field of a point (columns,), with angles and jumps clipped into their ranges."""
     found, instance = problem.field(point), problem.instance
     return CrossField(
         instance,
@@ -99,7 +99,7 @@ def field_of(problem: Problem, point: Floats) -> CrossField:
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The best known point of a problem: the point, its field, who found it."""
+    """The best known point of a problem with its field and provenance."""
 
     problem: Problem
     known: Known
@@ -111,7 +111,7 @@ class Best:
         return self.problem.objective_value(self.point)
 
     def facts(self) -> dict[str, Any]:
-        """Objective, worst violation, integrality, energy of the field, and who found it."""
+        """Return objective, worst violation, integrality, energy of the field, and provenance."""
         violation, provenance = self.problem.violation(self.point), self.known.provenance
         return {
             "objective": self.objective,
@@ -126,6 +126,6 @@ class Best:
 
 
 def best_point(problem: Problem, known: Sequence[Known]) -> Best:
-    """The point of least objective among those of the known fields, the first of equal ones."""
+    """Return the point of least objective among those of the known fields, the first of equal ones."""
     points = [Best(problem, each, complete_point(problem, each.field)) for each in known]
     return min(points, key=lambda best: best.objective)

@@ -1,4 +1,4 @@
-"""Fields of low 1-norm energy by HiGHS, limited in work, not in time: every build finds the same."""
+"""Fields of low 1-norm energy by HiGHS, with a limit of nodes: every build finds the same."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ LP_UP_TO: Final = 1000
 
 
 def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
-    """Fields of lower 1-norm energy than a start, where they are found.
+    """Return fields of lower 1-norm energy than a start.
 
-    One has the best angles for its jumps; on the lower rungs another comes from a search over jumps.
+    One has the best angles for its jumps; on the lower rungs another one comes from a search over jumps.
     """
     if start.instance.grid.size > LP_UP_TO:
         return []

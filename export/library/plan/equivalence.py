@@ -1,4 +1,4 @@
-"""What is equivalent to what, and what is not (docs/mathematics.md, 5 to 7); what files change."""
+"""Relations between entries (docs/mathematics.md, 5 to 7), and changes that files make."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _FACETS: Final = {
 
 
 def siblings(recipe: EntryRecipe, names: Collection[str]) -> dict[str, str]:
-    """Entries of the library with the same optimum, this one aside, and their formulations."""
+    """Return the other entries of the library with the same optimum, and their formulations."""
     found = equivalent(recipe, names)
     return {each["entry"]: each["formulation"] for each in found if each["entry"] is not None}
 
 
 def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
-    """Formulations of the instance with the same optimum, and why. names: entries of the library."""
+    """Return the formulations with the same optimum, and the reasons. names: entries of the library."""
     if recipe.facet == "printed":
         return []
     return [
@@ -44,7 +44,7 @@ def equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, An
 
 
 def not_equivalent(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, Any]]:
-    """Formulations of the same instance that have another optimum, and how it differs."""
+    """Return the formulations of the instance with another optimum, and the difference."""
     mine = FORMULATIONS[recipe.formulation].minimises
     found = [
         _relation(recipe, other, names, _difference(recipe, other))
@@ -94,12 +94,12 @@ def _other_gauge(recipe: EntryRecipe, names: Collection[str]) -> list[dict[str, 
 
 
 def transformations(problem: Problem, formats: Collection[str]) -> list[str]:
-    """Sentences about what the files change: products lifted, the column ONE, a free variable's bounds."""
+    """Return sentences about changes in the files: products lifted, the column ONE, bounds."""
     return [f".{name}: {note}" for name in formats for note in notes_of(problem, name)]
 
 
 def notes_of(problem: Problem, name: str) -> list[str]:
-    """What the file of one format changes; empty for what it refuses."""
+    """Return the changes that the file of a format makes; empty if it refuses the problem."""
     try:
         held = carried(problem, FORMATS[name])
     except UnsupportedByFormatError:

@@ -1,4 +1,4 @@
-"""What is to be made: all instances and entries (an instance in one formulation), with names.
+"""Plan of a library: all instances and entries (an instance in one formulation), with names.
 
 cf_SHORT_nSSS[_sK][_box]              an instance: sketch, size, seed, gauge
 instance[_printed]_TOKEN              an entry: facet and formulation
@@ -21,7 +21,7 @@ LONGEST: Final = 32
 
 @dataclass(frozen=True)
 class InstanceRecipe:
-    """How an instance is made. sketch: with the drawing's bytes; seed: None unless the sketch is random.
+    """Recipe of an instance. sketch: with the drawing's bytes; seed: None unless the sketch is random.
 
     prove: whether its 2-norm optimum is to be proven, where the rung says so and a formulation asks for it;
     not under the gauge `box`, where bounds are weak. added: the day on which it came into the library, empty
@@ -38,7 +38,7 @@ class InstanceRecipe:
     added: str = ""
 
     def document(self) -> dict[str, Any]:
-        """All that decides its content, as JSON."""
+        """Return everything that determines its content, as JSON."""
         hashes = [hashlib.sha256(data).hexdigest() for data in (self.sketch.drawing, self.sketch.mask)]
         sketch = {
             "kind": self.sketch.kind,
@@ -52,7 +52,7 @@ class InstanceRecipe:
 
 @dataclass(frozen=True)
 class EntryRecipe:
-    """How an entry is made: instance, formulation, facet, formats, and whether files are compressed."""
+    """Recipe of an entry: instance, formulation, facet, formats, and compression."""
 
     name: str
     instance: str
@@ -71,12 +71,12 @@ class InstancePlan:
 
 
 def entry_name(instance: str, formulation: str, facet: str) -> str:
-    """Name of an entry."""
+    """Return the name of an entry."""
     return f"{instance}{'_printed' if facet == 'printed' else ''}_{FORMULATIONS[formulation].short}"
 
 
 def plan(spec: Spec) -> tuple[InstancePlan, ...]:
-    """Every instance of a specification with its entries: by sketch, size, seed and gauge.
+    """Return every instance of a specification with its entries, by sketch, size, seed and gauge.
 
     Raises InputError for a name that is too long.
     """
@@ -132,5 +132,5 @@ def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) 
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of a value that JSON holds, the same whatever the order of its keys."""
+    """Return the SHA-256 of a JSON value, independent of the order of its keys."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, ensure_ascii=False).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""From a recipe to its instance: of a sample, of a drawing, or of random strokes."""
+"""Instances of recipes: samples, drawings and random strokes."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ RAGGED_SHARE: Final = 0.75
 
 
 def instance_from(recipe: InstanceRecipe) -> Instance:
-    """The instance of a recipe, under the recipe's name.
+    """Return the instance of a recipe, under the recipe's name.
 
     Raises InputError that names it; a NoStrokeError when the size leaves nothing of the sketch.
 
-    Its weights are the coefficients of the paper, 1 and 1e-6, on every grid: what others have published of
-    these problems is about them.
+    Its weights are the coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
     """
     make = {"sample": _of_sample, "file": _of_file, "random": random_instance}[recipe.sketch.kind]
     try:
@@ -41,7 +40,7 @@ def instance_from(recipe: InstanceRecipe) -> Instance:
 
 
 def kind_of(recipe: InstanceRecipe) -> str:
-    """`sketch`, `analytic`, `file` or `random`."""
+    """Return `sketch`, `analytic`, `file` or `random`."""
     kind = recipe.sketch.kind
     return SAMPLES[recipe.sketch.what].kind if kind == "sample" else kind
 
@@ -66,7 +65,7 @@ def _of_file(recipe: InstanceRecipe) -> Instance:
 
 
 def random_instance(recipe: InstanceRecipe) -> Instance:
-    """The instance of a size and a seed: strokes in random directions on a fifth of the pixels.
+    """Return random strokes of a size and a seed, on a fifth of the pixels.
 
     Drawn with NumPy's PCG64 in this order: the mask when it is ragged, the order of the pixels (the first
     fifth, at least one, are strokes), theta uniform in [0, pi), w uniform in [0.1, 1].

@@ -40,7 +40,8 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -55,7 +56,6 @@ from ....models.sketch.read import suffix_of_picture
 from ....models.sketch.samples import SAMPLES, sample_svg
 from ....models.storage import read_bytes
 from ...formats.registry import FORMATS
-from .origin import NOTHING_STATED, Origin, Release, day
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
@@ -68,8 +68,55 @@ DEFAULT: Final = Path(__file__).with_name("default.toml")
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Author, licence (preferably an SPDX identifier) and source of a sketch; empty if not stated."""
+
+    author: str = ""
+    license: str = ""
+    source: str = ""
+
+    @classmethod
+    def of(cls, table: dict[str, Any]) -> Origin:
+        """Return the origin that the table of a sketch states."""
+        return cls(*(table.get(key, "") for key in cls.__dataclass_fields__))
+
+    def document(self) -> dict[str, str]:
+        """Return the stated values by key."""
+        return {key: value for key, value in asdict(self).items() if value}
+
+
+NOTHING_STATED: Final = Origin()
+
+
+@dataclass(frozen=True)
+class Release:
+    """A citable release of a library. date: as 2026-11-22; authors: names as they are cited."""
+
+    version: str
+    date: str
+    authors: tuple[str, ...]
+
+    @classmethod
+    def of(cls, table: dict[str, Any]) -> Release:
+        """Return the release that a table states. Raises InputError for an invalid day."""
+        return cls(table["version"], day(table["date"], "release.date"), tuple(table["authors"]))
+
+    def document(self) -> dict[str, Any]:
+        """Return the release as a table of a specification."""
+        return {"version": self.version, "date": self.date, "authors": list(self.authors)}
+
+
+def day(text: str, place: str) -> str:
+    """Return the day as YYYY-MM-DD. Raises InputError for an invalid one."""
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError as error:
+        raise InputError(f"{place}: {text!r} is no day; write one as 2026-11-22") from error
+
+
+@dataclass(frozen=True)
 class Rung:
-    """A step of the ladder: its sizes, and what is written of each instance there."""
+    """A step of the ladder: its sizes, and the formats, gauges and facets of its entries."""
 
     name: str
     sizes: tuple[int, ...]
@@ -81,7 +128,7 @@ class Rung:
     added: str = ""
 
     def document(self) -> dict[str, Any]:
-        """The rung as a table of a specification."""
+        """Return the rung as a table of a specification."""
         return {
             "sizes": list(self.sizes),
             "formats": list(self.formats),
@@ -95,7 +142,7 @@ class Rung:
 
 @dataclass(frozen=True)
 class Sketch:
-    """Where instances come from: a sample, a file with its mask, or random strokes of some seeds.
+    """Source of instances: a sample, a file with its mask, or random strokes of some seeds.
 
     name: short, part of every name. sizes: by rung, where they are not the rung's. what: the sample, the
     file's own name, or the shape of a random mask. drawing, mask: as they are published, with the suffixes of
@@ -117,7 +164,7 @@ class Sketch:
     added: str = ""
 
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
-        """Its sizes on a rung."""
+        """Return its sizes on a rung."""
         return dict(self.sizes).get(rung.name, rung.sizes)
 
     @property
@@ -136,7 +183,7 @@ class Sketch:
         return f"cf_{self.name}.mask{self.mask_suffix}"
 
     def document(self) -> dict[str, Any]:
-        """The sketch as a table of a specification, its files as they lie in a library."""
+        """Return the sketch as a table of a specification, with its file names in a library."""
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
         head["sizes"] = {rung: list(sizes) for rung, sizes in self.sizes}
         head |= self.origin.document() | ({"added": self.added} if self.added else {})
@@ -152,8 +199,8 @@ class Sketch:
 class Spec:
     """A checked specification.
 
-    ledger: the file of a ledger that the build takes as input, or None; points: a folder or an archive of
-    fields and certificates that are not to be searched for, or None.
+    ledger: file of a ledger that the build uses, or None; points: a folder or an archive of fields and
+    certificates that replace searches, or None.
     """
 
     title: str
@@ -165,7 +212,7 @@ class Spec:
     release: Release | None = None
 
     def document(self) -> dict[str, Any]:
-        """The specification with every default written out, as library.json holds it."""
+        """Return the specification with every default written out, as library.json holds it."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -178,12 +225,12 @@ class Spec:
 
 
 def default_spec() -> Spec:
-    """The specification that ships."""
+    """Read the specification that ships with crossfield."""
     return read_spec(DEFAULT)
 
 
 def read_spec(path: str | Path) -> Spec:
-    """The specification in a TOML file. Raises InputError that names file, key and remedy."""
+    """Read the specification in a TOML file. Raises InputError that names file, key and remedy."""
     path = Path(path)
     try:
         document = tomllib.loads(read_bytes(path, MAX_BYTES).decode())
@@ -195,7 +242,7 @@ def read_spec(path: str | Path) -> Spec:
 
 
 def spec_of(document: dict[str, Any], path: Path) -> Spec:
-    """The specification of a document whose files lie beside `path`. Raises InputError, naming `path`."""
+    """Return the specification of a document with files beside `path`. Raises InputError, naming `path`."""
     with naming(path):
         _check_form(document)
         return _spec(document, path.parent)
@@ -216,19 +263,19 @@ def _check_form(document: dict[str, Any]) -> None:
 
 
 def _of_key(error: Any) -> str | None:
-    """What is said of a key that is too many or missing; None where the error is about a value."""
-    given, said, place = error.instance, error.validator_value, error.json_path[2:]
+    """The message about an unknown or missing key; None if the error is about a value."""
+    given, rule, place = error.instance, error.validator_value, error.json_path[2:]
     known = error.schema.get("properties", {})
     match error.validator:
         case "additionalProperties":
             key = next(key for key in given if key not in known)
             words = f"is unknown; the keys here are {', '.join(known)}"
         case "required":
-            key = next(key for key in said if key not in given)
+            key = next(key for key in rule if key not in given)
             words = f"there is none; write {known[key].get('description', 'it')}"
         case "dependentRequired":
             key, needed = next(
-                (key, need) for key, (need,) in said.items() if key in given and need not in given
+                (key, need) for key, (need,) in rule.items() if key in given and need not in given
             )
             words = f"goes with {needed}; write both, or leave it out"
         case _:
@@ -237,7 +284,7 @@ def _of_key(error: Any) -> str | None:
 
 
 def _of_value(error: Any) -> str:
-    """What is said of a value, at its place; an entry of a list is told of as the list."""
+    """The message about a value; the place of a list's entry is that of the list."""
     place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
     if not isinstance(error.instance, dict):
         place = re.sub(r"\[\d+\]$", "", place)
@@ -305,7 +352,7 @@ def _check_names(names: list[str]) -> None:
 def _words(
     table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
 ) -> tuple[str, ...]:
-    """The words of a list, all of them known ones, or the default."""
+    """The words of a list, all of them known, or the default."""
     found = tuple(table.get(key, default))
     for word in found:
         _check_known(word, known, f"{place}{key}")

@@ -1,4 +1,4 @@
-"""How an entry is loaded in programs that people work with: a few lines each, with the entry's own files."""
+"""Code that loads an entry in common programs: a few lines each, with the entry's own files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...solvers_table import takes
 
 @dataclass(frozen=True)
 class Way:
-    """A program, the lines that load an entry there, and what is to be known of it; no lines: it cannot."""
+    """A program, the lines that load an entry there (empty if it cannot), and a note."""
 
     title: str
     text: str
@@ -20,7 +20,7 @@ class Way:
 
 
 def ways(entry: dict[str, Any], problem: Problem) -> list[Way]:
-    """How HiGHS, Gurobi, Pyomo, JuMP, GAMS and AMPL load an entry, from the files that it has."""
+    """Return the lines that load an entry in HiGHS, Gurobi, Pyomo, JuMP, GAMS and AMPL."""
     made = [_highs(entry, problem), _gurobi(entry), _pyomo(entry), _jump(entry), _gams(entry), _ampl(entry)]
     return [way for way in made if way is not None]
 
@@ -32,7 +32,7 @@ def _first(entry: dict[str, Any], *formats: str) -> str:
 
 
 def _unpacked(*names: str) -> tuple[str, tuple[str, ...]]:
-    """The command that unpacks what is packed, with its line's end, and the names afterwards."""
+    """The command that unpacks packed files, with its line's end, and the unpacked names."""
     packed = [name for name in names if name.endswith(".gz")]
     command = f"gunzip -k {' '.join(packed)}\n" if packed else ""
     return command, tuple(name.removesuffix(".gz") for name in names)
@@ -40,9 +40,9 @@ def _unpacked(*names: str) -> tuple[str, tuple[str, ...]]:
 
 def _highs(entry: dict[str, Any], problem: Problem) -> Way | None:
     name = _first(entry, "mps", "lp")
-    said = takes(problem, "highs")
-    if said.answer == "no" or not name:
-        return Way("HiGHS", "", said.reason) if said.reason else None
+    support = takes(problem, "highs")
+    if support.answer == "no" or not name:
+        return Way("HiGHS", "", support.reason) if support.reason else None
     text = f'import highspy\nhighs = highspy.Highs()\nhighs.readModel("{name}"); highs.run()'
     return Way("HiGHS, in Python", text, "pip install highspy brings no highs command.")
 

@@ -1,8 +1,8 @@
 """A library as a static site: a table of entries, a page for each, pictures, and every file.
 
 Layout: index.html, about.html, site.css, site.js, icon.svg, instance/NAME.html, entry/NAME.html, pictures/,
-files/ (the library itself). Links are relative, nothing is asked of any other place, and without JavaScript
-everything is there but sorting and filtering. The templates are templates/site/*.html.j2; every text that
+files/ (the library itself). Links are relative, no other server is contacted, and only sorting and filtering
+need JavaScript. The templates are templates/site/*.html.j2; every text that
 comes from a file is escaped by them.
 """
 
@@ -49,12 +49,12 @@ _ROLES: Final = {
     "least_1": "field of least known 1-norm energy",
     "baseline": "baseline field, whose jumps are the data of qp-fixed",
 }
-"""The fields of an instance, as its `about` names them, and what they are."""
+"""Roles of fields in the document of an instance, in words."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A field as it is shown. roles: keys of _ROLES; facts: who found it; told: its singularities."""
+    """A displayed field. roles: keys of _ROLES; facts: provenance; told: its singularities."""
 
     roles: tuple[str, ...]
     facts: dict[str, Any]
@@ -63,13 +63,13 @@ class Picture:
 
     @property
     def caption(self) -> str:
-        """What it is."""
+        """Its roles in words."""
         return "; ".join(_ROLES[role] for role in self.roles)
 
 
 @dataclass
 class Shown:
-    """An instance as the site shows it."""
+    """A displayed instance."""
 
     about: dict[str, Any]
     entries: list[dict[str, Any]]
@@ -83,14 +83,14 @@ class Shown:
         return str(self.about["name"])
 
     def picture_of(self, entry: dict[str, Any]) -> Picture:
-        """The field shown with an entry: the best in its norm, or the one whose jumps are its data."""
+        """Return the field shown with an entry: the best in its norm, or that with its jumps."""
         meaning = FORMULATIONS[entry["formulation"]].minimises
         role = "baseline" if entry["jumps"] is not None else "least_1" if "1-norm" in meaning else "least_2"
         return next(each for each in self.pictures if role in each.roles)
 
 
 def write_site(folder: str | Path, output: str | Path, progress: Progress = silent) -> list[Path]:
-    """The pages of the site about the library in `folder`; an earlier site in `output` is replaced.
+    """Write the site of a library and return its pages; an earlier site in `output` is replaced.
 
     Raises InputError, InstanceError when the library is missing, damaged, or differs from its checksums, and
     OutputError when `output` cannot be written or holds something other than a site.
@@ -138,7 +138,7 @@ def _label(source: dict[str, Any]) -> str:
 
 
 def _sums(path: Path) -> dict[str, str]:
-    """Name to SHA-256 of every file of the library. Raises InputError for a line that is none."""
+    """SHA-256 of every file of the library by name. Raises InputError for an invalid line."""
     found = {}
     for line in read_bytes(path).decode("ascii", "replace").splitlines():
         fields = _SUM.fullmatch(line)
@@ -151,7 +151,7 @@ def _sums(path: Path) -> dict[str, str]:
 
 
 def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) -> None:
-    """What the pages say of a file is what SHA256SUMS says. Raises InstanceError."""
+    """Raise InstanceError unless documents and SHA256SUMS agree about each file."""
     for document in (each for one in shown for each in (one.about, *one.entries)):
         for file in document["files"]:
             if sums.get(file["name"]) != file["sha256"]:
@@ -163,7 +163,7 @@ def _check_listed(library: Library, shown: list[Shown], sums: dict[str, str]) ->
 
 
 def _place(folder: Path, sums: dict[str, str], target: Path) -> None:
-    """Make hard links to every file of the library in a folder, or copies where there are no such links.
+    """Make hard links to every file of the library in a folder, or copies if links are impossible.
 
     Raises InputError for a symbolic link, and for a file that differs from its checksum.
     """
@@ -201,7 +201,7 @@ def _draw(folder: Path, shown: Shown, target: Path) -> None:
 
 
 def _write_pages(library: Library, shown: list[Shown], sums: dict[str, str], stage: Path) -> list[Path]:
-    """Write every page; their paths inside the site."""
+    """Write every page and return their paths inside the site."""
     environment = _environment()
     common = {
         "library": library.document,
@@ -251,13 +251,13 @@ def _families(shown: list[Shown]) -> dict[str, list[Shown]]:
 
 
 def _standing(shown: Shown) -> tuple[int, bool]:
-    """What the picture of a sketch is chosen by: the largest grid, in the gauge that loses nothing."""
+    """Sort key for the picture of a sketch: the largest grid, in the gauge `strokes`."""
     source = shown.entries[0]["source"]
     return source["size"], source["gauge"] == "strokes"
 
 
 def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
-    """What the filters of the table offer."""
+    """The choices of the filters of the table."""
     present = {
         key: dict.fromkeys(entry[key] for entry in entries if key in entry)
         for key in ("family", "rung", "formulation", "class", "difficulty", "status")
@@ -268,7 +268,7 @@ def _choices(entries: tuple[dict[str, Any], ...]) -> dict[str, list[str]]:
 
 
 def _licences(entries: tuple[dict[str, Any], ...]) -> list[str]:
-    """The licences that the entries state, each once, an empty one where none is stated."""
+    """The stated licences of the entries without repetition, an empty one for none."""
     return sorted({entry.get("origin", {}).get("license") or entry.get("licence") or "" for entry in entries})
 
 
@@ -278,7 +278,7 @@ def _formats(entries: tuple[dict[str, Any], ...]) -> list[Any]:
 
 
 def _environment() -> Environment:
-    """The templates with filters that write numbers as people read them."""
+    """The templates with filters that format numbers."""
     environment = ENVIRONMENT.overlay()
     environment.filters = {
         **ENVIRONMENT.filters,
@@ -293,29 +293,29 @@ def _environment() -> Environment:
 
 
 def count(number: int) -> str:
-    """A whole number with narrow spaces between its thousands."""
+    """Return a whole number with narrow spaces between its thousands."""
     return f"{number:,}".replace(",", "\u202f")
 
 
 def value(number: float | None) -> str:
-    """A number to six digits, a dash for none."""
+    """Return a number to six digits, a dash for none."""
     return "–" if number is None else f"{number + 0.0:.6g}".replace("-", "−")
 
 
 def exact(number: float) -> str:
-    """A number with all its digits."""
+    """Return a number with all its digits."""
     return repr(number + 0.0)
 
 
 def percent(share: float | None) -> str:
-    """A share in percent to three digits, a dash for none."""
+    """Return a share in percent to three digits, a dash for none."""
     if share is None:
         return "–"
     return "≈ 0\u202f%" if 0 < share < 1e-6 else f"{100 * share:.3g}\u202f%"
 
 
 def size(number: int) -> str:
-    """Bytes as B, kB or MB."""
+    """Return bytes as B, kB or MB."""
     for unit, name in ((1e6, "MB"), (1e3, "kB")):
         if number >= unit:
             return f"{number / unit:.3g}\u202f{name}"
@@ -324,7 +324,7 @@ def size(number: int) -> str:
 
 @contextmanager
 def _replacing_folder(output: Path) -> Iterator[Path]:
-    """An empty neighbour of a folder that takes its place on success; on failure it is removed.
+    """Yield an empty folder that replaces the output on success; on failure it is removed.
 
     Raises OutputError when the folder holds something other than a site, or nothing can be written beside it.
     """
@@ -364,7 +364,7 @@ def _check_replaceable(output: Path) -> None:
 
 
 def _take_place(stage: Path, output: Path) -> None:
-    """Rename the new folder to the old one's name; the old one comes back if that fails."""
+    """Rename the new folder to the old one's name; restore the old one if that fails."""
     old = stage.with_suffix(".old")
     if output.exists():
         output.rename(old)

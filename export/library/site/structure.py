@@ -1,4 +1,4 @@
-"""The structure of a problem: where its matrix and the Hessian of its Lagrangian have entries.
+"""Sparsity structure of a problem: its matrix and the Hessian of its Lagrangian.
 
 MINLPLib shows the same of its instances. Everything comes from the declaration; nothing is read from files.
 """
@@ -25,7 +25,7 @@ _HIGHEST: Final = 4
 
 @dataclass(frozen=True)
 class Blocks:
-    """The blocks of a Hessian, that is sets of columns that no entry joins: their number and their sizes."""
+    """Number and sizes of the blocks of a Hessian: sets of columns that no entry joins."""
 
     count: int
     least: int
@@ -34,7 +34,7 @@ class Blocks:
 
 
 def matrix(problem: Problem) -> Pattern:
-    """Where the Jacobian of the rows has entries; those of nonlinear terms are marked. Rows by family."""
+    """Return the entries of the Jacobian of the rows by family, with nonlinear ones marked."""
     rows, columns, curved, offset = [], [], [], 0
     for family in problem.rows:
         nonlinear = _nonlinear(family)
@@ -56,7 +56,7 @@ def matrix(problem: Problem) -> Pattern:
 
 
 def hessian(problem: Problem) -> Pattern:
-    """Where the Hessian of the Lagrangian has entries, both triangles."""
+    """Return the entries of the Hessian of the Lagrangian, both triangles."""
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(problem)])
     both = np.concatenate([pairs, pairs[:, ::-1]])
     keys = np.unique(both[:, 0] * problem.n_columns + both[:, 1])
@@ -67,7 +67,7 @@ def hessian(problem: Problem) -> Pattern:
 
 
 def blocks(pattern: Pattern) -> Blocks:
-    """The blocks of a Hessian among the columns that stand in nonlinear terms."""
+    """Return the blocks of a Hessian among the columns of nonlinear terms."""
     used, place = np.unique(np.concatenate([pattern.rows, pattern.columns]), return_inverse=True)
     ends = place[: pattern.entries], place[pattern.entries :]
     graph = coo_array((np.ones(pattern.entries, bool), ends), shape=(len(used), len(used)))
@@ -107,7 +107,7 @@ def _pairs(problem: Problem) -> Iterator[Places]:
 
 
 def _general(family: PlacedFamily) -> Iterator[Places]:
-    """The same of what is no polynomial: what the second derivative of the expression says."""
+    """Pairs of columns whose second derivative is not zero, for other families than polynomials."""
     for one, other in combinations_with_replacement(family.variables, 2):
         if sp.diff(family.family.body, one, other) != 0:
             yield np.stack([family.column_of(one), family.column_of(other)], axis=1).astype(np.int64)

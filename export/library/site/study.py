@@ -1,25 +1,53 @@
-"""What the page of an entry shows beside its sidecar: structure, presolve, a plot of runs, how to load it."""
+"""Content of an entry's page beyond its sidecar: structure, presolve, a plot of runs, loading."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import highspy
 
 from ....models.storage import write_bytes
 from ...pictures.sparsity import Pattern, sparsity_picture
 from ...pictures.traces import curve, trace_picture
+from ...programs.highs import loaded, version
+from ...programs.protocol import RefusedError
 from ..documents.documents import Library, problem_of
 from .loading import Way, ways
-from .presolve import Presolved, presolved
 from .structure import Blocks, blocks, hessian, matrix
+
+LINEAR: Final = ("LP", "MILP")
+"""Classes that HiGHS presolves: of a quadratic objective it presolves nothing, and quadratic rows it does not
+read.
+"""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Columns, integer ones among them, rows and nonzeros of a model."""
+
+    columns: int
+    integer: int
+    rows: int
+    nonzeros: int
+
+
+@dataclass(frozen=True)
+class Presolved:
+    """A model file before and after presolve, and the version of HiGHS that did it."""
+
+    file: str
+    before: Counts
+    after: Counts
+    version: str
 
 
 @dataclass(frozen=True)
 class Study:
-    """What is worked out of an entry. matrix, hessian: None without any entry; blocks: of the Hessian.
+    """Results computed from an entry. matrix, hessian: None if empty; blocks: of the Hessian.
 
-    plot: the picture of runs over time, empty where no run tells of them.
+    plot: the picture of runs over time, empty without traces.
     """
 
     matrix: Pattern | None
@@ -31,7 +59,7 @@ class Study:
 
 
 def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
-    """What is worked out of an entry; its pictures, NAME.matrix.svg and so on, are written.
+    """Compute the content of an entry's page and write its pictures, NAME.matrix.svg and so on.
 
     Raises InputError, InstanceError when the instance is missing, damaged, or another one than the sidecar
     names, and OutputError when a picture cannot be written.
@@ -48,14 +76,14 @@ def study(library: Library, entry: dict[str, Any], pictures: Path) -> Study:
         patterns.get("matrix"),
         patterns.get("hessian"),
         blocks(patterns["hessian"]) if "hessian" in patterns else None,
-        presolved(library.folder, entry),
+        _presolved(library.folder, entry),
         ways(entry, problem),
         _plot(entry, pictures),
     )
 
 
 def _plot(entry: dict[str, Any], pictures: Path) -> str:
-    """The name of the plot of an entry's runs, which is written; empty where none has a trace."""
+    """Write the plot of an entry's runs and return its name; empty without traces."""
     curves = [
         curve(f"{run['solver']} {run.get('version', '')}".strip(), run["trace"])
         for run in entry.get("runs", ())
@@ -67,3 +95,26 @@ def _plot(entry: dict[str, Any], pictures: Path) -> str:
     name = f"{entry['name']}.runs.svg"
     write_bytes(pictures / name, trace_picture(shown))
     return name
+
+
+def _presolved(folder: Path, entry: dict[str, Any]) -> Presolved | None:
+    """Return the size of an entry's .mps or .lp before and after presolve; None for other classes.
+
+    None, too, where there is no such file, or HiGHS does not read it.
+    """
+    files = [each["name"] for form in ("mps", "lp") for each in entry["files"] if each["format"] == form]
+    if entry["class"] not in LINEAR or not files:
+        return None
+    try:
+        highs = loaded(folder / files[0], threads=1)
+    except RefusedError:
+        return None
+    before = _counts(highs.getLp())
+    highs.presolve()
+    same = highs.getModelPresolveStatus() == highspy.HighsPresolveStatus.kNotReduced
+    return Presolved(files[0], before, before if same else _counts(highs.getPresolvedLp()), version())
+
+
+def _counts(model: Any) -> Counts:
+    kinds = [kind for kind in model.integrality_ if kind != highspy.HighsVarType.kContinuous]
+    return Counts(model.num_col_, len(kinds), model.num_row_, len(model.a_matrix_.value_))

@@ -34,8 +34,7 @@ NAMED = {
     "shade": [SAMPLES, METHODS],
     "verify": [PROGRAMS],
     "library solve": [SOLVERS, RUNGS],
-    "library submit-run": [get_args(RunStatus)],
-    "library submit-point": [],
+    "library submit": [get_args(RunStatus)],
 }
 """Tables whose names the help of a command lists."""
 OTHERS = (

@@ -39,7 +39,7 @@ def test_the_advice_of_a_writer_helps(given, better, tmp_path):
     reasons = refusals(one_stroke(**given), tmp_path / "refused")
     assert reasons
     assert all(
-        "nearly horizontal exactly 0" in each and "larger (0 leaves a term out)" in each for each in reasons
+        "nearly horizontal exactly 0" in each and "larger (0 removes a term)" in each for each in reasons
     )
     assert not any(map(SCALAR.search, reasons))
     assert refusals(one_stroke(**better), tmp_path / "written") == []

@@ -1,4 +1,4 @@
-"""What several tests of libraries share."""
+"""Fixtures of several tests of libraries."""
 
 import shutil
 
@@ -9,7 +9,7 @@ from oracles import browser as browser_program
 
 @pytest.fixture(scope="module")
 def short_searches():
-    """Libraries are built with one round of search: how good their fields are does not matter here."""
+    """Builds use one round of search, because the quality of their fields does not matter here."""
     from crossfield.export.library.ledger import points
 
     with pytest.MonkeyPatch.context() as patch:

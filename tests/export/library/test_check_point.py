@@ -77,8 +77,7 @@ def test_the_complete_point_of_a_field_is_feasible_also_without_its_zeros(name, 
     problem = carried(whole, FORMATS["mps"])
     write(whole, tmp_path / "m.mps")
     found = check(
-        str(tmp_path / "m.mps"),
-        save_point(tmp_path / "p.sol", problem, problem.point(field), zeros=False),
+        str(tmp_path / "m.mps"), save_point(tmp_path / "p.sol", problem, problem.point(field), zeros=False)
     )
     assert found.worst < 1e-14
     norm = 2 if problem.formulation.objective[0].expression.free_symbols and "l1" not in name else 1
@@ -164,7 +163,7 @@ def test_integers_that_are_not_quite_whole_count_as_they_are_or_rounded(tmp_path
 def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_path):
     tiny = Instance(
         "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
-        np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
+        np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes"
     )  # fmt: skip
     kind = file.split("_")[1]
     name = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[kind]
@@ -175,7 +174,7 @@ def test_points_of_real_solvers_have_the_objective_that_they_claim(file, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["milp-mccormick", "qp-fixed"])
-def test_highs_says_the_same_of_its_own_point(name, tmp_path):
+def test_highs_agrees_about_its_own_point(name, tmp_path):
     highspy = pytest.importorskip("highspy")
     field = make_field(make_instance("row"))
     write(formulate(field.instance, name, p=field.p if name == "qp-fixed" else None), tmp_path / "m.mps")
@@ -253,7 +252,7 @@ def test_ranges_mean_what_they_mean_to_highs(sense, length, tmp_path):
 
 PAIR = {
     "format": "crossfield-instance", "version": 1, "name": "pair", "mask": ["##"],
-    "w_strokes": 2.0, "w_beta": 0.5, "strokes": [[0, 0, 0.0, 0.25]],
+    "w_strokes": 2.0, "w_beta": 0.5, "strokes": [[0, 0, 0.0, 0.25]]
 }  # fmt: skip
 BY_HAND = "alpha_00_00 0.1\nalpha_00_01 0.3\nbeta_00_00 0.2\nbeta_00_01 -0.1\np1_00_00_r 1\np2_00_00_r -1\n"
 
@@ -515,7 +514,7 @@ def test_bad_points_are_one_line(what, tmp_path, capsys):
 
 
 def test_the_good_ones_are_good(tmp_path):
-    """So that none of the bad ones is refused for another reason."""
+    """The bad inputs differ from these in one place each."""
     (tmp_path / "p").write_text(GOOD_POINT)
     for model in (linear(), json.dumps(PAIR)):
         (tmp_path / "m").write_text(model)

@@ -1,4 +1,4 @@
-"""Where a library's tasks run: in processes of the package, whatever the program is that asks for them."""
+"""Executors of a library's tasks: processes of the package, for any calling program."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The ledger: that its records count, and that those which do not are told."""
+"""The ledger: records that count, and reports of those that do not."""
 
 from dataclasses import replace
 
@@ -31,8 +31,8 @@ sizes = { tiny = [6] }
 
 
 @pytest.mark.usefixtures("short_searches")
-@pytest.mark.parametrize("sha256, told", [(None, False), ("0" * 64, True)])
-def test_a_build_tells_of_records_that_do_not_count(tmp_path, capsys, sha256, told):
+@pytest.mark.parametrize("sha256, reported", [(None, False), ("0" * 64, True)])
+def test_a_build_reports_records_that_do_not_count(tmp_path, capsys, sha256, reported):
     (tmp_path / "spec.toml").write_text(SPEC)
     command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out"), "--quiet"]
     write_ledger(read_ledger(tmp_path))
@@ -44,7 +44,7 @@ def test_a_build_tells_of_records_that_do_not_count(tmp_path, capsys, sha256, to
     errors = capsys.readouterr().err
     assert (
         f"records of 1 entries do not count, for their problems have changed since: {record.entry}" in errors
-    ) == told
+    ) == reported
 
 
 def test_every_record_that_ships_counts():

@@ -1,6 +1,4 @@
-"""The instance library: what a build makes of a specification, that it is true,
-and that it is the same however it is made.
-"""
+"""Builds of a specification: content, correctness, and the same bytes in every way."""
 
 import gzip
 import hashlib
@@ -27,7 +25,8 @@ from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.contributions.solve import solve_library
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.documents.statistics import tangent_bound
-from crossfield.export.library.ledger.given import read_points
+from crossfield.export.library.ledger import points as known_points
+from crossfield.export.library.ledger.given import read_points, write_points
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.points import complete_point, field_of
 from crossfield.export.library.ledger.search_1norm import better_in_1norm
@@ -93,13 +92,25 @@ def write_spec(folder, text=SPEC):
 
 
 @pytest.fixture(scope="module")
-def spec(tmp_path_factory):
-    return write_spec(tmp_path_factory.mktemp("spec"))
+def searched(tmp_path_factory):
+    """A library whose points come from short searches; not to be changed."""
+    folder = tmp_path_factory.mktemp("searched")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(known_points, "_ROUNDS", 1)
+        return build(read_spec(write_spec(folder)), folder / "library")
+
+
+@pytest.fixture(scope="module")
+def spec(searched, tmp_path_factory):
+    """The specification with those points, so that builds in other processes do not search either."""
+    folder = tmp_path_factory.mktemp("spec")
+    write_points(searched.folder, folder / "points.zip")
+    return write_spec(folder, 'points = "points.zip"\n' + SPEC)
 
 
 @pytest.fixture(scope="module")
 def built(spec, tmp_path_factory):
-    """The library of the specification, built in this process; nobody may change it."""
+    """The library of the specification, built in this process; not to be changed."""
     return build(read_spec(spec), tmp_path_factory.mktemp("built") / "library")
 
 
@@ -137,125 +148,92 @@ def test_the_shipped_specification_is_a_ladder_of_every_sample(tmp_path):
     assert spec.formulations == tuple(FORMULATIONS)
 
 
-GOOD_RUNG = "[rungs.tiny]\nsizes = [4]\n"
-GOOD_SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
+RUNG = "[rungs.tiny]\nsizes = [4]\n"
+SKETCH = '[[sketches]]\nname = "a"\nsample = "mouse"\n'
 BAD = {
     "no TOML": ("[[[", "not valid TOML"),
     "another kind": ('format = "x"\n', "format: must be 'crossfield-library-spec'"),
     "version as truth": (HEAD.replace("version = 1", "version = true"), "version: must be 1"),
     "unknown key": (
-        HEAD + 'colour = "red"\n' + GOOD_RUNG + GOOD_SKETCH,
+        HEAD + 'colour = "red"\n' + RUNG + SKETCH,
         "colour: is unknown; the keys here are format",
     ),
-    "unknown key of a rung": (HEAD + GOOD_RUNG + "speed = 1\n" + GOOD_SKETCH, "rungs.tiny.speed: is unknown"),
+    "unknown key of a rung": (HEAD + RUNG + "speed = 1\n" + SKETCH, "rungs.tiny.speed: is unknown"),
     "unknown rung": (
-        HEAD + "[rungs.huge]\nsizes = [4]\n" + GOOD_SKETCH,
+        HEAD + "[rungs.huge]\nsizes = [4]\n" + SKETCH,
         "rungs.huge: is unknown; the keys here are tiny",
     ),
-    "no rung": (HEAD + GOOD_SKETCH, "rungs: there is none"),
-    "no sketch": (HEAD + GOOD_RUNG, "sketches: there is none"),
+    "no rung": (HEAD + SKETCH, "rungs: there is none"),
+    "no sketch": (HEAD + RUNG, "sketches: there is none"),
     "size zero": (
-        HEAD + "[rungs.tiny]\nsizes = [0]\n" + GOOD_SKETCH,
+        HEAD + "[rungs.tiny]\nsizes = [0]\n" + SKETCH,
         "rungs.tiny.sizes: 0 is out of range; choose 1 to 999",
     ),
-    "size too large": (HEAD + "[rungs.tiny]\nsizes = [1000]\n" + GOOD_SKETCH, "1000 is out of range"),
-    "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + GOOD_SKETCH, "must be a list of whole numbers"),
-    "size as truth": (
-        HEAD + "[rungs.tiny]\nsizes = [true]\n" + GOOD_SKETCH,
-        "must be a list of whole numbers",
-    ),
-    "size twice": (
-        HEAD + GOOD_RUNG + "[rungs.small]\nsizes = [4]\n" + GOOD_SKETCH,
-        "a has size 4 on two rungs",
-    ),
-    "unknown format": (
-        HEAD + GOOD_RUNG + 'formats = ["docx"]\n' + GOOD_SKETCH,
-        "there is no 'docx'; choose from nl",
-    ),
+    "size too large": (HEAD + "[rungs.tiny]\nsizes = [1000]\n" + SKETCH, "1000 is out of range"),
+    "size as text": (HEAD + '[rungs.tiny]\nsizes = ["4"]\n' + SKETCH, "must be a list of whole numbers"),
+    "size as truth": (HEAD + "[rungs.tiny]\nsizes = [true]\n" + SKETCH, "must be a list of whole numbers"),
+    "size twice": (HEAD + RUNG + "[rungs.small]\nsizes = [4]\n" + SKETCH, "a has size 4 on two rungs"),
+    "unknown format": (HEAD + RUNG + 'formats = ["docx"]\n' + SKETCH, "there is no 'docx'; choose from nl"),
     "unknown formulation": (
-        HEAD + 'formulations = ["lp"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        HEAD + 'formulations = ["lp"]\n' + RUNG + SKETCH,
         "formulations: there is no 'lp'",
     ),
     "formulation twice": (
-        HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + GOOD_RUNG + GOOD_SKETCH,
+        HEAD + 'formulations = ["qp-fixed", "qp-fixed"]\n' + RUNG + SKETCH,
         "'qp-fixed' is listed twice",
     ),
-    "duplicate name": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH + GOOD_SKETCH,
-        "sketches[1].name: 'a' is the name of two sketches",
-    ),
+    "duplicate name": (HEAD + RUNG + SKETCH + SKETCH, "sketches[1].name: 'a' is the name of two sketches"),
     "name with a path": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"../a"'),
+        HEAD + RUNG + SKETCH.replace('"a"', '"../a"'),
         "sketches[0].name: '../a' is not allowed",
     ),
-    "name in capitals": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
+    "name in capitals": (HEAD + RUNG + SKETCH.replace('"a"', '"A"'), "'A' is not allowed"),
     "name too long": (
-        HEAD
-        + GOOD_RUNG
-        + 'facets = ["printed"]\ngauges = ["box"]\n'
-        + GOOD_SKETCH.replace('"a"', '"abcdefghijklmn"'),
+        HEAD + RUNG + 'facets = ["printed"]\ngauges = ["box"]\n' + SKETCH.replace('"a"', '"abcdefghijklmn"'),
         "has 39 characters; shorten",
     ),
-    "unknown sample": (HEAD + GOOD_RUNG + GOOD_SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),
+    "unknown sample": (HEAD + RUNG + SKETCH.replace("mouse", "cat"), "there is no sample 'cat'"),
     "missing file": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n',
+        HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "gone.svg"\n',
         "sketches[0].file: there is no file",
     ),
     "missing mask": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n',
+        HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "drawn by hand.svg"\nmask = "gone.png"\n',
         "sketches[0].mask: there is no file",
     ),
-    "no source": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\n',
-        "needs exactly one of sample, file, random",
-    ),
-    "two sources": (HEAD + GOOD_RUNG + GOOD_SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
+    "no source": (HEAD + RUNG + '[[sketches]]\nname = "a"\n', "needs exactly one of sample, file, random"),
+    "two sources": (HEAD + RUNG + SKETCH + 'file = "drawn by hand.svg"\n', "needs exactly one of"),
     "random without seeds": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
+        HEAD + RUNG + '[[sketches]]\nname = "a"\nrandom = "full"\n',
         "sketches[0].random: goes with seeds",
     ),
     "sizes on a rung that is not": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH + "sizes = { large = [9] }\n",
+        HEAD + RUNG + SKETCH + "sizes = { large = [9] }\n",
         "sketches[0].sizes.large: is unknown",
     ),
-    "seeds of a sample": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH + "seeds = [1]\n",
-        "sketches[0].seeds: goes with random",
-    ),
-    "mask of a sample": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH + 'mask = "m.png"\n',
-        "sketches[0].mask: goes with file",
-    ),
+    "seeds of a sample": (HEAD + RUNG + SKETCH + "seeds = [1]\n", "sketches[0].seeds: goes with random"),
+    "mask of a sample": (HEAD + RUNG + SKETCH + 'mask = "m.png"\n', "sketches[0].mask: goes with file"),
     "two lines in a title": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH + 'title = "a\\nb"\n',
+        HEAD + RUNG + SKETCH + 'title = "a\\nb"\n',
         "sketches[0].title: must be one line",
     ),
-    "two lines in a name": (
-        HEAD + GOOD_RUNG + GOOD_SKETCH.replace('"a"', '"a\\n"'),
-        "sketches[0].name: must be a",
-    ),
+    "two lines in a name": (HEAD + RUNG + SKETCH.replace('"a"', '"a\\n"'), "sketches[0].name: must be a"),
     "compressed as text": (
-        HEAD + GOOD_RUNG + 'compress = "no"\n' + GOOD_SKETCH,
+        HEAD + RUNG + 'compress = "no"\n' + SKETCH,
         "rungs.tiny.compress: must be true or",
     ),
     "a rung without sizes": (
-        HEAD + "[rungs.tiny]\n" + GOOD_SKETCH,
+        HEAD + "[rungs.tiny]\n" + SKETCH,
         "rungs.tiny.sizes: there is none; write a list",
     ),
-    "a sketch that is a number": (
-        HEAD + "sketches = [3]\n" + GOOD_RUNG,
-        "sketches: must be a table [[sketches]]",
-    ),
+    "a sketch that is a number": (HEAD + "sketches = [3]\n" + RUNG, "sketches: must be a table [[sketches]]"),
     "another shape": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nrandom = "round"\nseeds = [1]\n',
+        HEAD + RUNG + '[[sketches]]\nname = "a"\nrandom = "round"\nseeds = [1]\n',
         "sketches[0].random: there is no 'round'; choose from full, ragged",
     ),
-    "missing ledger": (
-        HEAD + 'ledger = "gone.json"\n' + GOOD_RUNG + GOOD_SKETCH,
-        "ledger: there is no file gone.json",
-    ),
+    "missing ledger": (HEAD + 'ledger = "gone.json"\n' + RUNG + SKETCH, "ledger: there is no file gone.json"),
     "a drawing without strokes": (
-        HEAD + GOOD_RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n',
+        HEAD + RUNG + '[[sketches]]\nname = "a"\nfile = "spec.toml"\n',
         "cf_a_n004",
     ),
 }
@@ -358,7 +336,7 @@ def test_every_problem_can_be_had_from_instance_and_sidecar(built):
         assert problem.n_columns == document["counts"]["variables"]
 
 
-# Points, checked with readers that nobody here wrote
+# Points, checked with readers of other projects
 
 
 def highs_model(path, tmp_path):
@@ -415,7 +393,7 @@ def test_highs_finds_the_point_of_a_milp_feasible_with_the_sidecars_objective(bu
         "qp-fixed",
     ],
 )
-def test_casadi_evaluates_the_nl_at_its_point_as_the_sidecar_says(built, formulation):
+def test_casadi_evaluates_the_nl_at_its_point_as_the_sidecar_states(built, formulation):
     document = by_formulation(built, "cf_own_n004")[formulation]
     model = casadi.NlpBuilder()
     model.import_nl(str(built.folder / f"{document['name']}.nl"))
@@ -431,7 +409,7 @@ def test_casadi_evaluates_the_nl_at_its_point_as_the_sidecar_says(built, formula
     assert (rows <= np.array(model.g_ub) + 1e-9).all()
 
 
-def test_points_are_feasible_beyond_what_minlplib_asks(built):
+def test_points_are_feasible_beyond_the_tolerance_of_minlplib(built):
     for document in built.entries:
         assert document["best"]["violation"] <= 1e-12
         assert document["best"]["integrality"] == 0.0
@@ -572,17 +550,19 @@ def test_random_instances_follow_size_and_seed_alone():
 
 
 @pytest.mark.slow
-def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(built, spec, tmp_path):
+def test_another_process_with_two_jobs_and_another_hash_seed_makes_the_same_bytes(tmp_path):
+    """Searches included, which the points of the other tests' specification leave out."""
+    spec = write_spec(tmp_path)
     command = build_command(spec, tmp_path / "again")
     environment = os.environ | {"PYTHONHASHSEED": "7"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, complaints(done.stderr)) == (0, "")
-    assert content(tmp_path / "again") == content(built.folder)
+    assert content(tmp_path / "again") == content(build(read_spec(spec), tmp_path / "library").folder)
 
 
 @pytest.mark.slow
-def test_the_1_norm_field_does_not_depend_on_what_highs_did_before():
-    """Its threads stay in the process, and their number used to make the next run fail in silence."""
+def test_the_1_norm_field_does_not_depend_on_earlier_runs_of_highs():
+    """Its threads stay in the process, and another number of them makes the next run fail."""
     instance = sample("mouse", 4, gauge="box", stroke_weight=0.2)
     found = []
     for threads in (1, 2):
@@ -605,7 +585,7 @@ def test_nothing_whole_is_made_again(built, spec, copy):
     assert before == {path.name: path.stat().st_mtime_ns for path in copy.glob("cf_*_n*")}
 
 
-def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, copy):
+def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_rand_n006_s2_qp.nl.gz").write_bytes(b"half")
     (copy / "cf_own_n004_box_parity.json").write_text("{}")
@@ -621,13 +601,15 @@ def test_what_is_missing_or_damaged_is_made_again_and_nothing_else(built, spec, 
 
 
 @pytest.mark.slow
-def test_a_library_is_brought_up_to_date_from_itself_alone(built, copy):
+def test_a_library_is_brought_up_to_date_from_itself_alone(searched, tmp_path, monkeypatch):
+    monkeypatch.setattr(known_points, "_ROUNDS", 1)
+    copy = shutil.copytree(searched.folder, tmp_path / "library")
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_own_n004.about.json").unlink()
     with pytest.raises(InputError, match=r"cf_own_n004_milp\.json: cannot be read"):
         _ = read_library(copy).entries
     rebuild(copy)
-    assert content(copy) == content(built.folder)
+    assert content(copy) == content(searched.folder)
 
 
 @pytest.mark.slow
@@ -718,9 +700,11 @@ def better_field(library, name):
 
 @pytest.mark.slow
 def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_elsewhere(
-    built, spec, copy, tmp_path
+    searched, tmp_path, monkeypatch
 ):
-    document, problem, field = better_field(built, "cf_rand_n006_s2_miqp")
+    monkeypatch.setattr(known_points, "_ROUNDS", 1)
+    copy = shutil.copytree(searched.folder, tmp_path / "library")
+    document, problem, field = better_field(searched, "cf_rand_n006_s2_miqp")
     objective = problem.objective_value(complete_point(problem, field))
     assert objective < document["best"]["objective"] - 1e-6
     record = Record(
@@ -736,7 +720,7 @@ def test_a_better_field_in_the_ledger_improves_the_points_and_is_reproduced_else
     assert library.entry("cf_rand_n006_s2_bilin")["best"]["objective"] <= objective + 1e-9
     assert all("cf_rand_n006_s2" in line for line in made[:-1])
     models = [name for name in content(copy) if re.search(r"\.(nl|mps|gms|lp)(\.gz)?$", name)]
-    assert all((copy / name).read_bytes() == (built.folder / name).read_bytes() for name in models)
+    assert all((copy / name).read_bytes() == (searched.folder / name).read_bytes() for name in models)
 
     beside = tmp_path / "beside"
     beside.mkdir()
@@ -779,8 +763,8 @@ def test_a_damaged_ledger_is_one_line(copy, capfd):
 
 @pytest.mark.slow
 def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothing():
-    """Every record is about the very problem that is built today, no bound is above a point,
-    and every kept field has the objective told.
+    """Every record is about the problem that is built today, no bound is above a point, and every kept field
+    has the stated objective.
     """
     spec = default_spec()
     ledger = read_ledger(spec.ledger.parent)
@@ -810,7 +794,7 @@ def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(tmp_pat
         HEAD
         + 'formulations = ["miqcp-bilinear-l1", "milp-mccormick", "qp-fixed"]\n'
         + '[rungs.tiny]\nsizes = [3]\nformats = ["mps"]\n'
-        + GOOD_SKETCH
+        + SKETCH
     )
     folder = build(read_spec(write_spec(tmp_path, text)), tmp_path / "small").folder
     assert "=opt= cf_a_n003_milp" not in (folder / "library.solu").read_text()
@@ -836,7 +820,7 @@ def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(tmp_pat
 
 @pytest.mark.slow
 def test_every_format_of_the_table_can_be_asked_for(tmp_path):
-    text = HEAD + 'formulations = ["miqp-exact"]\n[rungs.tiny]\nsizes = [3]\n' + GOOD_SKETCH
+    text = HEAD + 'formulations = ["miqp-exact"]\n[rungs.tiny]\nsizes = [3]\n' + SKETCH
     library = build(read_spec(write_spec(tmp_path, text)), tmp_path / "all")
     (document,) = library.entries
     assert {file["format"] for file in document["files"]} | set(document["refused"]) == {*FORMATS, "sol"}

@@ -1,4 +1,4 @@
-"""Optima of a library by certificates: shipped, told of all equivalent entries, and never believed."""
+"""Certificates of a library: shipped, valid for all equivalent entries, and always checked."""
 
 import json
 import shutil
@@ -94,9 +94,9 @@ def test_the_same_certificate_is_made_twice(built, tmp_path):
 @pytest.mark.parametrize(
     "key, value, words",
     [
-        ("bound", 99.0, "tells another status, bound or energy of its certificate"),
-        ("status", "gap", "tells another status, bound or energy of its certificate"),
-        ("energy", 99.0, "tells another status, bound or energy of its certificate"),
+        ("bound", 99.0, "states another status, bound or energy of its certificate"),
+        ("status", "gap", "states another status, bound or energy of its certificate"),
+        ("energy", 99.0, "states another status, bound or energy of its certificate"),
         ("file", "cf_rand_n003_s2.certificate.npz", "as its certificate and does not list it"),
     ],
 )
@@ -108,7 +108,7 @@ def test_a_forged_claim_is_found(lib, key, value, words):
 
 
 def test_a_forged_certificate_is_found(lib):
-    """Of another instance, of a worse field that claims the same, and with bytes that were changed."""
+    """The certificate of another instance, one of a worse field with the same claim, and changed bytes."""
     good, name = (lib / CERTIFICATE).read_bytes(), f"{STEM}.about.json"
     shutil.copy(lib / "cf_rand_n003_s2.certificate.npz", lib / CERTIFICATE)
     assert found(lib)[CERTIFICATE] == f"is not a certificate of {STEM}"
@@ -116,7 +116,7 @@ def test_a_forged_certificate_is_found(lib):
     proof = cf.prove(worse.instance, jobs=1)
     weak = replace(proof, field=worse, energy=worse.energy().total, levels=proof.levels[:1])
     assert write_certificate(weak, lib / CERTIFICATE).status == "gap"
-    assert "tells another status, bound or energy" in found(lib)[name]
+    assert "states another status, bound or energy" in found(lib)[name]
     half = len(good) // 2
     (lib / CERTIFICATE).write_bytes(good[:half] + bytes([good[half] ^ 1]) + good[half + 1 :])
     assert CERTIFICATE in found(lib)
@@ -125,7 +125,7 @@ def test_a_forged_certificate_is_found(lib):
 @pytest.mark.parametrize("key, value", [("bound", 99.0), ("status", "gap"), ("energy", 99.0)])
 def test_points_that_claim_more_than_their_certificate_are_refused(lib, key, value):
     instance = cf.read_instance(lib / f"{STEM}.instance.json")
-    assert read_points(lib)(STEM).certificate(instance)[1]["status"] == "optimal"
+    assert read_points(lib)(STEM).certificate(instance).facts["status"] == "optimal"
     change(lib / f"{STEM}.about.json", **{f"certificate__{key}": value})
     with pytest.raises(InputError, match=f"{STEM}.about.json states another status, bound or energy"):
         read_points(lib)(STEM).certificate(instance)
@@ -156,7 +156,7 @@ def test_points_with_a_damaged_document_are_refused(lib, change_it, words):
 
 def test_a_forged_or_missing_checker_is_found(lib):
     (lib / "check_certificate.py").write_text("print('the certificate is valid')\n")
-    assert "is not the checker" in found(lib)["check_certificate.py"]
+    assert "is not what follows" in found(lib)["check_certificate.py"]
     (lib / "check_certificate.py").unlink()
     assert "is missing" in found(lib)["check_certificate.py"]
 

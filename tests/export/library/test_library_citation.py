@@ -1,4 +1,4 @@
-"""What a library says of origin, licence and citation is what its specification states, and no more."""
+"""Origin, licence and citation of a library follow from its specification alone."""
 
 import json
 import re
@@ -44,7 +44,7 @@ file = "drawn by hand.svg"
 author = "A. Name"
 license = "CC-BY-NC-4.0"
 """
-UNSAID = """[[sketches]]
+UNSTATED = """[[sketches]]
 name = "found"
 file = "drawn by hand.svg"
 """
@@ -61,7 +61,7 @@ def spec_of(folder, *parts):
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mixed")
-    return build(spec_of(folder, RELEASE, RUNG, OURS, FOREIGN, UNSAID), folder / "library")
+    return build(spec_of(folder, RELEASE, RUNG, OURS, FOREIGN, UNSTATED), folder / "library")
 
 
 def texts(library):
@@ -72,11 +72,7 @@ def texts(library):
 def test_every_sketch_keeps_its_own_licence(mixed):
     origins = {each["family"]: each.get("origin") for each in mixed.entries}
     assert origins == {
-        "mouse": {
-            "author": "The crossfield authors",
-            "license": "CC-BY-4.0",
-            "source": "a built-in sample",
-        },
+        "mouse": {"author": "The crossfield authors", "license": "CC-BY-4.0", "source": "a built-in sample"},
         "hers": {"author": "A. Name", "license": "CC-BY-NC-4.0"},
         "found": None,
     }
@@ -95,8 +91,8 @@ def test_every_sketch_keeps_its_own_licence(mixed):
 
 
 @pytest.mark.slow
-def test_without_a_licence_nothing_is_said_to_be_cc_by(tmp_path):
-    plain = build(spec_of(tmp_path, RUNG, UNSAID), tmp_path / "library")
+def test_without_a_licence_no_text_states_cc_by(tmp_path):
+    plain = build(spec_of(tmp_path, RUNG, UNSTATED), tmp_path / "library")
     assert not [name for name, text in texts(plain).items() if re.search("CC.BY|Commons", text)]
     assert not any("CC-BY" in path.read_text() for path in plain.folder.glob("*.json"))
     assert set(plain.document["release"]) == {"title", "authors", "bibtex"}
@@ -108,7 +104,7 @@ def test_without_a_licence_nothing_is_said_to_be_cc_by(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_release_is_told_in_index_and_texts(mixed):
+def test_index_and_texts_state_the_release(mixed):
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
     release = mixed.document["release"]
     assert {key: release[key] for key in ("title", "authors", "version", "date")} == {
@@ -127,18 +123,18 @@ def test_a_release_is_told_in_index_and_texts(mixed):
     assert "## 1.2, 2026-03-01" in texts(mixed)["CHANGELOG.md"]
 
 
-def test_one_licence_is_told_of_all_only_if_all_have_it_and_it_is_known(tmp_path):
+def test_a_licence_of_the_library_is_known_and_that_of_all_sketches(tmp_path):
     known = spec_of(tmp_path, RUNG, OURS)
     other = OURS.replace("mouse", "saddle")
     assert Terms(known.sketches).licence == "CC-BY-4.0"
     assert Terms(known.sketches).name == "Creative Commons Attribution 4.0 International (CC BY 4.0)"
-    for more in (FOREIGN, UNSAID, other.replace("CC-BY-4.0", "mine")):
+    for more in (FOREIGN, UNSTATED, other.replace("CC-BY-4.0", "mine")):
         assert Terms(spec_of(tmp_path, RUNG, OURS, more).sketches).licence == ""
     assert Terms(spec_of(tmp_path, RUNG, OURS.replace("CC-BY-4.0", "all mine")).sketches).licence == ""
     assert Terms(spec_of(tmp_path, RUNG, OURS, other).sketches).licence == "CC-BY-4.0"
 
 
-def test_bibtex_is_whole_and_escapes_what_tex_reads(tmp_path):
+def test_bibtex_is_complete_and_escaped(tmp_path):
     given = spec_of(tmp_path, RELEASE.replace("A. Name", "100%_{x}\\\\^~"), RUNG, OURS)
     text = bibtex(given)
     assert text.startswith("@misc{tests_more_2026,\n  title = {{tests \\& more}},\n")
@@ -156,22 +152,22 @@ def test_bibtex_is_whole_and_escapes_what_tex_reads(tmp_path):
 def test_another_origin_makes_an_instance_again_and_a_forged_one_is_found(mixed, tmp_path):
     folder = shutil.copytree(mixed.folder, tmp_path / "library")
     stolen = FOREIGN.replace("A. Name", "B. Name")
-    again = build(spec_of(tmp_path, RELEASE, RUNG, OURS, stolen, UNSAID), folder)
+    again = build(spec_of(tmp_path, RELEASE, RUNG, OURS, stolen, UNSTATED), folder)
     assert again.entry("cf_hers_n004_qp")["origin"]["author"] == "B. Name"
     assert verify_library(folder) == []
     for name in ("cf_found_n004_qp.json", "cf_found_n004.about.json"):
         path = folder / name
         whole = path.read_text()
         path.write_text(json.dumps(json.loads(whole) | {"origin": {"license": "CC0-1.0"}}))
-        assert "tells another origin" in " ".join(str(each) for each in verify_library(folder))
+        assert "states another origin" in " ".join(str(each) for each in verify_library(folder))
         path.write_text(whole)
     index = json.loads((folder / "library.json").read_text())
     index["release"]["authors"] = ["M. Allory"]
     (folder / "library.json").write_text(json.dumps(index))
-    assert "tells another release" in " ".join(str(each) for each in verify_library(folder))
+    assert "states another release" in " ".join(str(each) for each in verify_library(folder))
 
 
-def test_what_is_no_origin_or_release_is_refused(tmp_path):
+def test_an_invalid_origin_or_release_is_refused(tmp_path):
     for text, words in (
         (OURS.replace('"2026-02-03"', "2026-02-03"), r"sketches\[0\]\.added: must be a day in quotes"),
         (OURS.replace("02-03", "02-30"), r"sketches\[0\]\.added: '2026-02-30' is no day"),
@@ -182,7 +178,7 @@ def test_what_is_no_origin_or_release_is_refused(tmp_path):
             spec_of(tmp_path, RUNG, text)
 
 
-def test_the_library_that_ships_states_all_of_it():
+def test_the_shipped_library_states_release_and_origins():
     spec = default_spec()
     assert spec.release is not None
     assert spec.release.authors == ("The crossfield authors",)

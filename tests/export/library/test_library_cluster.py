@@ -1,6 +1,4 @@
-"""The library built on a cluster: a real scheduler and two real workers,
-one of which is killed in the middle.
-"""
+"""A library built on a cluster: a scheduler and two workers, one of which is killed during the build."""
 
 import signal
 import subprocess

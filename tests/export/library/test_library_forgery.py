@@ -1,6 +1,4 @@
-"""Every field of a library, forged in turn under new checksums, is found:
-nothing is believed that can be computed again.
-"""
+"""Every forged value of a library is found, also under new checksums, because it is recomputed."""
 
 import copy
 import json
@@ -11,13 +9,13 @@ import crossfield as cf
 import pytest
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents.documents import problem_of, read_library, read_sidecar
-from crossfield.export.library.ledger.dual_bounds import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.ledger.ledger import Record, add_record
+from crossfield.export.library.ledger.standing import contradicts, cut, is_proven, relative_gap
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, SolutionError
 from forging import seal
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -67,7 +65,7 @@ def built(tmp_path_factory):
 
 
 def forgeries(value, path=()):
-    """Copies of a document, each with one value changed to another of its type, and where."""
+    """Copies of a document with one value changed to another of its type, and its place."""
     if isinstance(value, dict):
         for key, part in value.items():
             for where, changed in forgeries(part, (*path, key)):
@@ -119,7 +117,7 @@ def changed(lib: Path, **given):
 
 
 def test_a_forged_bound_does_not_pass_as_optimal(built, tmp_path):
-    """All that follows from it is forged along: bounds, status, gap, library.solu and the checksums."""
+    """Bounds, status, gap, library.solu and the checksums are forged consistently."""
     lib = shutil.copytree(built, tmp_path / "lib")
     sidecar = json.loads((lib / f"{MILP}.json").read_text())
     best = sidecar["best"]["objective"]
@@ -127,7 +125,7 @@ def test_a_forged_bound_does_not_pass_as_optimal(built, tmp_path):
     solu = [line for line in (lib / "library.solu").read_text().splitlines() if MILP not in line]
     (lib / "library.solu").write_text("\n".join([*solu, f"=opt= {MILP} {best!r}"]) + "\n")
     found = changed(lib, bounds=bounds, bound=best, status="optimal", gap=0.0)
-    assert any("tells another bounds than follows" in each for each in found)
+    assert any("states another bounds than follows" in each for each in found)
 
 
 def test_a_text_that_was_changed_is_found(built, tmp_path):
@@ -189,20 +187,20 @@ def test_auxiliary_variables_are_computed_again(built, tmp_path):
     for name in ("s", "t", "gamma", "psi"):
         point[problem.blocks[name].slice] -= 1e-6
     assert problem.violation(point).worst > 1e-7
-    told = submit_point(written(problem, point, tmp_path), lib, entry=MILP)
-    assert told.objective == pytest.approx(told.known, abs=1e-8)
-    assert not told.better
+    result = submit_one(lib, written(problem, point, tmp_path), entry=MILP)
+    assert result.objective == pytest.approx(result.known, abs=1e-8)
+    assert result.outcome == "not better"
 
 
 @pytest.mark.parametrize("block", ["alpha", "beta", "p1", "p2"])
 def test_angles_and_jumps_are_not_mended(block, built, tmp_path):
-    """What the answer is about has to be feasible as it stands."""
+    """Angles and jumps of a solution have to be feasible without corrections."""
     lib = shutil.copytree(built, tmp_path / "lib")
     problem, point = point_of(lib)
     at = problem.blocks[block].slice
     point[at] = problem.blocks[block].upper + (1.0 if block.startswith("p") else 1e-6)
     with pytest.raises(SolutionError, match="not a feasible point"):
-        submit_point(written(problem, point, tmp_path), lib, entry=MILP)
+        submit_one(lib, written(problem, point, tmp_path), entry=MILP)
 
 
 def test_fractional_jumps_are_refused(built, tmp_path):
@@ -210,7 +208,7 @@ def test_fractional_jumps_are_refused(built, tmp_path):
     problem, point = point_of(lib)
     point[problem.blocks["p1"].slice] = 0.4
     with pytest.raises(SolutionError, match=r"integrality 0\.4"):
-        submit_point(written(problem, point, tmp_path), lib, entry=MILP)
+        submit_one(lib, written(problem, point, tmp_path), entry=MILP)
 
 
 def point_of(lib):

@@ -1,4 +1,4 @@
-"""Work on a library at the same time: each waits for the others, none is lost, no crash locks anybody out."""
+"""Simultaneous work on a library: processes wait, no result is lost, and a crash leaves no lock."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.documents import lock
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.export.library.documents.lock import locked
-from crossfield.export.library.ledger.ledger import Record, add_record, keep, merged, read_ledger
+from crossfield.export.library.ledger.ledger import Record, add_record, merged, read_ledger, write_ledger
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.errors import InputError, OutputError
 from crossfield.models.field.file import read_field
@@ -55,9 +55,7 @@ def copy(built, tmp_path):
 
 
 def better_points(library, folder):
-    """A solution file by HiGHS for each entry: the best angles for the jumps of its field,
-    which is better than the library has.
-    """
+    """A solution file by HiGHS for each entry that is better than the library's point."""
     highspy = pytest.importorskip("highspy")
     for document in library.entries:
         name = document["name"]
@@ -77,11 +75,11 @@ def test_submissions_at_one_moment_are_all_kept(tmp_path):
     copy = tmp_path / "library"
     files = list(better_points(build(write_spec(tmp_path, size=6), copy), tmp_path))
     assert len(files) == len(SEEDS)
-    command = [sys.executable, "-m", "crossfield", "library", "submit-point", "--library", str(copy)]
+    command = [sys.executable, "-m", "crossfield", "library", "submit", str(copy)]
     others = [subprocess.Popen([*command, str(file)], stdout=subprocess.PIPE, text=True) for file in files]
     said = [other.communicate()[0] for other in others]
     assert [other.returncode for other in others] == [0] * len(files)
-    better = [file.stem for file, words in zip(files, said, strict=True) if "better, and now" in words]
+    better = [file.stem for file, words in zip(files, said, strict=True) if "accepted" in words]
     assert len(better) == len(files)
     assert {record.entry for record in read_ledger(copy).records if record.point} == set(better)
     assert verify_library(copy) == []
@@ -109,7 +107,7 @@ def holder(copy):
         process.kill()
 
 
-def test_who_waits_too_long_is_told_for_whom(copy, holder, monkeypatch, capsys):
+def test_a_process_that_waits_too_long_names_the_holder(copy, holder, monkeypatch, capsys):
     monkeypatch.setattr(lock, "PATIENCE", 0.3)
     said = []
     with pytest.raises(OutputError) as caught, locked(copy, "this test", said.append):
@@ -123,7 +121,7 @@ def test_who_waits_too_long_is_told_for_whom(copy, holder, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_a_verification_waits_for_changes_and_changes_for_it(copy, holder, monkeypatch):
-    """Before, it looked at files while they were written, and found them damaged."""
+    """Without a lock it reads files that are being written."""
     monkeypatch.setattr(lock, "PATIENCE", 0.3)
     said = []
     with pytest.raises(
@@ -168,9 +166,9 @@ def test_a_process_that_was_killed_locks_nobody_out(copy, holder, monkeypatch):
 def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(built, copy):
     document = built.entries[0]
     field = read_field(copy / f"{document['name'].rpartition('_')[0]}.field.json")
-    told = {"problem_sha256": document["problem_sha256"], "version": "1", "status": "feasible"}
+    stated = {"problem_sha256": document["problem_sha256"], "version": "1", "status": "feasible"}
     for solver, primal in (("first", 2.0), ("second", 3.0), ("third", 1.0)):
-        add_record(copy, Record(entry=document["name"], solver=solver, primal=primal, **told), field)
+        add_record(copy, Record(entry=document["name"], solver=solver, primal=primal, **stated), field)
     assert {record.solver: record.point is not None for record in read_ledger(copy).records} == {
         "first": False,
         "second": False,
@@ -179,7 +177,7 @@ def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(built, 
 
 
 def test_a_build_that_is_refused_leaves_nothing(tmp_path):
-    """A drawing without strokes is only found out when its instance is made."""
+    """The error of a drawing without strokes comes when its instance is made."""
     (tmp_path / "bare.scap").write_text("#9 9\n")
     spec = write_spec(
         tmp_path, more='[[sketches]]\nname = "bare"\nfile = "bare.scap"\nsizes = { tiny = [4] }\n'
@@ -199,9 +197,9 @@ def test_a_ledger_is_merged_before_it_is_written(built, copy, tmp_path):
     record = Record(document["name"], document["problem_sha256"], "S", "1", "feasible", primal=1.0)
     kept = add_record(copy, record, field)
     (tmp_path / "new").mkdir()
-    found = merged(tmp_path / "new", read_ledger(copy), [document["name"]])
+    found = merged(tmp_path / "new", read_ledger(copy), [document["name"]], [])
     assert list((tmp_path / "new").iterdir()) == []
     assert found.field(kept).instance.sha256 == field.instance.sha256
-    keep(found)
+    write_ledger(found)
     assert read_ledger(tmp_path / "new").records == (kept,)
     assert (tmp_path / "new" / kept.point).read_bytes() == (copy / kept.point).read_bytes()

@@ -1,7 +1,4 @@
-"""What the pages of a site say beyond a sidecar's own counts.
-
-How to load an entry, its structure, presolve, runs, origin, citation.
-"""
+"""Pages of a site beyond a sidecar's counts: loading, structure, presolve, runs, origin, citation."""
 
 import json
 import re
@@ -100,9 +97,9 @@ def site(library, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def told(library, tmp_path_factory):
-    """The site when one entry has all that an entry may have, and others have nothing of it."""
-    folder = Path(shutil.copytree(library.folder, tmp_path_factory.mktemp("told") / "library"))
+def detailed(library, tmp_path_factory):
+    """The site of a library with one entry that has every optional fact, and others without any."""
+    folder = Path(shutil.copytree(library.folder, tmp_path_factory.mktemp("detailed") / "library"))
     path = folder / f"{ENTRY}.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | TOLD))
     about = folder / f"{INSTANCE}.about.json"
@@ -131,7 +128,7 @@ def text_of(site, entry):
 
 
 def ways_of(site, entry):
-    """The lines by which a page says that the entry is loaded, by program."""
+    """The lines by which a page states that the entry is loaded, by program."""
     part = re.search(r'<section aria-labelledby="loading">(.*?)</section>', text_of(site, entry), re.DOTALL)[
         1
     ]
@@ -140,7 +137,7 @@ def ways_of(site, entry):
 
 
 def ran(lines, folder, *more):
-    """What lines of Python print, in the folder of the files."""
+    """The last line that a Python program prints in the folder of the files."""
     done = subprocess.run(
         [sys.executable, "-c", "\n".join([lines, *more])],
         cwd=folder,
@@ -189,7 +186,7 @@ def test_the_lines_for_pyomo_make_the_problem_with_its_options_and_jumps(library
     assert ran("\n".join(script), site / "files", "print(*found)") == " ".join(map(str, wanted))
 
 
-def test_jump_reads_nl_files_without_a_legacy_block_and_is_said_to_lose_names(library, site):
+def test_jump_reads_nl_files_without_a_legacy_block_and_states_the_loss_of_names(library, site):
     names = [entry["name"] for entry in library.entries]
     lines = {name: ways_of(site, name)["JuMP"] for name in names}
     nl = [name for name in names if ".nl" in lines[name]]
@@ -199,7 +196,7 @@ def test_jump_reads_nl_files_without_a_legacy_block_and_is_said_to_lose_names(li
 
 
 @pytest.mark.needs("gurobi")
-def test_the_lines_for_gurobi_read_what_gurobi_can_hold(library, site):
+def test_the_lines_for_gurobi_read_every_file_of_its_class(library, site):
     for name in (ENTRY, f"{INSTANCE}_bilin", f"{INSTANCE}_exact"):
         lines = ways_of(site, name)["Gurobi"]
         columns = columns_of(library, library.entry(name))
@@ -207,7 +204,7 @@ def test_the_lines_for_gurobi_read_what_gurobi_can_hold(library, site):
 
 
 def columns_of(library, entry):
-    """How many columns the .mps of an entry has, ONE with them."""
+    """Number of columns in the .mps of an entry, including ONE."""
     return Canonical(problem_of(library, entry)).column_count
 
 
@@ -227,7 +224,7 @@ def test_every_matrix_and_every_hessian_has_its_picture(library, site):
             assert bool(drawn.findall(f".//*[@fill='{STROKE}']")) == bool(counts["nonlinear_nonzeros"])
 
 
-def test_presolve_is_told_of_linear_models_alone(library, site):
+def test_presolve_is_shown_of_linear_models_alone(library, site):
     for entry in library.entries:
         found = re.search(r"presolve by HiGHS .*?</table>", text_of(site, entry["name"]), re.DOTALL)
         assert bool(found) == (entry["class"] == "MILP" and entry["rung"] == "tiny")
@@ -243,11 +240,11 @@ def test_presolve_is_told_of_linear_models_alone(library, site):
         assert all(left <= held for left, held in zip(after, before, strict=True))
 
 
-# what others tell of an entry
+# runs, origin and citation
 
 
-def test_an_entry_tells_its_runs_origin_and_citation_where_it_has_them(site, told):
-    text = text_of(told, ENTRY)
+def test_an_entry_shows_its_runs_origin_and_citation(site, detailed):
+    text = text_of(detailed, ENTRY)
     wanted = [
         "A. Drawer",
         "drawn for this test",
@@ -271,29 +268,29 @@ def test_an_entry_tells_its_runs_origin_and_citation_where_it_has_them(site, tol
     assert "@misc{crossfield-library," in text
     assert "@misc{crossfield-library," not in text_of(site, ENTRY)
     agreed = r"Solved\s+by agreement of Gurobi 1, SCIP 1, Bonmin 2 on cf_mouse_n004_cubic\."
-    assert re.search(agreed, text_of(told, f"{INSTANCE}_exact"))
-    plot = ET.parse(told / "pictures" / f"{ENTRY}.runs.svg").getroot()
+    assert re.search(agreed, text_of(detailed, f"{INSTANCE}_exact"))
+    plot = ET.parse(detailed / "pictures" / f"{ENTRY}.runs.svg").getroot()
     assert [len(plot.findall(f".//*[@stroke='{hue}']")) for hue in HUES[:2]] == [3, 2]
-    for other in (text_of(site, ENTRY), text_of(told, f"{INSTANCE}_qp")):
+    for other in (text_of(site, ENTRY), text_of(detailed, f"{INSTANCE}_qp")):
         assert [each for each in wanted[:4] if each in other] == []
         assert "runs.svg" not in other
-    about = (told / "about.html").read_text()
+    about = (detailed / "about.html").read_text()
     assert "@misc{crossfield-library," in about
     assert "1.2" in about
 
 
-def test_every_page_says_one_licence_only_where_all_entries_have_it(library, site, told):
+def test_every_page_states_a_licence_only_if_all_entries_share_it(library, site, detailed):
     free = {entry.get("licence") for entry in library.entries} == {"CC-BY-4.0"}
-    for folder, claimed in ((site, free), (told, False)):
+    for folder, claimed in ((site, free), (detailed, False)):
         about = (folder / "about.html").read_text()
         assert ("CC BY 4.0" in re.search(r"<footer.*?</footer>", about, re.DOTALL)[0]) == claimed
-        assert ("A. Drawer" in about) == (folder == told)
+        assert ("A. Drawer" in about) == (folder == detailed)
         assert escape((folder / "files" / "LICENSE").read_text(), quote=False) in about.replace("&#39;", "'")
 
 
-def test_the_table_of_entries_is_filtered_by_difficulty_where_it_is_known(library, site, told):
+def test_the_table_of_entries_is_filtered_by_difficulty_where_it_is_known(library, site, detailed):
     known = any("difficulty" in entry for entry in library.entries)
-    for folder, shown in ((site, known), (told, True)):
+    for folder, shown in ((site, known), (detailed, True)):
         assert ('<select name="difficulty">' in (folder / "index.html").read_text()) == shown
 
 
@@ -301,8 +298,8 @@ def test_the_table_of_entries_is_filtered_by_difficulty_where_it_is_known(librar
 
 
 @pytest.fixture(scope="module")
-def address(told):
-    with served(told) as address:
+def address(detailed):
+    with served(detailed) as address:
         yield address
 
 

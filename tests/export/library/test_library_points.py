@@ -1,4 +1,4 @@
-"""Points that a specification brings: a build with them searches for nothing and is the same everywhere."""
+"""Given points of a specification: a build with them does not search and is the same everywhere."""
 
 import json
 import os
@@ -11,16 +11,16 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.checking.check_library import verify_library
-from crossfield.export.library.contributions.submit import submit_point
 from crossfield.export.library.documents.documents import read_about, read_library
-from crossfield.export.library.ledger.difficulty import EASY, difficulty
 from crossfield.export.library.ledger.given import ROLES, read_points
 from crossfield.export.library.ledger.ledger import Record
+from crossfield.export.library.ledger.standing import EASY, difficulty
 from crossfield.export.library.plan.recipe import plan
 from crossfield.export.library.plan.sources import instance_from
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import InputError
 from processors import PROCESSORS
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -74,7 +74,7 @@ def content(folder):
 
 
 def worsened(path):
-    """The 2-norm energy of the greedy field, now told to be the best known one; it is not."""
+    """State the greedy field as the best known one, and return its 2-norm energy."""
     about = read_about(path)
     poor = about["fields"]["baseline"]
     assert poor["energy_2norm"] > about["fields"]["least_2"]["energy_2norm"] + 1e-6
@@ -100,7 +100,7 @@ def spec(searched, tmp_path_factory):
 
 
 def on(processor, *arguments):
-    """Nothing, after a command ran as on another processor."""
+    """Run a command as on another processor."""
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor
     command = [sys.executable, "-W", "ignore", "-m", "crossfield", "library", *map(str, arguments)]
     subprocess.run(command, env=environment, check=True, capture_output=True)
@@ -132,13 +132,13 @@ def test_a_library_without_points_is_the_same_under_other_kernels(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_given_is_what_is_told_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
+def test_given_points_are_stated_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
     made = build(read_spec(spec), tmp_path / "lib").folder
     assert verify_library(made) == []
     before, after = content(searched), content(made)
     assert before.keys() == after.keys()
-    told = {name for name in before if before[name] != after[name]}
-    assert all(name.endswith(".json") or name == "SHA256SUMS" for name in told)
+    stated = {name for name in before if before[name] != after[name]}
+    assert all(name.endswith(".json") or name == "SHA256SUMS" for name in stated)
     about = read_about(made / f"{STEM}.about.json")
     old = read_about(searched / f"{STEM}.about.json")
     assert all(about[key] == old[key] for key in ("fields", "certificate", "files"))
@@ -148,7 +148,7 @@ def test_what_is_given_is_what_is_told_and_the_models_are_those_of_a_search(sear
 
 @pytest.mark.slow
 def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
-    """Given the greedy field as the best, it stays the best, and nothing is proven."""
+    """A greedy field that is given as the best one stays, and no optimum is proven."""
     known = shutil.copytree(searched, tmp_path / "known")
     poor = worsened(known / f"{SADDLE}.about.json")
     about = read_about(known / f"{STEM}.about.json")
@@ -161,13 +161,13 @@ def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_submission_keeps_what_was_given_and_another_build_comes_to_the_same(searched, tmp_path):
-    """A library of poor points takes a better one; its own points are then those that are given."""
+def test_a_submission_keeps_given_points_and_another_build_gives_the_same(searched, tmp_path):
+    """A library of poor points accepts a better one, which a new build from the ledger reproduces."""
     known = shutil.copytree(searched, tmp_path / "known")
     worsened(known / f"{SADDLE}.about.json")
     spec = write_spec(tmp_path, 'points = "known"')
     made = build(read_spec(spec), tmp_path / "lib").folder
-    assert submit_point(searched / f"{SADDLE}_exact.sol", made).better
+    assert submit_one(made, searched / f"{SADDLE}_exact.sol").better_point
     assert verify_library(made) == []
     other = tmp_path / "other"
     other.mkdir()
@@ -177,7 +177,7 @@ def test_a_submission_keeps_what_was_given_and_another_build_comes_to_the_same(s
 
 
 @pytest.mark.slow
-def test_points_of_another_instance_do_not_count_and_are_told(spec, searched, tmp_path):
+def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched, tmp_path):
     text = spec.read_text().replace("seeds = [1]", "seeds = [2]").replace("points.zip", "known")
     known = shutil.copytree(searched, tmp_path / "known")
     other = "cf_rand_n003_s2"
@@ -225,7 +225,7 @@ def test_the_same_points_are_the_same_archive(searched, spec, tmp_path):
 
 @pytest.mark.slow
 def test_the_points_that_ship_are_about_the_shipped_instances():
-    """None has to be searched for, and every instance whose optimum is to be proven has its certificate."""
+    """No search is needed, and every instance with a proof has its certificate."""
     spec = default_spec()
     assert spec.points.stat().st_size < 3_000_000
     points = read_points(spec.points)
@@ -241,7 +241,7 @@ def test_the_points_that_ship_are_about_the_shipped_instances():
             ]
         certificate = given.certificate(instance_from(each.recipe))
         assert each.recipe.prove == (certificate is not None)
-        assert certificate is None or certificate[1]["status"] == "optimal"
+        assert certificate is None or certificate.facts["status"] == "optimal"
 
 
 @pytest.mark.slow
@@ -290,7 +290,7 @@ def test_sidecars_tell_density_and_difficulty(searched):
 
 
 @pytest.mark.slow
-def test_two_processes_find_what_one_finds(searched, tmp_path):
+def test_two_processes_have_the_findings_of_one(searched, tmp_path):
     lib = shutil.copytree(searched, tmp_path / "lib")
     (lib / f"{STEM}_milp.sol").unlink()
     (lib / f"{SADDLE}_exact.json").write_text("{}")
@@ -300,6 +300,6 @@ def test_two_processes_find_what_one_finds(searched, tmp_path):
     found = verify_library(lib, progress=one.append)
     assert verify_library(lib, jobs=2, progress=two.append) == found
     assert one == two
-    told = {(finding.file, finding.what) for finding in found}
-    words = "tells another difficulty than follows from its instance and the ledger"
-    assert (f"{STEM}_cubic.json", words) in told
+    stated = {(finding.file, finding.what) for finding in found}
+    words = "states another difficulty than follows from its instance and the ledger"
+    assert (f"{STEM}_cubic.json", words) in stated

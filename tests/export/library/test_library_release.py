@@ -1,4 +1,4 @@
-"""A release is one archive with a checksum: same library, same bytes; and none of a library that is wrong."""
+"""Releases: one archive with a checksum, the same bytes for the same library, and only of a sound one."""
 
 import hashlib
 import json
@@ -46,14 +46,14 @@ def library(tmp_path_factory):
 def test_the_same_library_gives_the_same_archive_with_all_its_files(library, tmp_path, suffix, capfd):
     first = tmp_path / f"first.{suffix}"
     assert invoke(["library", "release", str(library), "-o", str(first), "--json"]) == 0
-    told = json.loads(capfd.readouterr().out)
+    stated = json.loads(capfd.readouterr().out)
     copy = Path(shutil.copytree(library, tmp_path / "copy"))
     for path in copy.iterdir():
         os.utime(path, (1, 1))
         path.chmod(0o600)
     second = release_library(copy, tmp_path / "elsewhere" / f"second.{suffix}", jobs=2)
     assert first.read_bytes() == second.file.read_bytes()
-    assert told["sha256"] == second.sha256 == hashlib.sha256(first.read_bytes()).hexdigest()
+    assert stated["sha256"] == second.sha256 == hashlib.sha256(first.read_bytes()).hexdigest()
     if suffix == "zip":
         with zipfile.ZipFile(first) as archive:
             held = {each.filename: archive.read(each) for each in archive.infolist()}
@@ -76,7 +76,7 @@ def test_the_system_checks_its_checksum(library, tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_what_does_not_verify_or_states_no_version_is_not_released(library, tmp_path, capfd):
+def test_a_library_without_version_or_with_defects_is_not_released(library, tmp_path, capfd):
     copy = Path(shutil.copytree(library, tmp_path / "copy"))
     (copy / "LICENSE").write_text("mine\n")
     (copy / "notes.txt").write_text("x")

@@ -1,4 +1,4 @@
-"""Runs that others send in: what is kept of them, what is refused, and what they show."""
+"""Submitted runs: records, refusals, and the status of entries that follows."""
 
 import json
 import re
@@ -15,8 +15,6 @@ from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.checking.check_library import verify_library
 from crossfield.export.library.contributions.solve import drop_refuted, solve_library
-from crossfield.export.library.contributions.submit import submit_point
-from crossfield.export.library.contributions.submit_run import Told, submit_run
 from crossfield.export.library.documents.documents import read_library, read_sidecar
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.library.ledger.standing import MAKERS, standing
@@ -24,6 +22,7 @@ from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.errors import CrossfieldError, InputError, SolutionError
 from forging import seal
+from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -57,7 +56,7 @@ def built(tmp_path_factory):
         for option, value in (
             ("output_flag", True), ("log_to_console", False), ("log_file", str(folder / f"{entry}.log")),
             ("threads", 1), ("mip_rel_gap", 0.0), ("mip_abs_gap", 0.0), ("mip_feasibility_tolerance", 1e-9),
-            ("primal_feasibility_tolerance", 1e-9),
+            ("primal_feasibility_tolerance", 1e-9)
         ):  # fmt: skip
             highs.setOptionValue(option, value)
         highs.readModel(str(library.folder / f"{entry}.mps"))
@@ -82,18 +81,13 @@ def record_of(lib, solver, name=MILP, **given):
     return Record(name, sidecar["problem_sha256"], solver, "1", **facts)
 
 
-# what is kept
+# records
 
 
 def test_a_run_is_kept_with_its_log_and_claims_the_optimum(built, lib):
-    told = Told(machine="a machine", by="A. Name", date="2026-11-22")
-    happened = submit_run(lib, log=built / f"{MILP}.log", told=told)
-    assert (happened.entry, happened.solver, happened.kept, happened.status) == (
-        MILP,
-        "HiGHS",
-        True,
-        "claimed",
-    )
+    facts = {"machine": "a machine", "by": "A. Name", "date": "2026-11-22"}
+    happened = submit_one(lib, built / f"{MILP}.log", **facts)
+    assert (happened.entries, happened.outcome, happened.status) == ((MILP,), "accepted", "claimed")
     sidecar = entry_of(lib)
     (run,) = sidecar["runs"]
     stated = {"machine": "a machine", "by": "A. Name", "date": "2026-11-22", "evidence": "log", "threads": 1}
@@ -108,14 +102,13 @@ def test_a_run_is_kept_with_its_log_and_claims_the_optimum(built, lib):
     solu = (lib / "library.solu").read_text().splitlines()
     assert f"=best= {MILP} {sidecar['best']['objective']!r}" in solu
     assert verify_library(lib) == []
-    again = submit_run(lib, log=built / f"{MILP}.log", told=told)
-    assert not again.kept
-    assert "not kept" in str(again)
+    again = submit_one(lib, built / f"{MILP}.log", **facts)
+    assert again.outcome == "not better"
 
 
 def test_a_better_point_comes_with_its_run(built, lib):
     before = entry_of(lib, OTHER)["best"]["objective"]
-    happened = submit_run(lib, point=built / f"{OTHER}.sol", log=built / f"{OTHER}.log")
+    happened = submit_one(lib, built / f"{OTHER}.sol", built / f"{OTHER}.log")
     sidecar = entry_of(lib, OTHER)
     assert happened.better_point
     assert sidecar["best"]["objective"] < before
@@ -127,8 +120,8 @@ def test_a_better_point_comes_with_its_run(built, lib):
 def test_the_best_run_of_each_solver_is_shown(lib):
     best = entry_of(lib)["best"]["objective"]
     for bound in (0.5, 0.7, 0.6):
-        submit_run(lib, entry=MILP, told=Told("scip", "10", bound=bound * best, seconds=3.0, threads=2))
-    submit_run(lib, entry=MILP, told=Told("Own", bound=0.1 * best, status="no point", limit=60.0))
+        submit_one(lib, entry=MILP, solver="scip", version="10", bound=bound * best, seconds=3.0, threads=2)
+    submit_one(lib, entry=MILP, solver="Own", bound=0.1 * best, status="no point", limit=60.0)
     runs = entry_of(lib)["runs"]
     assert [(each["solver"], each["bound"] / best) for each in runs] == [
         ("Own", pytest.approx(0.1)),
@@ -141,7 +134,7 @@ def test_the_best_run_of_each_solver_is_shown(lib):
 
 
 def test_a_build_takes_runs_and_logs_of_its_ledger_over(built, lib, tmp_path):
-    submit_run(lib, log=built / f"{MILP}.log")
+    submit_one(lib, built / f"{MILP}.log")
     (tmp_path / "spec.toml").write_text(f'ledger = "{lib / "ledger.json"}"' + SPEC)
     again = build(read_spec(tmp_path / "spec.toml"), tmp_path / "again").folder
     log = entry_of(lib)["runs"][0]["log"]
@@ -150,10 +143,10 @@ def test_a_build_takes_runs_and_logs_of_its_ledger_over(built, lib, tmp_path):
     assert verify_library(again) == []
 
 
-# what is refused
+# refusals
 
 
-def test_what_cannot_be_is_refused_in_one_line_and_nothing_changes(built, lib, tmp_path):
+def test_an_invalid_run_is_refused_in_one_line_and_changes_nothing(built, lib, tmp_path):
     best = entry_of(lib)["best"]["objective"]
     log = (built / f"{MILP}.log").read_text()
     higher = re.sub(r"(Dual bound +)\S+", rf"\g<1>{2 * best}", log)
@@ -164,32 +157,32 @@ def test_what_cannot_be_is_refused_in_one_line_and_nothing_changes(built, lib, t
     for name, text in files.items():
         (tmp_path / f"{name}.log").write_text(text)
     before = {path.name: path.read_bytes() for path in lib.iterdir()}
-    for given, told, words in (
-        ({"entry": MILP}, Told(bound=1.01 * best), "lies above .* the objective of a feasible point"),
-        ({"log": tmp_path / "higher.log", "entry": MILP}, Told(), "lies above .* of a feasible point"),
-        ({"log": built / f"{MILP}.log"}, Told(bound=1.001 * best), "is not that of the log"),
-        ({"log": other, "entry": MILP}, Told(), f"is a log of {OTHER}, not of {MILP}"),
-        ({"log": tmp_path / "larger.log", "entry": MILP}, Told(), "is a log of a model of .* columns"),
-        ({"log": tmp_path / "none.log", "entry": MILP}, Told(), "not a log of a known solver"),
-        ({"log": tmp_path / "none.log", "entry": MILP}, Told(bound=0.0), "not a log of a known solver"),
-        ({"log": built / f"{MILP}.log"}, Told("Gurobi"), "is given as Gurobi, and the log is of HiGHS"),
-        ({"log": tmp_path / "stopped.log", "entry": MILP}, Told(status="optimal"), "search was stopped"),
-        ({"point": built / f"{MILP}.sol", "entry": MILP}, Told(status="optimal"), "is proven by a bound"),
-        ({"entry": MILP}, Told("SCIP"), "give a bound"),
-        ({}, Told(bound=0.0), "name the entry"),
-        ({"entry": "cf_none_milp"}, Told(bound=0.0), "has no entry"),
-        ({"entry": MILP}, Told(bound=float("nan")), "bound is nan; give a finite number"),
-        ({"entry": MILP}, Told(bound=0.0, seconds=-1.0), "seconds is -1.0; give a finite number"),
-        ({"entry": MILP}, Told(bound=0.0, threads=-1), "threads is -1; give a finite number"),
-        ({"entry": MILP}, Told(bound=0.0, machine="a\nb"), "machine must be one line"),
-        ({"entry": MILP}, Told(bound=0.0, date="22.11.2026"), "date is '22.11.2026'; give a day"),
-        ({"entry": MILP}, Told(bound=0.0, status="solved"), "status is 'solved'; choose one of optimal"),
-        ({"entry": MILP}, Told(bound=0.0, limit=float("inf")), "time limit is inf; give a finite number"),
-        ({"entry": MILP}, Told(bound=0.0, by="\u202ereversed"), "by must be one line"),
-        ({"entry": MILP}, Told(bound=0.0, version="<script>"), "version is '<script>'; give at most 60"),
+    for files, facts, words in (
+        ([], {"entry": MILP, "bound": 1.01 * best}, "lies above .* the objective of a feasible point"),
+        ([tmp_path / "higher.log"], {"entry": MILP}, "lies above .* of a feasible point"),
+        ([built / f"{MILP}.log"], {"bound": 1.001 * best}, "is not that of the log"),
+        ([other], {"entry": MILP}, f"is a log of {OTHER}, not of {MILP}"),
+        ([tmp_path / "larger.log"], {"entry": MILP}, "is a log of a model of .* columns"),
+        ([tmp_path / "none.log"], {"entry": MILP}, "is no solution, field, certificate, log"),
+        ([tmp_path / "none.log"], {"entry": MILP, "bound": 0.0}, "is no solution, field, certificate, log"),
+        ([built / f"{MILP}.log"], {"solver": "Gurobi"}, "is given as Gurobi, and the log is of HiGHS"),
+        ([tmp_path / "stopped.log"], {"entry": MILP, "status": "optimal"}, "search was stopped"),
+        ([built / f"{MILP}.sol"], {"entry": MILP, "status": "optimal"}, "is proven by a bound"),
+        ([], {"entry": MILP, "solver": "SCIP"}, "an entry and a bound"),
+        ([], {"bound": 0.0}, "name the entry"),
+        ([], {"entry": "cf_none_milp", "bound": 0.0}, "has no entry"),
+        ([], {"entry": MILP, "bound": float("nan")}, "bound is nan; give a finite number"),
+        ([], {"entry": MILP, "bound": 0.0, "seconds": -1.0}, "seconds is -1.0; give a finite number"),
+        ([], {"entry": MILP, "bound": 0.0, "threads": -1}, "threads is -1; give a finite number"),
+        ([], {"entry": MILP, "bound": 0.0, "machine": "a\nb"}, "machine must be one line"),
+        ([], {"entry": MILP, "bound": 0.0, "date": "22.11.2026"}, "date is '22.11.2026'; give a day"),
+        ([], {"entry": MILP, "bound": 0.0, "status": "solved"}, "status is 'solved'; choose one of optimal"),
+        ([], {"entry": MILP, "bound": 0.0, "limit": float("inf")}, "time limit is inf; give a finite number"),
+        ([], {"entry": MILP, "bound": 0.0, "by": "\u202ereversed"}, "by must be one line"),
+        ([], {"entry": MILP, "bound": 0.0, "version": "<script>"}, "version is '<script>'; give at most 60"),
     ):
         with pytest.raises(CrossfieldError, match=words) as refused:
-            submit_run(lib, told=told, **given)
+            submit_one(lib, *files, **facts)
         assert "\n" not in str(refused.value)
         assert isinstance(refused.value, InputError | SolutionError)
     assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
@@ -223,35 +216,36 @@ def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib
     (tmp_path / "a.log").write_text(text)
     before = {path.name: path.read_bytes() for path in lib.iterdir()}
     with pytest.raises(InputError, match=rf"a\.log: {words}") as refused:
-        submit_run(lib, log=tmp_path / "a.log", entry=MILP)
+        submit_one(lib, tmp_path / "a.log", entry=MILP)
     assert "\n" not in str(refused.value)
     assert str(refused.value).isprintable()
     assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
-    assert submit_run(lib, entry=MILP, told=Told("scip", bound=0.0)).kept
+    assert submit_one(lib, entry=MILP, solver="scip", bound=0.0).outcome == "accepted"
 
 
-def test_what_is_stated_of_a_log_takes_the_place_of_what_it_says(lib, tmp_path):
+def test_stated_facts_replace_those_of_the_log(lib, tmp_path):
     (tmp_path / "a.log").write_text(GUROBI.replace("TimeLimit  60", "TimeLimit  -8"))
-    submit_run(lib, log=tmp_path / "a.log", entry=MILP, told=Told(limit=8.0))
+    submit_one(lib, tmp_path / "a.log", entry=MILP, limit=8.0)
     assert entry_of(lib)["runs"][0]["limit"] == 8.0
     with pytest.raises(InputError, match=r"^version is '\?'; give"):
-        submit_run(lib, log=tmp_path / "a.log", entry=MILP, told=Told(version="?", limit=8.0))
+        submit_one(lib, tmp_path / "a.log", entry=MILP, version="?", limit=8.0)
 
 
 @pytest.mark.parametrize("seconds", [float("inf"), float("nan"), -1.0])
 def test_a_point_with_a_time_that_cannot_be_is_refused_before_anything_is_written(built, lib, seconds):
     before = {path.name: path.read_bytes() for path in lib.iterdir()}
     with pytest.raises(InputError, match=f"^seconds is {seconds}; give a finite number"):
-        submit_point(built / f"{OTHER}.sol", lib, entry=OTHER, seconds=seconds)
+        submit_one(lib, built / f"{OTHER}.sol", entry=OTHER, seconds=seconds)
     assert {path.name: path.read_bytes() for path in lib.iterdir() if path.name != ".lock"} == before
 
 
-# what shows an optimum
+# optima
 
 
 def test_words_and_unknown_programs_never_solve_an_entry(lib):
     best = entry_of(lib)["best"]["objective"]
-    assert submit_run(lib, entry=MILP, told=Told("Gurobi", "1", "optimal", best)).status == "claimed"
+    facts = {"solver": "Gurobi", "version": "1", "status": "optimal", "bound": best}
+    assert submit_one(lib, entry=MILP, **facts).status == "claimed"
     for solver in ("SCIP", "Xpress", "HiGHS"):
         add_record(lib, record_of(lib, solver, evidence="word"))
     for solver in ("A", "B", "C"):
@@ -290,12 +284,12 @@ def test_agreement_needs_three_makers_whatever_the_order():
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
 
-# what a verification finds
+# findings
 
 
 @pytest.mark.slow
 def test_a_forged_run_is_found(built, lib, tmp_path):
-    submit_run(lib, log=built / f"{MILP}.log")
+    submit_one(lib, built / f"{MILP}.log")
     log = entry_of(lib)["runs"][0]["log"]
 
     def forged(change):
@@ -321,17 +315,17 @@ def test_a_forged_run_is_found(built, lib, tmp_path):
     def in_log(folder):
         (folder / log).write_text((folder / log).read_text() + "\n")
 
-    assert "tells another bound" in in_ledger(bound=0.1)()
+    assert "states another bound" in in_ledger(bound=0.1)()
     assert "and names none" in in_ledger(evidence="log", log=None, log_sha256=None)()
-    assert "does not say whether" in in_ledger(evidence=None)()
+    assert "does not state whether" in in_ledger(evidence=None)()
     assert "another course of the run" in in_ledger(trace=[[0.0, 0.1, 0.2]])()
-    assert f"says that {log} is of SCIP" in in_ledger(solver="SCIP")()
+    assert f"states that {log} is of SCIP" in in_ledger(solver="SCIP")()
     assert "is another file than the one its ledger names" in forged(in_log)
     assert verify_library(lib) == []
 
 
 def test_a_status_that_does_not_follow_is_found(built, lib):
-    submit_run(lib, log=built / f"{MILP}.log")
+    submit_one(lib, built / f"{MILP}.log")
     path = lib / f"{MILP}.json"
     sidecar = json.loads(path.read_text())
     solved = {"by": "agreement", "programs": sidecar["claimed"] * 3}
@@ -340,16 +334,16 @@ def test_a_status_that_does_not_follow_is_found(built, lib):
     seal(lib)
     found = " ".join(map(str, verify_library(lib)))
     for key in ("status", "solved", "claimed"):
-        assert f"tells another {key} than follows" in found
+        assert f"states another {key} than follows" in found
 
 
 # the command, and solving with every program
 
 
-def test_the_command_says_in_one_line_what_happened(built, lib, capfd):
-    given = ["library", "submit-run", "--library", str(lib)]
-    assert invoke([*given, "--log", str(built / f"{MILP}.log"), "--by", "me"]) == 0
-    assert "kept; the entry is claimed" in capfd.readouterr().out
+def test_the_command_reports_results_and_refusals(built, lib, capfd):
+    given = ["library", "submit", str(lib)]
+    assert invoke([*given, str(built / f"{MILP}.log"), "--by", "me"]) == 0
+    assert "claimed" in capfd.readouterr().out
     assert invoke([*given, "--entry", MILP, "--bound", "9", "--quiet"]) == 1
     shown = capfd.readouterr().err
     assert len(shown.splitlines()) == 1
@@ -357,7 +351,7 @@ def test_the_command_says_in_one_line_what_happened(built, lib, capfd):
 
 
 @pytest.mark.slow
-def test_every_installed_program_solves_what_it_takes(lib):
+def test_every_installed_program_solves_its_problems(lib):
     names = [
         name for name in ("gurobi", "cplex", "xpress", "scip", "cbc", "glpk") if not SOLVERS[name].missing
     ]
@@ -399,8 +393,8 @@ def test_a_solver_that_is_not_installed_is_one_line(lib, monkeypatch, hidden):
 
 
 def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(built, lib):
-    """The library goes on to be built after a solver's tolerances went too far."""
-    submit_run(lib, point=built / f"{OTHER}.sol")
+    """The library can still be built after a solver has exceeded its tolerances."""
+    submit_one(lib, built / f"{OTHER}.sol")
     best = entry_of(lib, OTHER)["best"]["objective"]
     wrong = record_of(lib, "Xpress", OTHER, bound=best + 2e-5)
     sent = record_of(lib, "SCIP", OTHER, bound=best + 2e-5, evidence="word")
@@ -414,7 +408,7 @@ def test_measured_bounds_above_a_point_found_later_are_dropped_and_others_stay(b
 
 @pytest.mark.slow
 def test_runs_that_are_sent_in_at_one_moment_are_all_kept(lib):
-    command = [sys.executable, "-m", "crossfield", "library", "submit-run", "--library", str(lib)]
+    command = [sys.executable, "-m", "crossfield", "library", "submit", str(lib)]
     given = [(entry, solver) for entry in (MILP, OTHER) for solver in ("SCIP", "Gurobi")]
     others = [
         subprocess.Popen([*command, "--entry", entry, "--solver", solver, "--bound", "0.01", "--quiet"])

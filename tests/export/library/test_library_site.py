@@ -1,4 +1,4 @@
-"""The site of a library: its pages and files as they lie on disk, and as a real browser shows them."""
+"""The site of a library: pages and files on disk, and in a browser."""
 
 import hashlib
 import json
@@ -88,7 +88,7 @@ def content_of(folder):
 
 
 def sealed(folder):
-    """The folder after its SHA256SUMS was brought up to date."""
+    """Bring SHA256SUMS up to date and return the folder."""
     names = sorted(path.name for path in folder.iterdir() if path.name != "SHA256SUMS")
     sums = [f"{hashlib.sha256((folder / name).read_bytes()).hexdigest()}  {name}\n" for name in names]
     (folder / "SHA256SUMS").write_text("".join(sums))
@@ -134,7 +134,7 @@ def pages(site):
     return {path.relative_to(site).as_posix(): Page(path) for path in sorted(site.rglob("*.html"))}
 
 
-# what is written
+# files
 
 
 def test_there_is_a_page_for_every_entry_and_every_instance(library, pages):
@@ -158,9 +158,7 @@ def test_the_whole_library_is_in_the_folder_of_files(library, site):
     assert content_of(site / "files") == content_of(library.folder)
 
 
-def test_the_command_says_how_many_pages_there_are_and_replaces_an_earlier_site(
-    library, site, tmp_path, capsys
-):
+def test_the_command_prints_the_number_of_pages_and_replaces_an_earlier_site(library, site, tmp_path, capsys):
     earlier = shutil.copytree(site, tmp_path / "web")
     (earlier / "index.html").write_text("old")
     (earlier / "entry" / "cf_gone.html").write_text("old")
@@ -293,7 +291,7 @@ def test_checksums_and_sizes_on_the_pages_are_those_of_the_files(library, site, 
     assert of_entries < checked
 
 
-def test_pages_are_well_formed_and_have_what_a_screen_reader_needs(pages):
+def test_pages_are_well_formed_and_accessible(pages):
     titles = []
     for name, page in pages.items():
         assert page.misplaced == [], name
@@ -326,7 +324,7 @@ def test_pages_are_well_formed_and_have_what_a_screen_reader_needs(pages):
     assert len(set(titles)) == len(pages)
 
 
-def test_an_entry_shows_what_its_sidecar_says(library, site, pages):
+def test_an_entry_shows_its_sidecar(library, site, pages):
     for entry in library.entries:
         page = pages[f"entry/{entry['name']}.html"]
         texts = {text for _, text in page.texts}
@@ -424,7 +422,7 @@ def test_the_mathematics_has_every_line_of_the_declaration(name):
 
 @pytest.fixture(scope="module")
 def address(site):
-    """Where a plain web server shows the site."""
+    """Address of the site on a plain web server."""
     with served(site) as address:
         yield address
 
@@ -436,7 +434,7 @@ def press(browser, *keys):
 
 
 def choose(browser, name, option):
-    """Choose as a person does, without the list that a headless browser has no window for."""
+    """Choose by keyboard, because a headless browser cannot show the list."""
     script = (
         "const [name, value] = arguments, field = document.querySelector(`[name=${name}]`); "
         "field.value = value;"
@@ -448,7 +446,7 @@ def choose(browser, name, option):
 
 
 def shown_rows(browser):
-    """Rows of the table that are seen: name, and what the numeric columns hold."""
+    """Visible rows of the table: name and numeric columns."""
     script = """return [...document.querySelectorAll('#table tbody tr')].filter(row => row.offsetParent)
       .map(row => [row.cells[0].innerText, ...[...row.cells].slice(10, 16).map(cell => cell.dataset.v)])"""
     return browser.execute_script(script)

@@ -1,4 +1,4 @@
-"""A size that does not suit a sketch is left out with a line; the build goes on, and verify agrees."""
+"""A size that does not suit a sketch is skipped with a message, and the library verifies."""
 
 import json
 
@@ -37,15 +37,15 @@ def spec(tmp_path):
     return path
 
 
-def test_a_size_that_does_not_suit_is_left_out_with_a_line(spec, tmp_path, capfd):
+def test_a_size_that_does_not_suit_is_skipped_with_a_message(spec, tmp_path, capfd):
     folder = tmp_path / "library"
     assert invoke(["library", "build", str(spec), "-o", str(folder)]) == 0
     shown = capfd.readouterr()
     names = ["cf_bottle_n003", "cf_bottle_n003_box"]
-    assert shown.out == f"{folder}: 8 entries, 2 instances left out\n"
-    told = complaints(shown.err).splitlines()
-    assert [line for line in told if "is left out" in line] == told
-    assert all(f"{name} is left out: {COARSE}" in line for name, line in zip(names, told, strict=True))
+    assert shown.out == f"{folder}: 8 entries, 2 instances skipped\n"
+    stated = complaints(shown.err).splitlines()
+    assert [line for line in stated if "is skipped" in line] == stated
+    assert all(f"{name} is skipped: {COARSE}" in line for name, line in zip(names, stated, strict=True))
     index = json.loads((folder / "library.json").read_text())
     assert index["skipped"] == dict.fromkeys(names, COARSE)
     assert {name.split("_")[1] for name in index["entries"]} == {"mouse"}
@@ -57,7 +57,7 @@ def test_a_size_that_does_not_suit_is_left_out_with_a_line(spec, tmp_path, capfd
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def test_what_is_left_out_without_need_is_found(spec, tmp_path):
+def test_an_instance_that_is_skipped_without_need_is_found(spec, tmp_path):
     folder = build(read_spec(spec), tmp_path / "library").folder
     path = folder / "library.json"
     index = json.loads(path.read_text())

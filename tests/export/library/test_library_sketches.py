@@ -1,4 +1,4 @@
-"""Sketches of a library: nothing but strokes is published, and a site takes plain files alone."""
+"""Sketches of a library: only strokes are published, and a site accepts plain files alone."""
 
 import shutil
 
@@ -71,7 +71,7 @@ def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
             assert word not in path.read_bytes(), path.name
 
 
-def test_what_somebody_put_into_a_published_sketch_is_found(lib):
+def test_an_addition_to_a_published_sketch_is_found(lib):
     path = lib / "cf_evil.sketch.svg"
     path.write_bytes(path.read_bytes().replace(b"</svg>", b"<script>alert(1)</script></svg>"))
     seal(lib)

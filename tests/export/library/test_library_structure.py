@@ -1,4 +1,4 @@
-"""Where matrices and Hessians have entries, beside CasADi, which differentiates the written file."""
+"""Entries of matrices and Hessians, compared with CasADi on the written file."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -106,15 +106,15 @@ def test_a_large_matrix_is_binned_and_its_picture_stays_small():
     assert sparsity_picture(pattern) == picture
 
 
-def test_a_plot_draws_what_logs_tell_and_leaves_out_what_they_do_not():
-    told = [
+def test_a_plot_draws_the_known_values_of_logs():
+    stated = [
         curve("A <b> 1", [[0, None, 9.5], [1.5, -2.0, 9.5], [4, float("inf"), 7.25], [5, 7.25, 7.25]]),
         curve("B", [[2.0, 3.0, None]]),
         curve("C", [[None, 3.0, 1.0]]),
     ]
-    assert [len(each.bounds) for each in told] == [2, 1, 0]
-    assert [len(each.objectives) for each in told] == [4, 0, 0]
-    picture = trace_picture(told[:2])
+    assert [len(each.bounds) for each in stated] == [2, 1, 0]
+    assert [len(each.objectives) for each in stated] == [4, 0, 0]
+    picture = trace_picture(stated[:2])
     root = ET.fromstring(picture)
     paths = [(each.get("stroke"), "stroke-dasharray" in each.attrib) for each in root.iter(f"{SVG}path")]
     first, second = HUES[:2]
@@ -126,7 +126,7 @@ def test_a_plot_draws_what_logs_tell_and_leaves_out_what_they_do_not():
     ]
     texts = [each.text for each in root.iter(f"{SVG}text")]
     assert {"A <b> 1", "B", "seconds", "0", "10"} <= set(texts)
-    assert trace_picture(told[:2]) == picture
+    assert trace_picture(stated[:2]) == picture
 
 
 @pytest.mark.parametrize("value", [0.0, -3.5, 1e-9, 1e9])

@@ -402,7 +402,7 @@ def test_claims_are_true(
 
 def proves(solvers: Solvers, held: Problem, path: Path, solver: str, optimum: float) -> bool:
     """Whether the solver, run all the same, returns the optimum with that status."""
-    files, limits = Files.beside(path, solver), Limits(1.0, 0.0, 1)
+    files, limits = Files.for_model(path, solver), Limits(1.0, 0.0, 1)
     try:
         found = solvers.solve_file(held, solver, files, limits, Deadline.after(21.0), precise=True)
     except CrossfieldError:

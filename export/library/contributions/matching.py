@@ -1,0 +1,162 @@
+"""Kinds of submitted files, and the entries of a library that they belong to."""
+
+from __future__ import annotations
+
+import json
+import re
+import zlib
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from ....models.array_archive import ArrayArchive, Expected
+from ....models.errors import CrossfieldError, InstanceError, SolutionError
+from ....models.field import file as fields
+from ....models.formulations.problem import Problem
+from ....models.input_limits import MAX_HEAD, MAX_LOG
+from ....models.proof import check_certificate
+from ....models.storage import read_bytes
+from ...formats.registry import FORMATS
+from ...solutions.logs.registry import LOG_READERS
+from ...solutions.logs.run_log import RunLog
+from ...solutions.readers.registry import READERS
+from ...solutions.readers.text import HEAD, RawSolution, with_unix_ends
+from ...solutions.solution import read_solution
+from ..documents.documents import Library, problem_of
+from ..ledger import ledger
+
+Kind = Literal["solution", "log", "field", "certificate", "ledger"]
+
+_JSON: Final[dict[str, Kind]] = {fields.FORMAT: "field", ledger.FORMAT: "ledger"}
+_ENTRY: Final = re.compile(r"cf_[a-z0-9_]+")
+_ADDED: Final = 4  # columns that solvers add to those of the model
+_LISTED: Final = 4  # entries named in a message
+
+
+def kinds_of(path: Path) -> set[Kind]:
+    """Return the kinds of a file by its content, and of a .rawfield by its suffix.
+
+    A file may be a solution and a log at once, as those of BARON are. The set is empty for a file of no known
+    kind. Raises InputError for a file that cannot be read.
+    """
+    data = read_bytes(path)
+    if path.suffix.lower() == ".rawfield":
+        return {"field"}
+    if data.startswith(b"PK"):
+        return {"certificate" if _is_certificate(data) else "field"}
+    head = _unpacked_head(data)
+    if head.lstrip().startswith(b"{"):
+        return _json_kinds(data)
+    found: set[Kind] = {"solution"} if any(each.recognises(head) for each in READERS) else set()
+    text = data[:MAX_LOG].decode("utf-8-sig", "replace").replace("\r\n", "\n")
+    return found | ({"log"} if any(each.start.search(text) for each in LOG_READERS) else set())
+
+
+def _is_certificate(data: bytes) -> bool:
+    with suppress(InstanceError):
+        head = ArrayArchive(data).arrays({"head": Expected(1, MAX_HEAD, "u")})["head"].tobytes()
+        return check_certificate.FORMAT.encode() in head
+    return False
+
+
+def _json_kinds(data: bytes) -> set[Kind]:
+    with suppress(ValueError, RecursionError):
+        document = json.loads(data)
+        if document.get("format") in _JSON:
+            return {_JSON[document["format"]]}
+    return set()
+
+
+def _unpacked_head(data: bytes) -> bytes:
+    if data.startswith(b"\x1f\x8b"):
+        with suppress(OSError, EOFError, zlib.error):
+            data = zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(data, HEAD)
+    return with_unix_ends(data[:HEAD].removeprefix(b"\xef\xbb\xbf"))
+
+
+class Entries:
+    """The entries of a library with their problems, each of which is formulated once."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._problems: dict[str, Problem] = {}
+
+    def sidecar(self, name: str) -> dict[str, Any]:
+        """Return the sidecar of an entry. Raises InputError for a name that the library does not have."""
+        return self.library.entry(name)
+
+    def problem(self, sidecar: dict[str, Any]) -> Problem:
+        """Return the problem of an entry. Raises as `problem_of`."""
+        name = sidecar["name"]
+        if name not in self._problems:
+            self._problems[name] = problem_of(self.library, sidecar)
+        return self._problems[name]
+
+    def on(self, instance_sha256: str) -> list[dict[str, Any]]:
+        """Return the sidecars of the entries of an instance."""
+        return [each for each in self.library.entries if each["instance"]["sha256"] == instance_sha256]
+
+    def by_file_name(self, path: Path) -> str:
+        """Return the longest name of an entry that the file's name begins with; empty if there is none."""
+        known = (
+            name for name in self.library.document["entries"] if re.match(rf"{name}([._-]|$)", path.name)
+        )
+        return max(known, key=len, default="")
+
+    def by_stamp(self, stamps: Iterable[str]) -> str:
+        """Return the only entry whose problem has one of the stamps; empty if there is none."""
+        found = {self._stamps[stamp] for stamp in stamps if stamp in self._stamps}
+        return found.pop() if len(found) == 1 else ""
+
+    @cached_property
+    def _stamps(self) -> dict[str, str]:
+        return {self.problem(each).stamp: each["name"] for each in self.library.entries}
+
+    def named_in(self, text: str) -> set[str]:
+        """Return the entries that a text names."""
+        return {name for name in _ENTRY.findall(text) if name in self.library.document["sha256"]}
+
+    def of_log(self, log: RunLog, path: Path) -> str:
+        """Return the entry of a log by its stamps, the names in it or the file's name; empty if unknown."""
+        named = self.named_in(log.text)
+        return (
+            self.by_stamp(log.stamps) or (named.pop() if len(named) == 1 else "") or self.by_file_name(path)
+        )
+
+    def of_solution(self, raw: RawSolution, path: Path) -> str:
+        """Return the entry of a solution by its stamp, its file's name or its columns.
+
+        Raises SolutionError unless exactly one entry fits.
+        """
+        by_stamp = self.by_stamp([raw.stamp]) if raw.stamp else ""
+        return by_stamp or self.by_file_name(path) or self._by_columns(raw, path)
+
+    def _by_columns(self, raw: RawSolution, path: Path) -> str:
+        fitting = [each["name"] for each in self.library.entries if self._fits(raw, path, each)]
+        if len(fitting) == 1:
+            return str(fitting[0])
+        if not fitting:
+            raise SolutionError("fits no entry of the library; name the entry if it should", file=path)
+        listed = ", ".join(fitting[:_LISTED]) + (", ..." if len(fitting) > _LISTED else "")
+        raise SolutionError(
+            f"fits {len(fitting)} entries of the library ({listed}); name the entry", file=path
+        )
+
+    def _fits(self, raw: RawSolution, path: Path, sidecar: dict[str, Any]) -> bool:
+        """Whether a solution has exactly the columns of one of an entry's model files."""
+        if raw.names is None:
+            return False
+        counts, pairs = sidecar["counts"], sidecar["instance"]["pairs"]
+        most = counts["variables"] + pairs + _ADDED  # the format may have lifted a product per pair
+        least = 0 if raw.omits_zeros else counts["variables"]
+        if not least <= len(raw.values) <= most:
+            return False
+        try:
+            problem = self.problem(sidecar)
+            found = read_solution(path, problem)
+        except CrossfieldError:
+            return False
+        beyond = max(problem.objective_degree, problem.row_degree) > FORMATS["mps"].degree
+        return found.unknown == 0 and (beyond or not found.problem.formulation.lifted)
