@@ -30,11 +30,15 @@ def _model() -> Any:
 
 
 def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
-    """Model of an LP or MPS file, with these options. Raises RefusedError if HiGHS cannot read it."""
+    """Model of an LP or MPS file, with these options. Raises RefusedError if HiGHS cannot read it.
+
+    The options are set afterwards: HiGHS applies a time limit to reading too and then reports an error.
+    """
     highs = _model()
-    set_options(highs, output_flag="false" if silent else "true", **options)
+    set_options(highs, output_flag="false" if silent else "true")
     if highs.readModel(str(path)) == highspy.HighsStatus.kError:
         raise RefusedError("HiGHS cannot read it", file=path)
+    set_options(highs, **options)
     return highs
 
 

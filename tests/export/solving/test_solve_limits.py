@@ -24,6 +24,15 @@ def test_without_time_the_start_is_the_answer(tmp_path, name):
     assert cf.solve(problem, limits=cf.Limits(1e-6)).status == Status.LIMIT_WITHOUT_POINT
 
 
+def test_a_time_limit_does_not_keep_highs_from_reading_a_file(tmp_path):
+    """HiGHS ends the reading of an MPS file at its time limit, with the error of an unreadable file."""
+    from crossfield.export.programs.highs import loaded
+
+    problem = cf.formulate(cf.sample("mouse", 24), "milp-mccormick")
+    cf.write(problem, tmp_path / "model.mps")
+    assert loaded(tmp_path / "model.mps", time_limit=1e-4).getNumCol() == problem.n_columns
+
+
 def test_the_second_stage_keeps_a_part_of_the_time():
     from crossfield.export.solving.two_stage import jumps_until
 
