@@ -201,14 +201,20 @@ def submit_command(
     solver: Annotated[
         str | None, typer.Option("--solver", metavar="NAME", help="Solver that found the points.")
     ] = None,
-    version: Annotated[str | None, typer.Option("--version", metavar="TEXT", help="Its version.")] = None,
+    version: Annotated[
+        str | None, typer.Option("--version", metavar="TEXT", help="Version of the solver.")
+    ] = None,
     status: Annotated[str | None, typer.Option("--status", help="Result of the run: {run statuses}.")] = None,
     bound: Annotated[
         float | None, typer.Option("--bound", help="Dual bound of the run; by default that of its log.")
     ] = None,
-    seconds: Annotated[float | None, typer.Option("--seconds", help="Duration of the run.")] = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="Number of threads.")] = None,
-    limit: Annotated[float | None, typer.Option("--limit", help="Time limit in seconds.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="Duration of the run in seconds.")
+    ] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Number of threads of the run.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", help="Time limit of the run in seconds.")
+    ] = None,
     machine: Annotated[
         str | None, typer.Option("--machine", metavar="TEXT", help="Processor and memory.")
     ] = None,
@@ -228,7 +234,7 @@ def submit_command(
     from ..library.contributions.run_record import RunFacts
     from ..library.contributions.submit import submit
 
-    facts = RunFacts(solver, version, status, bound, seconds, threads, limit, machine, by, date)  # type: ignore[arg-type]
+    facts = RunFacts(solver, version, status, bound, seconds, threads, time_limit, machine, by, date)  # type: ignore[arg-type]
     with progress(quiet=quiet) as show:
         found = submit(folder, files or [], entry=entry, facts=facts, progress=show)
     if as_json:

@@ -63,9 +63,9 @@ def _is_certificate(data: bytes) -> bool:
 
 def _json_kinds(data: bytes) -> set[Kind]:
     with suppress(ValueError, RecursionError):
-        document = json.loads(data)
-        if document.get("format") in _JSON:
-            return {_JSON[document["format"]]}
+        stated = json.loads(data).get("format")
+        if isinstance(stated, str) and stated in _JSON:
+            return {_JSON[stated]}
     return set()
 
 

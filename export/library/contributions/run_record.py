@@ -27,7 +27,7 @@ class RunFacts:
     """Facts that a submitter states about a run; None for what its log states or is unknown.
 
     solver, version: program; status: result; bound: dual bound; seconds: duration; threads: number of
-    threads; limit: time limit in seconds; machine: processor and memory; by: submitter; date: as YYYY-MM-DD.
+    threads; time_limit: in seconds; machine: processor and memory; by: submitter; date: as YYYY-MM-DD.
     """
 
     solver: str | None = None
@@ -36,7 +36,7 @@ class RunFacts:
     bound: float | None = None
     seconds: float | None = None
     threads: int | None = None
-    limit: float | None = None
+    time_limit: float | None = None
     machine: str | None = None
     by: str | None = None
     date: str | None = None
@@ -124,7 +124,7 @@ def run_record(
         bound=bound,
         seconds=read.seconds if facts.seconds is None else facts.seconds,
         threads=read.threads if facts.threads is None else facts.threads,
-        time_limit=read.limit if facts.limit is None else facts.limit,
+        time_limit=read.limit if facts.time_limit is None else facts.time_limit,
         by=facts.by,
         machine=facts.machine,
         date=facts.date,
@@ -144,7 +144,7 @@ def _check(record: Record, facts: RunFacts, log: LogFile | None) -> None:
         version=facts.version or UNKNOWN,
         seconds=facts.seconds,
         threads=facts.threads,
-        time_limit=facts.limit,
+        time_limit=facts.time_limit,
         trace=(),
     )
     stated.check()

@@ -30,11 +30,12 @@ from ..checking.finding import FEASIBLE, is_better
 from ..documents.documents import Library, about_file, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
-from ..ledger.ledger import Ledger, Record, read_ledger, write_ledger
+from ..ledger.ledger import Ledger, Record, SubmittedCertificate, read_ledger, write_ledger
 from ..ledger.points import complete_point, field_of
 from ..ledger.standing import best_of_each, contradicts
-from .matching import Entries, Kind, kinds_of
+from .matching import Entries
 from .run_record import LogFile, RunFacts, run_record
+from .sources import Source, sources_of
 
 Outcome = Literal["accepted", "not better", "refused", "skipped"]
 
@@ -110,7 +111,7 @@ def submit(
             library.entry(entry)
         session = _Session(library, entry, facts)
         found = []
-        for source in _sources(files, facts):
+        for source in sources_of(files, facts):
             progress(f"checking {source.name}")
             found += session.results(source)
         if any(each.outcome == "accepted" for each in found):
@@ -140,85 +141,6 @@ def _settled(library: Library, progress: Progress) -> Library:
     return library if f"{digest}  {LEDGER}" in sums else rebuilt(library.folder, progress=progress)
 
 
-@dataclass(frozen=True)
-class _Source:
-    """A submitted file, or the solution and the log of one run. error: if the file cannot be read."""
-
-    kind: Kind | Literal["bound", ""]
-    path: Path | None = None
-    log: Path | None = None
-    listed: bool = True
-    error: CrossfieldError | None = None
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        return tuple(dict.fromkeys(each for each in (self.path, self.log) if each is not None))
-
-    @property
-    def name(self) -> str:
-        return " and ".join(each.name for each in self.files) or "the bound"
-
-
-def _sources(files: Sequence[str | Path], facts: RunFacts) -> list[_Source]:
-    """The files by kind, solutions with their logs. Raises InputError."""
-    found = [_source(path, listed) for path, listed in _expanded(files)]
-    logs = {each.path.with_suffix(""): each for each in found if each.kind == "log" and each.path}
-    paired = []
-    for each in found:
-        log = logs.get(each.path.with_suffix("")) if each.kind == "solution" and each.path else None
-        paired.append(replace(each, log=log.path) if log and each.log is None else each)
-    used = {each.log for each in paired}
-    left = [
-        replace(each, path=None, log=each.path) if each.kind == "log" else each
-        for each in paired
-        if each.kind != "log" or each.path not in used
-    ]
-    if not files and facts.bound is not None:
-        return [_Source("bound")]
-    if not left:
-        raise InputError("there is nothing to submit; give files, or an entry and a bound")
-    is_run = len(left) == 1 and left[0].kind not in ("field", "certificate", "ledger")
-    if not is_run and (facts.bound, facts.status) != (None, None):
-        raise InputError("a bound or status belongs to one run; submit the files of that run alone")
-    return left
-
-
-def _expanded(files: Iterable[str | Path]) -> Iterator[tuple[Path, bool]]:
-    """The files with those in folders, and whether each was listed by itself."""
-    for path in map(Path, files):
-        if path.is_dir():
-            inside = (each for each in sorted(path.rglob("*")) if not each.name.startswith("."))
-            yield from ((each, False) for each in inside if each.is_file())
-        else:
-            yield path, True
-
-
-def _source(path: Path, listed: bool) -> _Source:
-    try:
-        kinds = kinds_of(path)
-    except CrossfieldError as error:
-        return _Source("", path, error=error)
-    if kinds == {"solution", "log"}:
-        return _both(path)
-    return _Source(next(iter(kinds), ""), path, listed=listed)
-
-
-def _both(path: Path) -> _Source:
-    """The file as the log of a run, as its solution, or as both, depending on its content."""
-    try:
-        LogFile.read(path)
-        has_log = True
-    except CrossfieldError:
-        has_log = False
-    try:
-        has_point = read_raw(path).has_point
-    except CrossfieldError:
-        has_point = False
-    if has_log and not has_point:
-        return _Source("log", path)
-    return _Source("solution", path, path if has_log else None)
-
-
 @dataclass
 class _Session:
     """A submission in progress: the ledger with what was accepted so far."""
@@ -234,7 +156,7 @@ class _Session:
         self.ledger = read_ledger(self.library.folder)
         self.entries = Entries(self.library)
 
-    def results(self, source: _Source) -> list[Submission]:
+    def results(self, source: Source) -> list[Submission]:
         """Check a source and add its improvements to the ledger."""
         before = self.ledger
         try:
@@ -250,14 +172,14 @@ class _Session:
             self.ledger = before
             return [Submission(source.files, source.kind, "refused", error=error)]
 
-    def _unknown(self, source: _Source) -> Submission:
+    def _unknown(self, source: Source) -> Submission:
         if source.listed:
             raise InputError(
                 "is no solution, field, certificate, log or ledger; give one of these", file=source.path
             )
         return Submission(source.files, "", "skipped")
 
-    def _run(self, source: _Source) -> Submission:
+    def _run(self, source: Source) -> Submission:
         """Check the solution, the log and the stated bound of a run."""
         log = LogFile.read(source.log) if source.log else None
         name = self.entry or self._name_of(source, log)
@@ -267,7 +189,7 @@ class _Session:
             found = self._point(source.path, sidecar)
         return self._kept(source, sidecar, self.facts, log, found)
 
-    def _name_of(self, source: _Source, log: LogFile | None) -> str:
+    def _name_of(self, source: Source, log: LogFile | None) -> str:
         name = self.entries.of_log(log.log, log.path) if log else ""
         if source.path is not None:
             raw = read_raw(source.path)
@@ -282,7 +204,7 @@ class _Session:
 
     def _kept(
         self,
-        source: _Source,
+        source: Source,
         sidecar: dict[str, Any],
         facts: RunFacts,
         log: LogFile | None,
@@ -370,7 +292,7 @@ class _Session:
                 file=path,
             )
 
-    def _field(self, source: _Source) -> Submission:
+    def _field(self, source: Source) -> Submission:
         """Check a field on every entry of its instance."""
         assert source.path is not None
         found = self._read_field(source.path)
@@ -423,7 +345,7 @@ class _Session:
             raise InputError(f"is a {kind} of an instance that is not in the library: {summary}", file=path)
         return found
 
-    def _certificate(self, source: _Source) -> Submission:
+    def _certificate(self, source: Source) -> Submission:
         """Check a certificate and keep it if it proves more than the one before."""
         assert source.path is not None
         found = read_certificate(source.path)
@@ -471,7 +393,7 @@ class _Session:
         about = read_about(self.library.folder / about_file(instance))
         return about["certificate"]["bound"] if "certificate" in about else None
 
-    def _ledger(self, source: _Source) -> Iterator[Submission]:
+    def _ledger(self, source: Source) -> Iterator[Submission]:
         """Check the runs, points and certificates of another ledger, whose files lie beside it."""
         assert source.path is not None
         other = read_ledger(source.path.parent, source.path.name)
@@ -487,11 +409,11 @@ class _Session:
         for each in other.certificates:
             if each not in self.ledger.certificates:
                 found += 1
-                yield from self.results(_Source("certificate", other.folder / each.file))
+                yield from self.results(_certificate_of(other, each))
         if not found:
             yield Submission(source.files, source.kind, "not better")
 
-    def _of_ledger(self, source: _Source, record: Record, other: Ledger) -> Submission:
+    def _of_ledger(self, source: Source, record: Record, other: Ledger) -> Submission:
         """Check a record of another ledger, whose bound counts as stated unless its log shows it."""
         assert source.path is not None
         sidecar = self.entries.sidecar(record.entry)
@@ -505,8 +427,18 @@ class _Session:
             path = other.folder / str(record.point)
             _check_feasible(path, record.entry, problem.violation(complete_point(problem, found)))
             self._check_bound(path, sidecar, problem, found)
-        facts = {name: getattr(record, name) for name in RunFacts.__dataclass_fields__ if name != "limit"}
-        return self._kept(source, sidecar, RunFacts(**facts, limit=record.time_limit), log, found)
+        facts = RunFacts(**{name: getattr(record, name) for name in RunFacts.__dataclass_fields__})
+        return self._kept(source, sidecar, facts, log, found)
+
+
+def _certificate_of(other: Ledger, certificate: SubmittedCertificate) -> Source:
+    """The file of a certificate in another ledger, with an error if the ledger names another one."""
+    path = other.folder / certificate.file
+    try:
+        other.content(certificate.file, certificate.sha256)
+    except CrossfieldError as error:
+        return Source("certificate", path, error=error)
+    return Source("certificate", path)
 
 
 Improved = tuple[dict[str, Any], float, float]

@@ -121,7 +121,7 @@ def test_the_best_run_of_each_solver_is_shown(lib):
     best = entry_of(lib)["best"]["objective"]
     for bound in (0.5, 0.7, 0.6):
         submit_one(lib, entry=MILP, solver="scip", version="10", bound=bound * best, seconds=3.0, threads=2)
-    submit_one(lib, entry=MILP, solver="Own", bound=0.1 * best, status="no point", limit=60.0)
+    submit_one(lib, entry=MILP, solver="Own", bound=0.1 * best, status="no point", time_limit=60.0)
     runs = entry_of(lib)["runs"]
     assert [(each["solver"], each["bound"] / best) for each in runs] == [
         ("Own", pytest.approx(0.1)),
@@ -177,7 +177,7 @@ def test_an_invalid_run_is_refused_in_one_line_and_changes_nothing(built, lib, t
         ([], {"entry": MILP, "bound": 0.0, "machine": "a\nb"}, "machine must be one line"),
         ([], {"entry": MILP, "bound": 0.0, "date": "22.11.2026"}, "date is '22.11.2026'; give a day"),
         ([], {"entry": MILP, "bound": 0.0, "status": "solved"}, "status is 'solved'; choose one of optimal"),
-        ([], {"entry": MILP, "bound": 0.0, "limit": float("inf")}, "time limit is inf; give a finite number"),
+        ([], {"entry": MILP, "bound": 0.0, "time_limit": float("inf")}, "time limit is inf; give a finite number"),
         ([], {"entry": MILP, "bound": 0.0, "by": "\u202ereversed"}, "by must be one line"),
         ([], {"entry": MILP, "bound": 0.0, "version": "<script>"}, "version is '<script>'; give at most 60"),
     ):
@@ -225,10 +225,10 @@ def test_a_log_that_no_ledger_can_hold_is_refused_before_anything_is_written(lib
 
 def test_stated_facts_replace_those_of_the_log(lib, tmp_path):
     (tmp_path / "a.log").write_text(GUROBI.replace("TimeLimit  60", "TimeLimit  -8"))
-    submit_one(lib, tmp_path / "a.log", entry=MILP, limit=8.0)
+    submit_one(lib, tmp_path / "a.log", entry=MILP, time_limit=8.0)
     assert entry_of(lib)["runs"][0]["limit"] == 8.0
     with pytest.raises(InputError, match=r"^version is '\?'; give"):
-        submit_one(lib, tmp_path / "a.log", entry=MILP, version="?", limit=8.0)
+        submit_one(lib, tmp_path / "a.log", entry=MILP, version="?", time_limit=8.0)
 
 
 @pytest.mark.parametrize("seconds", [float("inf"), float("nan"), -1.0])
@@ -367,7 +367,7 @@ def test_every_installed_program_solves_its_problems(lib):
     if len({SOLVERS[name].maker for name in names}) > 3:
         assert entry_of(lib)["solved"]["by"] == "agreement"
     assert verify_library(lib) == []
-    assert solve_library(lib, solvers=names, time_limit=60.0) == []
+    assert solve_library(lib, solvers=names, time_time_limit=60.0) == []
 
 
 def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others_run(lib, capfd):

@@ -234,6 +234,24 @@ def test_the_ledger_of_another_copy_is_submitted_with_its_files(lib, sent, built
     assert verify_library(lib) == []
 
 
+def test_a_certificate_that_its_ledger_does_not_name_is_refused(lib, sent, built, tmp_path):
+    other = shutil.copytree(built, tmp_path / "other")
+    submit(other, [sent / "s6.npz"])
+    (certificate,) = other.glob("*.certificate.npz")
+    shutil.copy(sent / "s7.npz", certificate)
+    (found,) = submit(lib, [other / "ledger.json"])
+    assert (found.outcome, found.files) == ("refused", (certificate,))
+    assert "is another file than the one its ledger names" in str(found.error)
+
+
+@pytest.mark.parametrize("stated", ["[]", "{}", "null", "7", '"crossfield"'])
+def test_a_file_of_an_unknown_format_is_refused_and_the_others_are_kept(lib, sent, tmp_path, stated):
+    (tmp_path / "odd.json").write_text(f'{{"format": {stated}}}')
+    (tmp_path / "list.json").write_text(f"[{stated}]")
+    found = submit(lib, [tmp_path / "odd.json", sent / "s6.npz", tmp_path / "list.json"])
+    assert [each.outcome for each in found] == ["refused", "accepted", "refused"]
+
+
 def test_kinds_are_recognised_by_content(sent, lib, tmp_path):
     files = [path for path in SOLUTIONS.iterdir() if path.is_file() and path.suffix == ".sol"]
     assert {frozenset(kinds_of(path)) for path in files} == {frozenset({"solution"})}
