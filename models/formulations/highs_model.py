@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..errors import UnsupportedBySolverError
+from ..errors import SolverError, UnsupportedBySolverError
 from .arrays import ProblemArrays
 
 
@@ -31,7 +31,7 @@ def check_highs(problem_class: str, *, convex: bool) -> None:
 
 
 def highs_of(arrays: ProblemArrays, name: str) -> Any:
-    """Return a `highspy.Highs` that holds the arrays."""
+    """Return a `highspy.Highs` that holds the arrays. Raises SolverError if HiGHS refuses them."""
     import highspy
 
     model = highspy.HighsModel()
@@ -53,7 +53,8 @@ def highs_of(arrays: ProblemArrays, name: str) -> Any:
         _fill(model.hessian_, sparse.tril(arrays.q, format="csc"))
     solver = highspy.Highs()  # type: ignore[no-untyped-call]
     solver.setOptionValue("output_flag", False)  # noqa: FBT003 - as highspy has it
-    solver.passModel(model)
+    if solver.passModel(model) == highspy.HighsStatus.kError:
+        raise SolverError(f"HiGHS {solver.version()} refuses the arrays of {name}")
     return solver
 
 

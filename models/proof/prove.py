@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..field.field import CrossField, Norm
 from ..instance.instance import Instance
 from ..processes.crew import crew
-from ..processes.deadline import Stop, asked
+from ..processes.deadline import Stop, stop_function
 from ..processes.interruption import interruptible
 from ..processes.limits import Limits
 from ..processes.progress import Progress, silent
@@ -84,11 +84,17 @@ def prove(
         raise InputError(f"a proof is in the 1-norm or the 2-norm, not in norm {norm}")
     if start is not None:
         start.check_instance(instance)
+    checked(jobs)
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
-    with interruptible() as interrupted, crew(given.threads or checked(jobs)) as hands:
+    with interruptible() as interrupted, crew(given.threads or jobs) as hands:
         own = WorkLimits(
-            given.deadline(), interrupted, asked(stop), given.gap, certified and norm == 2, work or math.inf
+            given.deadline(),
+            interrupted,
+            stop_function(stop),
+            given.gap,
+            certified and norm == 2,
+            work or math.inf,
         )
         kind = Work if norm == 2 else WorkIn1Norm
         proving = kind(instance, kind.first(instance, start, own.over), own, hands, (seed, jobs), progress)

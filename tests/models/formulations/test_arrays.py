@@ -1,11 +1,14 @@
 """Arrays of a problem against HiGHS' reading of its file, and against its values at random points."""
 
+from dataclasses import replace
+
 import crossfield as cf
 import numpy as np
 import pytest
 from cases import CASES, make_field, make_instance, make_problem, points_of, problem_of
 from crossfield.export.formats.registry import write
-from crossfield.models.errors import UnsupportedBySolverError
+from crossfield.models.errors import SolverError, UnsupportedBySolverError
+from crossfield.models.formulations.highs_model import highs_of
 from loops import for_each
 from scipy import sparse
 
@@ -123,6 +126,12 @@ def test_highs_is_not_given_what_it_does_not_take(name):
     assert problem.problem_class not in HIGHS_TAKES
     with pytest.raises(UnsupportedBySolverError, match=f"HiGHS takes .* {problem.problem_class};"):
         problem.to_highs()
+
+
+def test_arrays_that_highs_refuses_are_an_error():
+    arrays = make_problem("milp-mccormick", make_instance("full")).to_arrays()
+    with pytest.raises(SolverError, match="refuses the arrays of broken"):
+        highs_of(replace(arrays, row_lower=np.full_like(arrays.row_lower, np.inf)), "broken")
 
 
 def test_arrays_do_not_share_memory_with_the_problem():

@@ -115,6 +115,12 @@ def test_the_same_arguments_give_the_same_proof_for_any_number_of_threads():
     assert one.field.alpha.tobytes() == two.field.alpha.tobytes()
 
 
+@pytest.mark.parametrize("threads", [0, 1])
+def test_jobs_out_of_range_are_refused(threads):
+    with pytest.raises(cf.InputError, match="jobs must be between 1 and"):
+        cf.prove(cf.sample("bottle", 12), jobs=0, limits=cf.Limits(1.0, threads=threads))
+
+
 def test_limits_end_a_proof_with_what_it_has():
     instance = cf.sample("bottle", 12, stroke_weight=0.5)
     told = []
