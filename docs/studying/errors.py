@@ -109,7 +109,7 @@ def gaps(rows: Iterable[Row]) -> list[tuple[Row, float]]:
 
 
 def differences(found: list[tuple[Row, float]]) -> list[tuple[Row, float, float]]:
-    """Each field with its gap, and its error minus that of the field of least energy of its instance."""
+    """Each field with its gap, and its error minus that of its instance's field with the lowest energy."""
     least: dict[Any, Row] = {}
     for row, _ in found:
         case = case_of(row)

@@ -13,7 +13,7 @@ from .marks import Area, Dots, Lines, Mark, Sheet
 
 _SIDE: Final = 400.0
 """Points of the longer side of the page."""
-_TIP: Final = 1e-3  # of a pixel, lest a side is rounded down to the pixel before
+_TIP: Final = 1e-3  # of a pixel: else a side could be rounded down by a pixel
 
 
 def page_of(sheet: Sheet) -> Any:

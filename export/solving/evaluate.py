@@ -13,7 +13,7 @@ import numpy as np
 from ...models.errors import CrossfieldError, InputError
 from ...models.evaluation.hidden import SHORTEST, HiddenCurve, Summary, hidden_curves, summary
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Over, Stop, asked
+from ...models.processes.deadline import Over, Stop, stop_function
 from ...models.processes.interruption import interruptible
 from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
@@ -156,7 +156,7 @@ def evaluate(
             f"{instance.name} has no curve of {SHORTEST} pixels or more besides others that could be hidden; "
             "choose a larger size, or a drawing of more curves"
         )
-    done, interrupted = _in_turn(hidden, methods, limits, progress, asked(stop))
+    done, interrupted = _in_turn(hidden, methods, limits, progress, stop_function(stop))
     return Evaluation(instance, methods, limits, tuple(done), has_curves(sketch, choice), interrupted)
 
 

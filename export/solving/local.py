@@ -29,7 +29,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Floats
 from ...models.processes.child import Child, KilledError
-from ...models.processes.deadline import Deadline, Stop, asked
+from ...models.processes.deadline import Deadline, Stop, stop_function
 from ...models.processes.limits import Limits
 from ...models.processes.messages import WorkerError
 from ...models.storage import make_folder
@@ -288,7 +288,7 @@ class Solvers:
         begin = time.perf_counter()
         try:
             outcome, interrupted = self.child(entry.program).call(
-                call, entry.program, "solve", job, deadline=deadline, log=files.log, stop=asked(stop)
+                call, entry.program, "solve", job, deadline=deadline, log=files.log, stop=stop_function(stop)
             )
         except TooLargeError as error:
             raise UnsupportedBySolverError(

@@ -11,7 +11,7 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Deadline, Over, Stop, asked, never
+from ...models.processes.deadline import Deadline, Over, Stop, never, stop_function
 from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
@@ -223,7 +223,7 @@ def run(
         When a file cannot be written.
 
     """
-    over = asked(stop)
+    over = stop_function(stop)
     below = None if drawing is None else read_drawing(drawing, on=instance)
     limits, folder = Limits.bounded(limits), make_folder(folder)
     _clear(folder)

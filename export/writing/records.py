@@ -90,7 +90,7 @@ class Words:
         return self._nonzero[start:stop] if self.codes is None else self._nonzero.take(self.codes[start:stop])
 
     def at(self, codes: NDArray[Any]) -> Words:
-        """The same table with other codes."""
+        """Return this table with other codes."""
         return Words(self.table, codes if self.codes is None else self.codes[codes])
 
 
@@ -154,7 +154,7 @@ class Tagged:
         return len(self.tag) + self.words.width
 
     def at(self, codes: NDArray[Any]) -> Tagged:
-        """The same names with other codes."""
+        """Return these names with other codes."""
         return Tagged(self.tag, self.words.at(codes))
 
 

@@ -128,12 +128,12 @@ def gzipped(chunks: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def joined(chunks: Iterable[bytes], least: int) -> Iterator[bytes]:
-    """The same bytes in pieces of at least that length, except the last."""
+    """Join chunks to pieces of at least `least` bytes; the last may be shorter."""
     return (b"".join(parts) for parts, _ in gathered(chunks, least))
 
 
 def gathered(chunks: Iterable[bytes], least: int) -> Iterator[tuple[list[bytes], int]]:
-    """The same chunks in lists of at least that many bytes, except the last, and the length of each."""
+    """Collect chunks in lists of at least `least` bytes, each with its length; the last may be shorter."""
     parts: list[bytes] = []
     length = 0
     for chunk in chunks:

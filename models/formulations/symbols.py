@@ -91,7 +91,7 @@ VARIABLES: Final = {
 """Every variable of every formulation, in the order of columns."""
 
 NARROWED: Final = VARIABLES | {"beta": replace(VARIABLES["beta"], lower=beta_lo, upper=beta_up)}
-"""The same variables after a proof has narrowed the windows, so that bounds of beta are data too."""
+"""`VARIABLES` for windows that a proof has narrowed, so that bounds of beta are data too."""
 
 SLOTS: Final[dict[IndexSet, dict[sp.Symbol, tuple[str, Way]]]] = {
     "pixels": {

@@ -30,8 +30,8 @@ Stop = Callable[[], bool] | Event
 """A request to end work early: a function that returns whether to stop, or an event."""
 
 
-def asked(stop: Stop | None) -> Over:
-    """Return the function that says whether a caller asks to stop; for None it never does.
+def stop_function(stop: Stop | None) -> Over:
+    """Return a request to stop as a function; for None it never stops.
 
     Raises
     ------
@@ -68,13 +68,6 @@ class Deadline:
     def after(cls, seconds: float, clock: Clock = time.monotonic) -> Deadline:
         """The moment that many seconds from now."""
         return cls(clock() + seconds, clock)
-
-    @classmethod
-    def of(cls, limit: float | Deadline | None) -> Deadline:
-        """Deadline of a limit: itself, the moment that many seconds from now, or no deadline for None."""
-        if isinstance(limit, Deadline):
-            return limit
-        return cls() if limit is None else cls.after(limit)
 
     def __reduce__(self) -> tuple[Callable[[float], Deadline], tuple[float]]:
         return Deadline.after, (self.left(),)

@@ -44,7 +44,10 @@ class Limits:
     def __post_init__(self) -> None:
         """Check the ranges."""
         if not (self.time_limit > 0 and 0 <= self.gap < math.inf):
-            raise _refusal(self)
+            raise InputError(
+                f"a time limit of {self.time_limit} s and a gap of {self.gap} are out of range; "
+                "give a positive number of seconds, and a gap that is not negative"
+            )
         checked(self.threads, "threads", least=0)
 
     @classmethod
@@ -59,7 +62,7 @@ class Limits:
         """
         limits = given or cls()
         if limits.time_limit == math.inf:
-            raise _refusal(limits)
+            raise InputError("this work needs a finite time limit; give a number of seconds")
         return limits
 
     def deadline(self) -> Deadline:
@@ -69,10 +72,3 @@ class Limits:
     def until(self, deadline: Deadline) -> Limits:
         """Return the same limits with the seconds that are left until a deadline."""
         return replace(self, time_limit=max(deadline.left(), LEAST), _end=deadline)
-
-
-def _refusal(limits: Limits) -> InputError:
-    return InputError(
-        f"a time limit of {limits.time_limit} s and a gap of {limits.gap} are out of range; "
-        "give a positive number of seconds, and a gap that is not negative"
-    )

@@ -35,7 +35,7 @@ from ..errors import InputError, InstanceError, SolverError, naming
 from ..field.field import CrossField
 from ..instance.file import arrays_of, of_arrays
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, asked
+from ..processes.deadline import Over, Stop, stop_function
 from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
@@ -111,7 +111,7 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
     if not proof.levels:
         raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
     arrays = certificate_arrays(proof, "gap", 0.0)
-    verdict = _confirmed(arrays, path, asked(stop))
+    verdict = _confirmed(arrays, path, stop_function(stop))
     status, bound = _claim(verdict)
     kept = len(verdict.levels)
     confirmed = replace(proof, levels=proof.levels[:kept], parents=proof.parents[:kept])

@@ -14,7 +14,7 @@ from typing import Final
 from ..field.field import CrossField, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, asked, never
+from ..processes.deadline import Over, Stop, never, stop_function
 from ..processes.limits import Limits
 from ..processes.progress import Progress, silent
 from ..search.search import Search, search_patches
@@ -92,7 +92,7 @@ def search(
         jobs=jobs,
         start=start,
         progress=progress,
-        stop=asked(stop),
+        stop=stop_function(stop),
         suggest=partial(suggested, threads=limits.threads or jobs),
     )
 

@@ -16,7 +16,7 @@ from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, asked, never
+from ..processes.deadline import Over, Stop, never, stop_function
 from ..processes.progress import Progress, silent
 from ..smooth.systems import locally, one_thread
 from .energy import CLOSE, LinearSolver, energy_at
@@ -71,7 +71,7 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
     """
     state, nearest = _cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
-    over = asked(stop)
+    over = stop_function(stop)
     _stitch(state, nearest, pace, over, progress)
     return state.bounded(over)
 

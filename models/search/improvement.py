@@ -18,7 +18,7 @@ from ..field.jumps import free_jumps, parity_sign, stepped
 from ..instance.angles import line_difference
 from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
-from ..processes.deadline import Over, Stop, asked, never
+from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.systems import one_thread
 from .box_qp import least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
@@ -54,7 +54,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
         A field whose 2-norm energy (docs/mathematics.md, 5) is at most that of `field`.
 
     """
-    state, solver, over = FreeField.of(field), LinearSolver(), asked(stop)
+    state, solver, over = FreeField.of(field), LinearSolver(), stop_function(stop)
     settle(state, solver, over)
     if field.instance.gauge == "strokes":
         _exchange_families(state, solver, over)

@@ -19,7 +19,7 @@ from ..field.field import CrossField
 from ..instance.angles import wrap
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, QUARTER
-from ..processes.deadline import Over, Stop, asked
+from ..processes.deadline import Over, Stop, stop_function
 from .systems import factored, one_thread
 
 _Places = NDArray[np.intp]
@@ -81,7 +81,7 @@ def bend_field(
         The field.
 
     """
-    over = asked(stop)
+    over = stop_function(stop)
     if over():
         return start
     if harmonic is not None:

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Grid
-from ..processes.deadline import Over, Stop, asked
+from ..processes.deadline import Over, Stop, stop_function
 from ..processes.progress import Progress, silent
 from ..smooth.systems import one_thread
 from .crosses import Crosses
@@ -81,7 +81,7 @@ def surface(
         For a hint outside the mask, or with angles that no normal has.
 
     """
-    instance, given, cut = field.instance, tuple(hints), TimeLimit(asked(stop))
+    instance, given, cut = field.instance, tuple(hints), TimeLimit(stop_function(stop))
     check_hints(given, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)

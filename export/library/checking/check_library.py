@@ -52,8 +52,8 @@ _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
     """Return the findings about a library in a folder or an archive; an empty list if it is sound.
 
-    jobs: processes; progress: called with a line per step. The folder is locked meanwhile. Raises InputError
-    without a library, OutputError if another process holds the lock for too long.
+    jobs: processes; progress: called with a line per step. The folder is locked during the work.
+    Raises InputError without a library, OutputError if another process holds the lock for too long.
     """
     with opened(folder) as place:
         if not (place / INDEX).is_file() and not (place / SUMS).is_file():

@@ -53,7 +53,7 @@ def release_library(
 ) -> Frozen:
     """Write the release of a library as a .tar.gz or .zip, with its checksum beside it.
 
-    jobs: processes that verify it first. The library is locked meanwhile. Raises InputError for another
+    jobs: processes that verify it first. The library is locked during the work. Raises InputError for another
     suffix, for a library that states no version and day, and for one that does not verify; OutputError where
     nothing can be written.
     """

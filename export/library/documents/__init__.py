@@ -1,5 +1,5 @@
-"""Documents beside the model files.
+"""Files of a library that describe its entries.
 
 Sidecars with their schemas, statistics of a problem, formulas for browsers, archives, and the checker that is
-shipped in each library. They describe; making is building, comparing is checking.
+shipped in each library. The folders `building` and `checking` create and compare them.
 """

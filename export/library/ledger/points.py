@@ -64,7 +64,7 @@ def searched_field(instance: Instance) -> Known:
 
 
 def least_energy(known: Sequence[Known], norm: int) -> Known:
-    """Return the field of least energy in a norm, the first of equal ones."""
+    """Return the field whose energy in a norm is lowest, the first of equal ones."""
     return min(known, key=lambda each: each.field.energy(2 if norm == 2 else 1).total)
 
 

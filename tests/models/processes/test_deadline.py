@@ -6,7 +6,7 @@ import threading
 
 import pytest
 from crossfield.models.errors import InputError
-from crossfield.models.processes.deadline import Deadline, asked
+from crossfield.models.processes.deadline import Deadline, stop_function
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,13 +31,6 @@ def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
     assert (deadline.left(), deadline.passed()) == (1.0, False)
     clock.now += 5.0
     assert (deadline.left(), deadline.passed()) == (0.0, True)
-
-
-def test_a_limit_is_a_deadline_seconds_or_none():
-    deadline = Deadline.after(3.0, Clock())
-    assert Deadline.of(deadline) is deadline
-    assert Deadline.of(None) == Deadline()
-    assert 0.0 < Deadline.of(3.0).left() <= 3.0
 
 
 def test_a_step_that_would_end_late_is_not_begun():
@@ -80,11 +73,11 @@ def test_a_deadline_goes_to_another_process():
 
 def test_a_request_to_stop_is_a_function_or_an_event():
     happened = threading.Event()
-    over = asked(happened)
+    over = stop_function(happened)
     assert not over()
     happened.set()
     assert over()
-    assert asked(over) is over
-    assert not asked(None)()
+    assert stop_function(over) is over
+    assert not stop_function(None)()
     with pytest.raises(InputError, match="stop is bool; give a function"):
-        asked(True)
+        stop_function(True)
