@@ -177,7 +177,11 @@ def test_an_invalid_run_is_refused_in_one_line_and_changes_nothing(built, lib, t
         ([], {"entry": MILP, "bound": 0.0, "machine": "a\nb"}, "machine must be one line"),
         ([], {"entry": MILP, "bound": 0.0, "date": "22.11.2026"}, "date is '22.11.2026'; give a day"),
         ([], {"entry": MILP, "bound": 0.0, "status": "solved"}, "status is 'solved'; choose one of optimal"),
-        ([], {"entry": MILP, "bound": 0.0, "time_limit": float("inf")}, "time limit is inf; give a finite number"),
+        (
+            [],
+            {"entry": MILP, "bound": 0.0, "time_limit": float("inf")},
+            "time limit is inf; give a finite number",
+        ),
         ([], {"entry": MILP, "bound": 0.0, "by": "\u202ereversed"}, "by must be one line"),
         ([], {"entry": MILP, "bound": 0.0, "version": "<script>"}, "version is '<script>'; give at most 60"),
     ):
