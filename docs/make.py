@@ -14,7 +14,7 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.cli.tables import sample_rows, tables
+from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import DEFAULTS
 from crossfield.export.solving.methods import METHODS, Candidate, Request
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
@@ -196,6 +196,28 @@ def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
     )
 
 
+ERRATA = (
+    (
+        "(26) reads z >= -pi/4",
+        "z >= -(pi/4) p1, the facet that was meant; the MILP is then exact for the 1-norm",
+        "`--facet printed`",
+    ),
+    (
+        "(1) restricts alpha to [0, pi/2]: a stroke at 120 degrees forces a skew of 30 degrees",
+        "the window of alpha is centred on the stroke's direction",
+        "`--gauge box`",
+    ),
+    ("w_beta is in (6) and in the total, and missing in (21)", "it counts once", ""),
+    ("gamma rows for all pixels", "gamma rows for stroke pixels, where theta exists", ""),
+    (
+        "p2 may be any integer",
+        "p2 is bounded, so that solvers can branch on it; every optimum is within the bounds",
+        "",
+    ),
+)
+"""Differences from the paper: as printed, as it is here, and the option that gives the printed form."""
+
+
 def errata() -> None:
     """Write docs/errata.md: the effect of the paper's misprints on the optimum, in numbers."""
     facets = []
@@ -237,6 +259,8 @@ def errata() -> None:
 {generated("python docs/make.py errata")}
 
 {misprints_in_short(facets, gauges, angles)}
+
+{markdown(("in the paper", "in crossfield", "option to write it as printed"), list(map(list, ERRATA)))}
 
 ## (26) as printed
 
@@ -329,7 +353,7 @@ def samples_in_short() -> str:
 
 
 def readme() -> None:
-    """Replace the tables inside README.md, between their markers."""
+    """Replace the table of formulations inside README.md, between its markers."""
     _, rows = tables()["formulations"]
     shown = ("name", "short", "paper", "class", *DEFAULTS)
     replace_between(
@@ -342,12 +366,6 @@ def readme() -> None:
                 for row in rows
             ],
         ),
-    )
-    shown = ("name", "kind", "description")
-    replace_between(
-        README,
-        "samples",
-        markdown(shown, [[str(row[column]) for column in shown] for row in sample_rows()]),
     )
 
 

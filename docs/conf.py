@@ -1,0 +1,56 @@
+"""Configuration of the documentation site, which `sphinx-build -W docs site` builds."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from docutils.nodes import SkipNode
+from latex2mathml.converter import convert
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the extension beside this file
+
+project = "crossfield"
+author = "The crossfield authors"
+version = release = installed("crossfield")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages"]
+exclude_patterns = ["studying"]
+source_suffix = {".md": "markdown"}
+
+myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
+myst_heading_anchors = 4
+
+default_role = "code"
+html_theme = "furo"
+html_title = f"crossfield {version}"
+html_math_renderer = "mathml"
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True}
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+
+def _inline(writer: Any, node: Any) -> None:
+    """Write a formula within a line."""
+    writer.body.append(convert(node.astext()))
+    raise SkipNode
+
+
+def _block(writer: Any, node: Any) -> None:
+    """Write a formula on lines of its own."""
+    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    raise SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Show formulas as MathML, for which browsers need no script."""
+    app.add_html_math_renderer("mathml", (_inline, None), (_block, None))

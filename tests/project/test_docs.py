@@ -1,0 +1,76 @@
+"""The code of tutorials, guides and README runs as printed; the API reference has every public name."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import crossfield
+import places
+import pytest
+
+DOCS = places.ROOT / "docs"
+PAGES = [places.ROOT / "README.md", *sorted(DOCS.glob("tutorials/*.md")), *sorted(DOCS.glob("guides/*.md"))]
+FENCE = re.compile(r"(?:<!-- needs: (\S+) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
+SAVED = re.compile(r"Save this as `([\w.]+)`")
+ELSEWHERE = ("pip install", "sphinx-build", "python3 -m venv", ". .venv")
+"""Commands that change the environment, which other tests run."""
+
+
+def programs() -> str:
+    """The search path, with the folder of GAMS where it is installed for Python."""
+    found = find_spec("gamspy_base")
+    more = [] if found is None or found.origin is None else [str(Path(found.origin).parent)]
+    return os.pathsep.join([*more, os.environ["PATH"]])
+
+
+def is_there(program: str) -> bool:
+    return shutil.which(program, path=programs()) is not None or find_spec(program) is not None
+
+
+def run_line(line: str, folder: Path) -> None:
+    words = shlex.split(line, comments=True)
+    if words and not line.startswith(ELSEWHERE):
+        command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
+        subprocess.run(
+            command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"PATH": programs()}
+        )
+
+
+def run_block(language: str, text: str, folder: Path) -> None:
+    if language == "sh":
+        for line in text.splitlines():
+            run_line(line, folder)
+    elif language == "python":
+        subprocess.run([sys.executable, "-c", text], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    elif saved := SAVED.search(text):
+        (folder / saved[1]).write_text(text)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_block_of_a_page_runs_in_turn(page, tmp_path):
+    """A comment `needs: PROGRAM` holds from there to the end of its section."""
+    missing = set()
+    for section in page.read_text(encoding="utf-8").split("\n## "):
+        needed = ""
+        for needs, language, text in FENCE.findall(section):
+            needed = needs or needed
+            if needed and not is_there(needed):
+                missing.add(needed)
+            else:
+                run_block(language, text, tmp_path)
+    if missing:
+        pytest.skip(f"not installed, so their blocks did not run: {', '.join(sorted(missing))}")
+
+
+def test_the_api_reference_has_every_public_name():
+    page = (DOCS / "reference" / "api.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\.\. auto\w+:: crossfield\.(\w+)$", page, re.MULTILINE)
+    assert sorted(listed) == crossfield.__all__
