@@ -452,7 +452,7 @@ positive index, blue dots those of negative index.
 ## Angles for given jumps
 
 The greedy field at size 256, and the best angles for its jumps from a cold start: a projected Newton method
-with a sparse factorisation ([models/search/box_qp.py](../models/search/box_qp.py)). At size 64, the optimum
+with a sparse factorisation (`models/search/box_qp.py`). At size 64, the optimum
 of `qp-fixed` that Ipopt finds from the written .nl, and by how much ours differs, relative to it or to 1 if
 that is more.
 

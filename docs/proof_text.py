@@ -92,7 +92,7 @@ The checkerboard makes this sharp where it matters: at the best known field each
 the middle between two values of its grid, where the variance is $h^2/4$ and nothing is given away. For
 strokes the same is reached in another way: on black pixels, where the best known cross is a label, the line
 $u$ may lose $0$ at labels with $k + l = 0$, $h^2$ where $|k + l| = 1$ and $h^2/2$ elsewhere; the mean of that
-is at least the variance in every cell ([`models/proof/costs.py`](../models/proof/costs.py)).
+is at least the variance in every cell (`models/proof/costs.py`).
 
 ### 4. Any shares give a bound
 
@@ -182,7 +182,7 @@ computed by the checker, as are energy, costs, bound, the cells that are left, w
 them, Lemmas 4 and 5 and the quadratic. Wrong shares can only make a bound worse. All is done in doubles; an
 error bound of every sum is taken off, so that *optimal* says: no field has less energy by more than $10^{-8}$
 of it, or of 1 if that is more. The checker is
-[one file](../models/proof/check_certificate.py) with NumPy, and repeats this proof with the rounding in it.
+one file (`models/proof/check_certificate.py`) with NumPy, and repeats this proof with the rounding in it.
 It reads the archive once and refuses every archive that
 [another program could read differently](files.md#archives). crossfield shows only what it has checked.
 """
