@@ -117,3 +117,32 @@ def pytest_testnodedown(node):
 def pytest_terminal_summary(terminalreporter, config):
     for reason, count in sorted(config.stash.get(LEFT_OUT, {}).items()):
         terminalreporter.write_line(f"LEFT OUT [{count}] {reason}")
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A headless Chromium; its logs are kept."""
+    from oracles import browser as browser_program
+    from selenium import webdriver
+
+    driver = shutil.which("chromedriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser_program()
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=driver))
+    yield browser
+    browser.quit()
+
+
+@pytest.fixture
+def browser(chromium):
+    """The browser as a desktop in light mode, with a fresh page and empty logs."""
+    from browsing import show
+
+    show(chromium)
+    chromium.get("about:blank")
+    for log in ("browser", "performance"):
+        chromium.get_log(log)
+    return chromium

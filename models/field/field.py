@@ -124,7 +124,8 @@ class CrossField(Pictured):
         The lines need not be at right angles. Turns by pi and the order of the two lines do not matter: the
         label is the one in the window of the instance's gauge. Under `strokes` its u is the line nearer to
         the stroke. Under `box` it may be the other line, whose distance the energy then counts
-        (docs/mathematics.md, 4). Crosses stay as they are; both lines may coincide, with |beta| = pi/4.
+        (docs/mathematics.md, 4). Crosses stay as they are; both lines may coincide, where
+        abs(beta) = pi/4.
 
         Parameters
         ----------
@@ -202,8 +203,8 @@ class CrossField(Pictured):
     def energy(self, norm: Norm = 2) -> Energy:
         """The energy with squares (2) or absolute values (1) throughout, as three sums and their total.
 
-        2 sum (|A| + |B|) over pairs, w_strokes sum w |R| over stroke pixels, w_beta sum |beta| over pixels,
-        or all of them squared (docs/mathematics.md, 5).
+        The sums run over 2 (abs(A) + abs(B)) of each pair, w_strokes w abs(R) of each stroke pixel, and
+        w_beta abs(beta) of each pixel, or over all of these squared (docs/mathematics.md, 5).
         """
         instance = self.instance
         size = np.abs if norm == 1 else np.square

@@ -32,19 +32,34 @@ _DECIMALS: Final = 9  # of line angles in quarter turns: rounding errors must no
 
 @one_thread()
 def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float | None = None) -> CrossField:
-    """The crosses of the smoothest polynomials, of any angle between their lines, with the best jumps.
+    """Field of the smoothest polynomials whose roots are the lines, with the best jumps.
 
-    X0, X1 minimise 2 (|X0_i - X0_j|^2 + |X1_i - X1_j|^2) over pairs, hold w |s^2 + X1 s + X0|^2 over strokes,
-    where s = exp(2 i theta) should be a root, and w_beta |X1|^2 over pixels, which prefers right angles where
-    nothing else counts. Near a right-angled cross along the stroke this is 16 times the energy of
-    docs/mathematics.md, 5, with hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels
-    are then moved into the windows of the instance (docs/mathematics.md, 10).
+    The two lines of a cross may have any angle. The coefficients X0, X1 of s^2 + X1 s + X0 minimise a sum of
 
-    hold: factor of the stroke weights, above 0. Strokes are soft, because instances weigh them. Among
-    `HOLDS`, after the best angles for the jumps, a loose hold has the lowest energy on most drawings: there
-    strokes contradict each other, and a hard hold makes singularities between them. A hard hold has the
-    lowest energy on clean curves that cross. tolerance: relative residual of the polynomials, solved without
-    a factorisation in a third of the time; None: solve exactly.
+    - 2 (abs(X0_i - X0_j)^2 + abs(X1_i - X1_j)^2) over pairs,
+    - hold w abs(s^2 + X1 s + X0)^2 over strokes, where s = exp(2 i theta) should be a root,
+    - w_beta abs(X1)^2 over pixels, which prefers right angles where nothing else counts.
+
+    Near a right-angled cross along the stroke this is 16 times the energy of docs/mathematics.md, 5, with
+    hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels are moved into the windows
+    of the instance (docs/mathematics.md, 10).
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    hold
+        Factor of the stroke weights, above 0. A small factor gives the lowest energy on most drawings, whose
+        strokes contradict each other. A large one gives the lowest energy on clean curves that cross.
+    tolerance
+        Relative residual of the polynomials, which are then solved without a factorisation in a third of the
+        time. None: solve exactly.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
     """
     found = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*found))

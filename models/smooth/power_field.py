@@ -17,12 +17,22 @@ from .systems import factored, one_thread, smoothness, stroke_weight
 
 @one_thread()
 def power_field(instance: Instance) -> CrossField:
-    """The orthogonal crosses of the harmonic extension of exp(4 i theta), with the best jumps.
+    """Field of orthogonal crosses from the harmonic extension of exp(4 i theta), with the best jumps.
 
-    z minimises 2 |z_i - z_j|^2 over pairs and w |z - exp(4 i theta)|^2 over strokes; alpha =
-    arg(z)/4 and beta = 0.
-    Parts without a stroke get alpha = 0. Labels are then moved into the windows of the instance
-    (docs/mathematics.md, 10).
+    The complex numbers z minimise the sum of 2 abs(z_i - z_j)^2 over pairs and of w abs(z - exp(4 i theta))^2
+    over strokes. Then alpha = arg(z) / 4 and beta = 0; parts without a stroke get alpha = 0. Labels are moved
+    into the windows of the instance (docs/mathematics.md, 10).
+
+    Parameters
+    ----------
+    instance
+        The instance.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
     """
     grid = instance.grid
     strokes, theta = instance.stroke_terms, instance.theta

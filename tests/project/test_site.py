@@ -1,0 +1,70 @@
+"""The documentation site is built without a warning, and works in a browser without a network."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import places
+import pytest
+from browsing import find, served, show, sideways
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    pytest.importorskip("sphinx", reason="sphinx is not installed: pip install '.[docs]'")
+    folder = tmp_path_factory.mktemp("documentation")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-d", str(folder / "doctrees")]
+    subprocess.run([*command, str(places.ROOT / "docs"), str(folder / "site")], check=True)
+    return folder / "site"
+
+
+def test_no_page_loads_anything_from_elsewhere(site):
+    loaded = re.compile(r"<(?:script|img|iframe|link rel=\"stylesheet\")[^>]*(?:src|href)=\"(?:https?:)?//")
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 20
+    assert [page.name for page in pages if loaded.search(page.read_text(encoding="utf-8"))] == []
+
+
+def test_every_command_and_its_options_are_listed(site):
+    page = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    shown = subprocess.run(
+        [sys.executable, "-m", "crossfield", "prove", "--help"], check=True, capture_output=True, text=True
+    ).stdout
+    options = set(re.findall(r"(--[a-z-]+)", shown)) - {"--help"}
+    assert len(options) > 10
+    section = page.partition('id="crossfield-prove"')[2].partition("<section")[0]
+    assert {option for option in options if option not in section} == set()
+    assert "crossfield library submit" in page
+    assert not re.search(r"\{[a-z ]+\}", re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL))
+
+
+@pytest.fixture
+def address(site):
+    with served(site) as found:
+        yield found
+
+
+def test_formulas_are_shown(browser, address):
+    browser.get(f"{address}/mathematics.html")
+    sizes = browser.execute_script(
+        "return [...document.querySelectorAll('math')].map(each => each.getBoundingClientRect().height)"
+    )
+    assert len(sizes) > 100
+    assert min(sizes) > 4
+
+
+def test_a_search_finds_a_page(browser, address):
+    browser.get(f"{address}/search.html?q=troubleshooting")
+    browser.implicitly_wait(10)
+    assert "Troubleshooting" in find(browser, "ul.search li a").text
+
+
+@pytest.mark.parametrize("page", ["index", "tutorials/drawing", "guides/solvers", "reference/api"])
+def test_a_phone_shows_a_page_without_scrolling_sideways(browser, address, page):
+    show(browser, width=390, height=844)
+    browser.get(f"{address}/{page}.html")
+    assert sideways(browser)[0] == [390, 390]
