@@ -48,19 +48,50 @@ _RETIRED: Final = {
 
 
 def write_instance(instance: Instance, path: str | Path) -> Path:
-    """Write the instance and return the path: NumPy's .npz if the name has this suffix, otherwise JSON.
+    """Write an instance. Equal instances give equal bytes.
 
-    Equal instances give equal bytes. Raises OutputError.
+    Parameters
+    ----------
+    instance
+        The instance.
+    path
+        File to write: NumPy's .npz if the name has this suffix, otherwise JSON.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+
     """
     path = Path(path)
     return write_bytes(path, _npz(instance) if path.suffix.lower() == ".npz" else to_json(instance).encode())
 
 
 def read_instance(path: str | Path) -> Instance:
-    """Read an instance from a .json or .npz file.
+    """Read an instance.
 
-    Raises InputError when the file cannot be read and InstanceError, with file and place, when it breaks the
-    schema.
+    Parameters
+    ----------
+    path
+        A .json or .npz file that `write_instance` wrote.
+
+    Returns
+    -------
+    Instance
+        The instance.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    InstanceError
+        If it breaks the schema; the message names the place.
+
     """
     data = read_bytes(path, MAX_ARCHIVE)
     with naming(path):

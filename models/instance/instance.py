@@ -99,27 +99,44 @@ def _reliabilities(w: Floats) -> Floats:
 class Instance(Pictured):
     """A mask with stroke directions on some of its pixels, and the weights of the energy.
 
-    name: lower-case letters, digits and underscores, a letter first, at most 32 characters.
-    mask: bool [height, width], row 0 at the top; True = solve for this pixel.
-    stroke_pixels: int (s, 2), [row, column] of each stroke pixel, inside the mask, sorted, each once.
-    theta: float (s,), stroke directions in radians, counter-clockwise from +x with y up; taken modulo pi and
-    rounded to 12 decimals. Within 1e-8 of the horizontal it is 0: readers of the files would drop such small
-    costs.
-    w: float (s,), reliability of each direction in (0, 1]; above 1e-3 rounded to 12 decimals.
-    stroke_coefficient, skew_coefficient: coefficients w_strokes and w_beta of the energy (1 and 1e-6), at
-    most 1e6, because rounding errors of a larger term would hide the others. They count per pixel;
-    `with_weights` takes weights that mean the same on every grid.
-    gauge: the window of length pi/2 that holds alpha: `strokes` (exact) or `box` (as printed in (1)).
-    source: origin of the sketch, one line of text.
-    pixel_size: side of a pixel in units of the sketch; origin: sketch coordinates (x, y) of the top left
-    corner of pixel [0, 0], with y downwards as in sketches. Both are rounded to 12 digits; pixel_size is in
-    [1e-100, 1e100], origin at most 1e100.
-    reading: messages from the reader of its drawing, such as warnings; None for other origins.
+    It is frozen and validated. Rounding makes instances, and so their hashes, equal on processors that differ
+    in the last digit. Rounding is idempotent. See docs/mathematics.md, 1 and 4.
 
-    Rounding makes instances, and so their hashes, equal on processors that differ in the last digit. Rounding
-    is idempotent.
+    Parameters
+    ----------
+    name
+        At most 32 lower-case letters, digits and underscores, a letter first.
+    mask
+        Pixels to solve for, bool (height, width), row 0 at the top.
+    stroke_pixels
+        Row and column of each stroke pixel, int (s, 2), inside the mask, sorted, each once.
+    theta
+        Stroke directions, float (s,), in radians counter-clockwise from +x with y up. Stored modulo pi,
+        rounded to 12 decimals, and as 0 within 1e-8 of the horizontal, because readers of files drop such
+        small costs.
+    w
+        Reliability of each direction, float (s,), in (0, 1]; above 1e-3 rounded to 12 decimals.
+    stroke_coefficient, skew_coefficient
+        Coefficients w_strokes and w_beta of the energy per pixel, 0 to 1e6. `with_weights` takes weights that
+        mean the same on every grid.
+    gauge
+        Window of length pi/2 that contains alpha: `strokes` (exact), or `box` as printed in (1).
+    source
+        Origin of the sketch, one line of text.
+    pixel_size
+        Side of a pixel in units of the sketch, 1e-100 to 1e100, rounded to 12 digits.
+    origin
+        Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards, rounded to 12 digits.
+    reading
+        Messages from the reader of its drawing, such as warnings; None for other origins.
 
-    Raises InstanceError when a rule is broken. See docs/mathematics.md, 1 and 4.
+    Raises
+    ------
+    NoStrokeError
+        For a mask without pixels, and for no stroke pixel.
+    InstanceError
+        For a value that breaks a rule.
+
     """
 
     name: str
@@ -272,17 +289,30 @@ class Instance(Pictured):
         return np.ceil(-2 * d_lo / np.pi - _SLACK).astype(np.int32)
 
     def with_gauge(self, gauge: Gauge) -> Instance:
-        """The same instance under another gauge."""
+        """Return the same instance under another gauge. Raises InstanceError for an unknown one."""
         return replace(self, gauge=gauge)
 
     def with_weights(
         self, *, stroke_weight: float | None = None, skew_weight: float | None = None
     ) -> Instance:
-        """The same instance under other weights, which mean the same on every grid (docs/weights.md).
+        """Return the same instance under other weights, which mean the same on every grid (docs/weights.md).
 
-        stroke_weight, skew_weight: the coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On
-        another grid the coefficients are stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a
-        weight. Raises InstanceError for a weight or coefficient out of range.
+        Parameters
+        ----------
+        stroke_weight, skew_weight
+            The coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On another grid they are
+            stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a weight.
+
+        Returns
+        -------
+        Instance
+            The instance.
+
+        Raises
+        ------
+        InstanceError
+            For a weight or coefficient out of range.
+
         """
         changed: dict[str, Any] = {}
         for weight, given, coefficient in (
@@ -305,9 +335,25 @@ class Instance(Pictured):
         return skew_weight(self.skew_coefficient, max(self.mask.shape))
 
     def with_strokes(self, kept: Bools, mask: Bools | None = None) -> Instance:
-        """The same instance with only those stroke pixels, shape (s,).
+        """Return the same instance with a part of its strokes.
 
-        mask: another mask; the same by default. Raises InstanceError.
+        Parameters
+        ----------
+        kept
+            Stroke pixels to keep, bool (s,).
+        mask
+            Another mask; by default the same.
+
+        Returns
+        -------
+        Instance
+            The instance.
+
+        Raises
+        ------
+        InstanceError
+            If no stroke is left, or one lies outside the mask.
+
         """
         return replace(
             self,

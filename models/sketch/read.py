@@ -91,25 +91,51 @@ def read_sketch(
     curvature: Iterable[str] = (),
     view: str | None = None,
 ) -> Instance:
-    """Read the instance of a sketch: an SVG drawing, a bitmap, a .scap or .curves file, detected by content.
+    """Read a sketch as an instance: an SVG drawing, a bitmap, a .scap or a .curves file, detected by content.
 
-    size: pixels on the longer side of the grid, 1..4096. Without a mask the grid is the drawing with a margin
-    of 4 %, at least one pixel, and the field is solved inside the drawing's outline (`inside_outline`),
-    in the parts that contain curvature lines; an open drawing gets the whole rectangle.
-    mask: a picture of the bitmap's size in pixels, or of the page's size rounded for vector sketches
-    (viewBox; the declared size of a .scap): white = solve. The grid is then the white part; a pixel counts
-    from half its area on.
-    gauge: as in Instance. name: the instance's name; by default made from the file name.
-    stroke_weight, skew_weight: weights of the stroke and the skew term that mean the same on every grid, as
-    in `Instance.with_weights`; their defaults are 20 and 1e-6 (docs/weights.md).
-    silhouette: "outer": curvature lines, or parts of them, that run along the outline carry no direction
-    (`along_outline`). curvature: labels of the strokes that are curvature lines, the others cut the field:
-    colour=, class=, id=, layer= (SVG), cluster= (.scap). view: of a .curves file, as in `read_curves`.
+    Directions within a pixel are averaged by the double angle. The reliability w is min(1, length in the
+    pixel / pixel side) R, where R is the length of the mean double-angle vector. Pixels with a small w, or
+    with R below 1/2 as at crossings, have no direction.
 
-    Directions are averaged by the double angle; w = min(1, length in the pixel / pixel side) * R with R the
-    length of the mean double-angle vector. Pixels with w < LEAST_WEIGHT or R < LEAST_R (crossings) carry
-    no direction. Raises InputError, with the file, for unusable input, and InstanceError for a weight
-    out of range.
+    Parameters
+    ----------
+    path
+        The sketch.
+    size
+        Pixels on the longer side of the grid, 1 to 4096.
+    mask
+        Picture that is white where the field is wanted, of the size of the bitmap or page. The grid is then
+        the white part, and a pixel belongs to it from half of its area on. By default the grid is the drawing
+        with a margin of 4 %, and the mask its inside; an open drawing has the whole rectangle.
+    gauge
+        Window of alpha, as in `Instance`.
+    name
+        Name of the instance; by default made from the file name.
+    stroke_weight, skew_weight
+        Weights that mean the same on every grid, as in `Instance.with_weights`.
+    silhouette
+        With `outer`, curvature lines along the outline have no direction.
+    curvature
+        Labels of the strokes that are curvature lines, such as `colour=red`, `class=flow`, `id=group2`,
+        `layer=Flow` (SVG) or `cluster=3` (.scap). The others cut the field.
+    view
+        Viewpoint of a .curves file: `front`, `side`, `top`, or azimuth and elevation in degrees, as in
+        `30,25`.
+
+    Returns
+    -------
+    Instance
+        The instance. Its `reading.warnings` are doubts about the drawing.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be used, and for an option out of range.
+    NoStrokeError
+        If no stroke or no pixel is left on the grid.
+    InstanceError
+        For a weight out of range.
+
     """
     path = Path(path)
     check_size(size)

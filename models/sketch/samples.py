@@ -67,7 +67,7 @@ SAMPLES: Final[dict[str, Sample]] = {
 
 
 def samples() -> list[Sample]:
-    """Name, kind and description of every built-in sample, in the order of the table."""
+    """Names, kinds and descriptions of the built-in samples, in the order of the table."""
     return list(SAMPLES.values())
 
 
@@ -80,12 +80,33 @@ def sample(
     skew_weight: float = SKEW_WEIGHT,
     silhouette: Silhouette = "none",
 ) -> Instance:
-    """The instance of a built-in sample on a grid whose longer side has `size` pixels.
+    """Instance of a built-in sample.
 
-    name: a name in `samples()`; size: 1..4096; gauge: as in Instance; stroke_weight, skew_weight: as in
-    `Instance.with_weights`; silhouette: as in `read_sketch`, of a drawn sample. For the exact answer of an
-    analytic one see `analytic`. Raises InputError for an unknown name or size, InstanceError for a weight
-    out of range.
+    Parameters
+    ----------
+    name
+        A name in `samples()`.
+    size
+        Pixels on the longer side of the grid, 1 to 4096.
+    gauge
+        Window of alpha, as in `Instance`.
+    stroke_weight, skew_weight
+        Weights that mean the same on every grid, as in `Instance.with_weights`.
+    silhouette
+        `outer` or `none`, as in `read_sketch`; only for drawn samples.
+
+    Returns
+    -------
+    Instance
+        The instance. `analytic` also returns the exact answer of a computed sample.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, and for a size out of range.
+    InstanceError
+        For a weight out of range.
+
     """
     check_size(size)
     choice = Choice(silhouette)

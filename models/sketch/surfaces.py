@@ -212,14 +212,36 @@ def analytic(
     stroke_weight: float = STROKE_WEIGHT,
     skew_weight: float = SKEW_WEIGHT,
 ) -> AnalyticInstance:
-    """The instance of a surface on a grid whose longer side has `size` pixels, with its exact answer.
+    """Instance of a computed surface, with its exact answer.
 
-    A pixel belongs to the mask when its centre lies on the patch (its largest connected part). Strokes are
+    A pixel belongs to the mask if its centre lies on the largest connected part of the patch. Strokes are
     evenly parametrised curvature lines of both families. Their number brings the share of stroke pixels as
-    close as possible to the surface's `share`; their theta is exact at the pixel's centre, their w as for
-    drawn strokes. name: of a sample whose kind is `analytic`; size: 1..4096 pixels; gauge: as in Instance;
-    stroke_weight, skew_weight: as in `Instance.with_weights`. Raises InputError for an unknown name or size,
-    InstanceError for a weight out of range.
+    close as possible to the surface's `share`. Their theta is exact at the pixel's centre, and their w that
+    of drawn strokes.
+
+    Parameters
+    ----------
+    name
+        A name in `samples()` whose kind is `analytic`.
+    size
+        Pixels on the longer side of the grid, 1 to 4096.
+    gauge
+        Window of alpha, as in `Instance`.
+    stroke_weight, skew_weight
+        Weights that mean the same on every grid, as in `Instance.with_weights`.
+
+    Returns
+    -------
+    AnalyticInstance
+        The instance, and the exact angles of both lines at every pixel.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, and for a size out of range.
+    InstanceError
+        For a weight out of range.
+
     """
     if name not in SURFACES:
         raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")

@@ -22,11 +22,17 @@ _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
 
 @dataclass(frozen=True)
 class Hint:
-    """The normal of the surface at a pixel.
+    """Normal of the surface at a pixel.
 
-    row, column: of the pixel. slant: angle between the normal and the direction to the viewer, in
-    [0, pi/2) radians. tilt: direction in which the normal leans in the picture, in radians counter-clockwise
-    from +x with y up.
+    Parameters
+    ----------
+    row, column
+        The pixel.
+    slant
+        Angle between the normal and the direction to the viewer, in [0, pi/2) radians.
+    tilt
+        Direction in which the normal leans in the picture, in radians counter-clockwise from +x with y up.
+
     """
 
     row: int

@@ -18,15 +18,26 @@ from ..previews import Pictured
 
 @dataclass(frozen=True, eq=False)
 class Surface(Pictured):
-    """The heights that a cross field was lifted to, and how far they can be trusted.
+    """Heights that a cross field was lifted to, and how far they can be trusted.
 
-    field: the cross field, its pixels in the order of `instance.grid`. heights: float (height + 1, width + 1)
-    at the corners of pixels, [0, 0] the upper left one, in pixels; NaN at a corner of no pixel of the mask.
-    confidence: float (n,) in [0, 1], how well the equations hold at each pixel, which does not measure the
-    distance from the intended surface. doubts: sentences with reasons not to trust the surface;
-    empty if there are none. freedom: sentences that describe other surfaces with the same
-    crosses. firmness: change of the angles between its lines in space when its normals turn, in radians per
-    radian, where they change least (docs/surface.md); of the largest part of the mask.
+    Parameters
+    ----------
+    field
+        The cross field.
+    heights
+        Heights at the corners of pixels in pixels, float (height + 1, width + 1), [0, 0] at the upper left;
+        NaN at a corner of no pixel of the mask.
+    confidence
+        How well the equations hold at each pixel, float (n,) in [0, 1]. It does not measure the distance from
+        the intended surface.
+    doubts
+        Sentences with reasons not to trust the surface; empty if there are none.
+    freedom
+        Sentences that describe other surfaces with the same crosses.
+    firmness
+        Smallest change of the angles between the lines in space when the normals turn, in radians per radian,
+        of the largest part of the mask (docs/surface.md).
+
     """
 
     field: CrossField
