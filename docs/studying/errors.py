@@ -64,7 +64,12 @@ class Change:
         return abs(self.mean) > 2 * self.error
 
     def __str__(self) -> str:
-        return f"{self.mean:+.2f} +- {self.error:.2f}"
+        return f"{self.mean:+.2f} ± {self.error:.2f}"
+
+    @property
+    def range(self) -> str:
+        """The interval of two standard errors around the mean, of 95 % confidence."""
+        return f"{self.mean - 2 * self.error:+.1f} to {self.mean + 2 * self.error:+.1f}"
 
 
 def change(rows: Iterable[Row], before: Kind, after: Kind) -> Change | None:

@@ -11,7 +11,7 @@ from make import generated
 
 from . import errors, practice_page, quality_page, solver_page
 from .instances import surfaces
-from .plan import Plan, stages
+from .plan import FULL, Plan, stages
 from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
 from .rows import read as read_rows
 from .solver_page import percent
@@ -63,9 +63,12 @@ def completeness(kept: Kept, plan: Plan) -> str:
 def answers(kept: Kept) -> dict[str, list[str]]:
     """The answers in plain words: sentences by question, the most important one first."""
     return {
-        "Can they be solved?": solvable(kept),
-        "Does it matter?": matters(kept),
-        "What to use?": practice_page.recommendation(kept),
+        "Can solvers prove optima?": solvable(kept),
+        "Do lower energies give better fields?": matters(kept),
+        "Which method should be used?": [
+            quality_page.by_others("polyvector", "bend"),
+            *practice_page.recommendation(kept),
+        ],
     }
 
 
@@ -95,18 +98,22 @@ def solvable(kept: Kept) -> list[str]:
     reach = found["reach"]
     last = max((size for of in free.values() for size, rung in of.items() if rung.tried), default=0)
     if reach is None:
-        text = "No solver proves half of the instances of any size."
+        text = "no solver proves half of the instances of any size."
     elif reach[0] == last:
-        text = f"Half of the instances or more at every size that is measured, up to {last} pixels a side."
+        text = f"a solver proves at least half of the instances at every size, up to {last} pixels per side."
     else:
-        text = f"Only on small grids: {reach[0]} pixels a side is the most of which a solver proves half."
+        text = f"a solver proves half of the instances up to {reach[0]} pixels per side."
     sentences = (
-        text,
-        f"From a file, the best pair of formulation and solver proves {', '.join(parts)}.",
-        f"`prove`, which uses what is special about the problem, proves {', '.join(ours)}.",
+        f"{HOW}, {text}",
+        f"The best pair of formulation and solver proves {', '.join(parts)}.",
+        f"`prove`, which is made for this problem, proves {', '.join(ours)}.",
         found["helped"],
     )
     return list(filter(None, sentences))
+
+
+HOW: Final = f"In {FULL.limit:g} s per run, on one thread, from a cold start and with free editions"
+"""The conditions under which solvers ran."""
 
 
 def matters(kept: Kept) -> list[str]:
@@ -117,23 +124,22 @@ def matters(kept: Kept) -> list[str]:
         return ["Not measured yet."]
     before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
     mean = percent(float(np.mean(before or [0.0])))
-    if not optimum.sure:
-        verdict = "No: the error to hidden curves does not change beyond chance"
-    else:
-        verdict = f"{'It does harm' if optimum.mean > 0 else 'Yes'}: the error to hidden curves changes"
-    text = (
-        f"{verdict}, by {optimum} degrees, from the greedy field, whose energy is {mean} above the optimum "
-        "on average where that is proven, to the best field that is found."
-    )
     others = quality_page.elsewhere()
-    there = f"On {others.drawings} drawings, {others.others} by others, it is {others.changes[PROOF]}."
+    there = others.changes[PROOF]
+    verdict = "" if optimum.sure or there.sure else "No effect was found, and large ones are excluded. "
+    text = (
+        f"{verdict}From the greedy field to the best one found, the mean error at hidden curves changes by "
+        f"{there} degrees on {others.drawings} drawings, {others.others} of them by others (95 % interval "
+        f"{there.range}), and by {optimum} degrees on the study's own ({optimum.range})."
+    )
+    about = f"The greedy field's energy is {mean} above the proven optimum on average."
     sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
-    last = "Nothing that was tried lowers the error to hidden curves beyond chance."
+    last = "No change that was tried lowers the error at hidden curves by more than two standard errors."
     if sure:
         most = sorted(sure, key=lambda name: sure[name].mean)[:3]
         words = "; ".join(f"{quality_page.CHANGES[name][0]} ({sure[name]})" for name in most)
-        last = f"What lowers the error to hidden curves, in degrees: {words}."
-    return [*filter(None, (text, there, quality_page.harmless(kept["quality"]))), last]
+        last = f"These changes lower the error at hidden curves, in degrees: {words}."
+    return [*filter(None, (text, about, quality_page.harmless(kept["quality"]))), last]
 
 
 def threats(kept: Kept) -> str:
@@ -159,7 +165,7 @@ def page(kept: Kept, plan: Plan) -> str:
     """The text of the page."""
     kept = ordered(kept, plan)
     parts = [
-        "# Of what practical use?",
+        "# Are the formulations useful in practice?",
         generated(COMMAND),
         QUESTION,
         paragraphs(answers(kept)),
@@ -180,5 +186,5 @@ def write_page(data: Path, target: Path, plan: Plan) -> None:
 
 
 def in_short(kept: Kept, plan: Plan) -> str:
-    """The first sentence of each answer, for the index of all pages."""
-    return paragraphs(answers(ordered(kept, plan)), most=1)
+    """The first two sentences of each answer, for the index of all pages."""
+    return paragraphs(answers(ordered(kept, plan)), most=2)

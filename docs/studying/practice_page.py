@@ -62,7 +62,7 @@ class Fare:
     def cells(self) -> list[str]:
         """Its cells of the table."""
         mean = "" if self.error is None else f"{self.error.mean:.1f}"
-        spread = "" if self.error is None or self.error.error is None else f" +- {self.error.error:.1f}"
+        spread = "" if self.error is None or self.error.error is None else f" ± {self.error.error:.1f}"
         notes = [f"{self.failed} without a field"] * bool(self.failed)
         notes += [f"{self.optimal} proven optimal"] * bool(self.optimal)
         return [
@@ -133,14 +133,14 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
         return f"No way that takes {QUICK:g} s or less is measured yet."
     mean = float(np.mean([_error(found, size, way) for size, way in best.items()]))
     text = (
-        f"While drawing, take {_grouped(best)}: of the ways that take {QUICK:g} s or less there it comes "
-        f"nearest to hidden curves, {mean:.1f} degrees on average"
+        f"On the study's own drawings, use {_grouped(best)} while drawing: of the methods that take {QUICK:g} "
+        f"s or less, it has the smallest mean error at hidden curves, {mean:.1f} degrees on average"
     )
     others = [way for ways in order.values() for way in ways[1:2]]
     if others:
         second = max(set(others), key=lambda way: (others.count(way), way))
         at = [size for size, way in best.items() if way != second and second in order[size]]
-        text += f" ({_paired(rows, best, second, at)} beside `{second}`)"
+        text += f" ({_paired(rows, best, second, at)} compared with `{second}`)"
     slower = {size: ranking(found[size], (QUICK, np.inf))[:1] for size in best}
     nearer = {
         s: way
@@ -151,10 +151,10 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
     ahead = [
         f"`{nearer[size]}` at {size} pixels ({_paired(rows, nearer, best[size], [size])})" for size in nearer
     ]
-    text += f"; slower, {', '.join(ahead)} comes nearer" if ahead else "; no slower way comes nearer there"
+    text += f"; among slower ones, {', '.join(ahead)} is better" if ahead else "; no slower method is better"
     none = {size: way for size in found if size not in best for way in ranking(found[size])[:1]}
     rest = [
-        f"at {s} pixels, where none is as quick, `{way}` does in {found[s][way].seconds:.2g} s"
+        f"at {s} pixels, where all take longer, it is `{way}` with {found[s][way].seconds:.2g} s"
         for s, way in none.items()
     ]
     return f"{'; '.join([text, *rest])}."
@@ -195,23 +195,23 @@ def _for_energy(found: Fares) -> str:
         for way, fare in ways.items()
         if way.startswith("prove") and fare.optimal
     ]
-    text = f"For the least energy take {_grouped(best)}"
-    return f"{text}; `prove` shows {', '.join(proven)} to be optimal in its time." if proven else f"{text}."
+    text = f"For the lowest energy, use {_grouped(best)}"
+    return f"{text}; `prove` proves {', '.join(proven)} optimal within its time." if proven else f"{text}."
 
 
 def _for_solvers(kept: Kept) -> str:
     reach = solver_page.facts_in_short(kept)["reach"]
     if reach is None:
-        return "No solver proves half of any rung from the file of a formulation with free jumps."
+        return "No solver proves half of the instances of any size from a file with free jumps."
     size, pair = reach
     text = (
-        "Hand files to solvers to prove optima of small grids and to compare solvers: the largest rung of "
-        f"which one proves half is that of {size} pixels ({solver_page.label(pair)})"
+        "Use solver files to prove optima on small grids and to compare solvers: the largest grid on which "
+        f"one proves half of the instances has {size} pixels per side ({solver_page.label(pair)})"
     )
     lower, tried = below_all_others(kept["practice"], MILP_WAY)
     return (
-        f"{text}; the paper's two stages, begun at a field that is improved already, get below all other "
-        f"ways on {lower} of {tried} fields."
+        f"{text}. The paper's two stages, started from an improved field, find a lower energy than all other "
+        f"methods on {lower} of {tried} fields."
     )
 
 

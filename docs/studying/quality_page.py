@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
@@ -101,18 +101,39 @@ class Elsewhere:
         )
 
 
+def drawn_rows(facts: dict[str, Any], size: int) -> list[Row]:
+    """The rows of docs/fields.json at a size, one per hidden curve and method."""
+    return [
+        {"instance": row["drawing"], "size": size, "hidden": curve, "way": row["method"], "error": degrees}
+        for row in facts["rows"]["methods"]
+        if row["size"] == size
+        for curve, degrees in enumerate(row["degrees"])
+    ]
+
+
+@cache
+def by_others(before: str, after: str) -> str:
+    """Effect of a change of method on the drawings by others in docs/fields.json, at each of its sizes."""
+    facts = json.loads((DOCS / "fields.json").read_text())
+    parts, drawings = [], 0
+    for size in sorted({row["size"] for row in facts["rows"]["methods"]}):
+        rows = [row for row in drawn_rows(facts, size) if row["instance"] not in SAMPLES]
+        found = change(rows, lambda row: row["way"] == before, lambda row: row["way"] == after)
+        if found is not None:
+            drawings = max(drawings, found.drawings)
+            parts.append(f"{found} degrees at {size} pixels")
+    return (
+        f"On {drawings} drawings by others, `{after}` changes the mean error at hidden curves, compared with "
+        f"`{before}`, by {', '.join(parts)}."
+    )
+
+
 @cache
 def elsewhere() -> Elsewhere:
     """The changes on the drawings of docs/fields.json, at the size at which it has proofs."""
     facts = json.loads((DOCS / "fields.json").read_text())
-    kept = facts["rows"]["methods"]
-    size = max(row["size"] for row in kept if row["method"] == PROOF)
-    rows = [
-        {"instance": row["drawing"], "size": size, "hidden": curve, "way": row["method"], "error": degrees}
-        for row in kept
-        if row["size"] == size
-        for curve, degrees in enumerate(row["degrees"])
-    ]
+    size = max(row["size"] for row in facts["rows"]["methods"] if row["method"] == PROOF)
+    rows = drawn_rows(facts, size)
     names = {row["instance"] for row in rows}
     found = {
         way: change(rows, lambda row: row["way"] == "greedy", lambda row, way=way: row["way"] == way)
@@ -146,7 +167,7 @@ def ways_table(rows: list[Row]) -> str:
             part = [row for row, _ in mine if is_surface(row) == surfaces]
             mean = errors.mean_by_drawing(part, lambda row: row["error"])
             line.append(
-                "" if mean is None else f"{mean.mean:.1f}" + (f" +- {mean.error:.1f}" if mean.error else "")
+                "" if mean is None else f"{mean.mean:.1f}" + (f" ± {mean.error:.1f}" if mean.error else "")
             )
         cells.append(line)
     heads = (
@@ -177,7 +198,7 @@ def correlation_text(rows: list[Row]) -> str:
             mine = [(r, gap) for r, gap in errors.gaps(rows) if is_surface(r) == surfaces and gap <= most]
             found = errors.correlation(mine)
             if found is not None and found.error is not None:
-                parts.append(f"{found.mean:+.2f} +- {found.error:.2f} over {found.count} {words}, {which}")
+                parts.append(f"{found.mean:+.2f} ± {found.error:.2f} over {found.count} {words}, {which}")
     return (
         "Rank correlation of energy and error between the fields of one instance, 1 where less energy always "
         f"means less error: {'; '.join(parts)}."

@@ -173,7 +173,9 @@ def test_the_recommendation_follows_the_rows(study):
         kept = {"practice": list(practice_rows(study, ways)), "solvers": [], "proofs": []}
         texts.append(study.practice_page.recommendation(kept))
     assert [sentences[0].split("`")[1] for sentences in texts] == ["bend", "greedy"]
-    assert {sentences[1] for sentences in texts} == {"For the least energy take `search, 10 s` at 24 pixels."}
+    assert {sentences[1] for sentences in texts} == {
+        "For the lowest energy, use `search, 10 s` at 24 pixels."
+    }
     assert all(len(sentences) == 3 and "No solver proves half" in sentences[2] for sentences in texts)
     sizes = {
         24.0: {"bend": (3.0, 1.5, 0.1, 0.0), "greedy": (4.0, 1.2, 0.1, 0.0)} | slow,
@@ -183,7 +185,7 @@ def test_the_recommendation_follows_the_rows(study):
     rows = [row for size, ways in sizes.items() for row in practice_rows(study, ways, size)]
     first, second, _ = study.practice_page.recommendation({"practice": rows, "solvers": [], "proofs": []})
     assert all(each in first for each in ("`bend` at 24 pixels", "`greedy` at 48 pixels"))
-    assert second == "For the least energy take `search, 10 s` at 24, 48 and 128 pixels."
+    assert second == "For the lowest energy, use `search, 10 s` at 24, 48 and 128 pixels."
     nothing = {"practice": [], "solvers": [], "proofs": []}
     assert study.practice_page.recommendation(nothing) == ["The ways to a field are not measured yet."]
 
