@@ -133,7 +133,7 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
         return f"No way that takes {QUICK:g} s or less is measured yet."
     mean = float(np.mean([_error(found, size, way) for size, way in best.items()]))
     text = (
-        f"On the study's own drawings, use {_grouped(best)} while drawing: of the methods that take {QUICK:g} "
+        f"On the study's own drawings, use {_grouped(best)} while drawing: of methods that take {QUICK:g} "
         f"s or less, it has the smallest mean error at hidden curves, {mean:.1f} degrees on average"
     )
     others = [way for ways in order.values() for way in ways[1:2]]
