@@ -28,6 +28,7 @@ from ..surfaces.report import surface_facts
 from .compiling import compiling
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven
+from .run_page import PAGE, write_page
 from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
@@ -183,6 +184,7 @@ def run(
     - DIR/lowest.npz: the field of minimum 2-norm energy
     - DIR/mask.png: the pixels that are solved for, as read_sketch takes them; not for an instance from a file
     - DIR/certificate.npz: the certificate of the bound that is proven, with the field of the method `prove`
+    - DIR/index.html: a page that shows all of these
     - DIR/report.json: written last. Where it is, the run is complete, or it says what interrupted the run
 
     A method that fails is noted in the report; the fields that were found stand. Ctrl-C ends the present
@@ -263,13 +265,15 @@ def run(
         report = _shaded(report, folder, progress, over)
         watch.lap("surface")
     report = replace(report, stages=watch.stages)
-    write_bytes(folder / REPORT, (json.dumps(report.document(), indent=1, allow_nan=False) + "\n").encode())
+    document = report.document()
+    write_page(folder, document, report.manifests)
+    write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     return report
 
 
 def _clear(folder: Path) -> None:
     """Remove files of an earlier run that this run may not write."""
-    for stale in (REPORT, CERTIFICATE, MASK, LOWEST, SHADED, *OVERLAY, *map(_picture, PICTURES)):
+    for stale in (REPORT, PAGE, CERTIFICATE, MASK, LOWEST, SHADED, *OVERLAY, *map(_picture, PICTURES)):
         (folder / stale).unlink(missing_ok=True)
 
 

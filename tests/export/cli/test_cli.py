@@ -113,6 +113,7 @@ def test_a_tour_of_the_commands(tmp_path, crossfield):
 
 
 RUN_FILES = {
+    "index.html",
     "field.json", "field.npz", "field.obj", "field.rawfield", "field.sings", "lowest.npz", "report.json",
     "angle.png", "crosses.png", "field.png", "instance.png", "mask.png", "overview.png",
     "overlay.png", "overlay.svg",

@@ -1,0 +1,120 @@
+"""The page of a run: one HTML file that shows what its folder contains, without a network or a script."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any, Final
+
+from ...models.storage import read_bytes, write_bytes
+from ...templates import ENVIRONMENT
+from ..bundle.manifest import Manifest
+
+PAGE: Final = "index.html"
+_LAYERS: Final = (
+    ("drawing", True),
+    ("strokes", False),
+    ("crosses", False),
+    ("streamlines-u", True),
+    ("streamlines-v", True),
+    ("singularities", True),
+)
+"""Layers of overlay.svg, and whether they are shown at first."""
+_SOLVED: Final = {
+    "nl": ("bonmin models/{file} -AMPL", "models/{stem}.sol"),
+    "gms": ("gams models/{file} --RESULTS={answer}", "{stem}.csv"),
+    "lp": ('scip -c "read models/{file}" -c optimize -c "write solution {answer}" -c quit', "{stem}.lp.sol"),
+    "mps": ("gurobi_cl ResultFile={answer} models/{file}", "{stem}.mps.sol"),
+}
+"""The line that solves a file of each format, and the file of its answer."""
+_FILES: Final = {
+    "field.npz": "the field that is kept; also .json, and .rawfield with .obj and .sings",
+    "lowest.npz": "the field of lowest 2-norm energy",
+    "certificate.npz": "proof of the bound, for `crossfield prove --check`",
+    "overlay.svg": "the field in layers, in the coordinates of the drawing",
+    "overlay.png": "the same as a picture",
+    "overview.png": "strokes, crosses, streamlines and angle",
+    "field.png": "streamlines",
+    "crosses.png": "crosses",
+    "angle.png": "angle between the lines",
+    "instance.png": "strokes and mask",
+    "shaded.png": "the surface",
+    "mask.png": "the pixels that are solved for; paint it and give it back with --mask",
+    "report.json": "all facts",
+}
+
+
+def write_page(folder: Path, report: dict[str, Any], manifests: tuple[Manifest, ...]) -> None:
+    """Write the page of a run. report: the document of report.json. Raises InputError, OutputError."""
+    text = ENVIRONMENT.get_template("run/index.html.j2").render(
+        report=report,
+        seconds=f"{report['seconds']:.0f}",
+        bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
+        layers=[each for each in _LAYERS if each[0] != "drawing" or _has(folder / "overlay.svg", "drawing")],
+        overlay=_svg(folder / "overlay.svg"),
+        overview=_picture(folder / "overview.png"),
+        shaded=_picture(folder / "shaded.png"),
+        columns=_columns(report),
+        methods=[_row(report, facts) for facts in report["methods"]],
+        sets=[_set(manifest.document) for manifest in manifests],
+        files=[(name, meaning) for name, meaning in _FILES.items() if (folder / name).exists()],
+    )
+    write_bytes(folder / PAGE, text.encode())
+
+
+def _has(path: Path, layer: str) -> bool:
+    return f'id="{layer}"' in _svg(path)
+
+
+def _svg(path: Path) -> str:
+    """Our own SVG without its XML declaration; empty if it was not drawn."""
+    return read_bytes(path).decode().partition("?>\n")[2] if path.exists() else ""
+
+
+def _picture(path: Path) -> str:
+    """A PNG as the address that contains it; empty if it was not drawn."""
+    return f"data:image/png;base64,{b64encode(read_bytes(path)).decode()}" if path.exists() else ""
+
+
+def _columns(report: dict[str, Any]) -> list[str]:
+    gap = ["gap"] if report["proof"] else []
+    return ["method", "2-norm", *gap, "1-norm", "off strokes", "lines < 45°", "singularities", "seconds"]
+
+
+def _row(report: dict[str, Any], facts: dict[str, Any]) -> list[str]:
+    gap = ["optimal" if facts["proven_optimal"] else f"{facts['gap_2_norm']:.1%}"] if report["proof"] else []
+    return [
+        facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""),
+        f"{facts['energy_2_norm']:.4g}",
+        *gap,
+        f"{facts['energy_1_norm']:.4g}",
+        f"{facts['stroke_deviation_mean_degrees']:.1f}°",
+        f"{facts['lines_under_45_degrees']:.0%}",
+        str(facts["singularities"]),
+        f"{facts['seconds']:.1f}",
+    ]
+
+
+def _set(document: dict[str, Any]) -> dict[str, Any]:
+    """The model files of a formulation, each with the lines that solve it and read its answer."""
+    counts = document["counts"]
+    return {
+        "formulation": document["formulation"],
+        "kind": document["class"],
+        "columns": counts["columns"],
+        "rows": counts["rows"],
+        "files": [_file(each) for each in document["files"] if each["name"].endswith(f".{each['format']}")],
+        "refused": list(document["refused"].values()),
+    }
+
+
+def _file(file: dict[str, Any]) -> dict[str, Any]:
+    stem = file["name"].removesuffix(f".{file['format']}")
+    solve, answer = _SOLVED[file["format"]]
+    answer = answer.format(stem=stem)
+    return {
+        "name": file["name"],
+        "kilobytes": max(1, round(file["bytes"] / 1000)),
+        "solve": solve.format(file=file["name"], answer=answer),
+        "read": f"crossfield read {answer} --manifest models/{stem}.manifest.json -o {stem}.npz",
+    }
