@@ -129,10 +129,7 @@ def solve_command(
 
 @command("verify")
 def verify_command(
-    folder: Annotated[
-        Path,
-        typer.Argument(metavar="DIR|ARCHIVE", help="Folder, .zip or .tar (.gz, .bz2, .xz) of a library."),
-    ],
+    folder: Library,
     *,
     jobs: Processes = 1,
     quiet: Quiet = False,
@@ -162,7 +159,7 @@ def verify_command(
 def release_command(
     folder: Library,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write: .tar.gz or .zip.")
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Archive to write, a .tar.gz.")
     ],
     *,
     jobs: Processes = 1,
@@ -272,11 +269,11 @@ def _row(result: Submission) -> list[str]:
 @command("points")
 def points_command(
     folder: Library,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.zip", help="The archive.")],
+    output: Folder,
     *,
     quiet: Quiet = False,
 ) -> None:
-    """Write the points of a library: an archive of fields and certificates for a specification.
+    """Write the points of a library: a folder of fields and certificates for a specification.
 
     A build of a specification that names it does not search, and its bytes are the same on every processor.
     """

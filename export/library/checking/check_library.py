@@ -24,9 +24,16 @@ from ..building.entry_task import Entry
 from ..building.executor import executor
 from ..building.index import CERTIFICATES, CHECKER, SOLU, SUMS, TEXTS, general
 from ..building.inputs import Inputs
-from ..documents.archive import opened
 from ..documents.citation import cited
-from ..documents.documents import INDEX, Library, about_file, read_about, read_library, read_sidecar
+from ..documents.documents import (
+    INDEX,
+    Library,
+    about_file,
+    folder_of,
+    read_about,
+    read_library,
+    read_sidecar,
+)
 from ..documents.lock import FILE as LOCK
 from ..documents.lock import unchanged
 from ..ledger.given import points_of
@@ -50,16 +57,16 @@ _SUM: Final = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Finding]:
-    """Return the findings about a library in a folder or an archive; an empty list if it is sound.
+    """Return the findings about a library in a folder; an empty list if it is sound.
 
     jobs: processes; progress: called with a line per step. The folder is locked during the work.
     Raises InputError without a library, OutputError if another process holds the lock for too long.
     """
-    with opened(folder) as place:
-        if not (place / INDEX).is_file() and not (place / SUMS).is_file():
-            raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
-        with unchanged(place, "a verification of the library", progress):
-            return list(findings_in(place, jobs=jobs, progress=progress))
+    place = folder_of(folder)
+    if not (place / INDEX).is_file() and not (place / SUMS).is_file():
+        raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
+    with unchanged(place, "a verification of the library", progress):
+        return list(findings_in(place, jobs=jobs, progress=progress))
 
 
 def findings_in(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Iterator[Finding]:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import gzip
 import io
 import tarfile
-import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Final
@@ -24,14 +23,11 @@ from ..documents.documents import Library, read_library
 from ..documents.lock import unchanged
 from .check_library import findings_in
 
-_TIME: Final = (1980, 1, 1, 0, 0, 0)
-"""The time of every file, the earliest that a .zip can hold."""
-_SECONDS: Final = 315532800  # the same in Unix time
+_SUFFIX: Final = ".tar.gz"
+_SECONDS: Final = 315532800  # of every file: the beginning of 1980 in Unix time
 _MODE: Final = 0o644
 _LEVEL: Final = 9
 _LONGEST: Final = 60  # characters of a folder's name that come from the title
-
-Members = Iterable[tuple[str, bytes]]
 
 
 @dataclass(frozen=True)
@@ -51,14 +47,15 @@ class Frozen:
 def release_library(
     folder: str | Path, output: str | Path, *, jobs: int = 1, progress: Progress = silent
 ) -> Frozen:
-    """Write the release of a library as a .tar.gz or .zip, with its checksum beside it.
+    """Write the release of a library as a .tar.gz, with its checksum in a second file.
 
     jobs: processes that verify it first. The library is locked during the work. Raises InputError for another
     suffix, for a library that states no version and day, and for one that does not verify; OutputError where
     nothing can be written.
     """
     folder, output = Path(folder), Path(output)
-    pack = _packer(output)
+    if not output.name.lower().endswith(_SUFFIX):
+        raise InputError(f"is no name of a release; let it end in {_SUFFIX}", file=output)
     if output.resolve().is_relative_to(folder.resolve()):
         raise OutputError("lies inside the library, whose files are its own; choose another", file=output)
     with unchanged(folder, "a release of the library", progress):
@@ -68,17 +65,10 @@ def release_library(
         progress(f"{len(names)} files")
         make_folder(output.parent)
         with replacing(output) as stream:
-            pack(stream, ((f"{top}/{name}", read_bytes(folder / name)) for name in sorted(names)))
+            _pack(stream, ((f"{top}/{name}", read_bytes(folder / name)) for name in sorted(names)))
     frozen = Frozen(output, sha256_of(output), len(names))
     write_bytes(frozen.sum_file, f"{frozen.sha256}  {output.name}\n".encode())
     return frozen
-
-
-def _packer(output: Path) -> Callable[[IO[bytes], Members], None]:
-    for suffix, pack in _KINDS.items():
-        if output.name.lower().endswith(suffix):
-            return pack
-    raise InputError(f"is no name of an archive; let it end in {' or '.join(_KINDS)}", file=output)
 
 
 def _top(library: Library) -> str:
@@ -102,7 +92,7 @@ def _check(folder: Path, jobs: int, progress: Progress) -> None:
         )
 
 
-def _tar(stream: IO[bytes], members: Members) -> None:
+def _pack(stream: IO[bytes], members: Iterable[tuple[str, bytes]]) -> None:
     with (
         gzip.GzipFile("", "wb", _LEVEL, stream, mtime=0) as packed,
         tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive,
@@ -111,14 +101,3 @@ def _tar(stream: IO[bytes], members: Members) -> None:
             entry = tarfile.TarInfo(name)
             entry.size, entry.mode, entry.mtime = len(data), _MODE, _SECONDS
             archive.addfile(entry, io.BytesIO(data))
-
-
-def _zip(stream: IO[bytes], members: Members) -> None:
-    with zipfile.ZipFile(stream, "w") as archive:
-        for name, data in members:
-            entry = zipfile.ZipInfo(name, _TIME)
-            entry.create_system, entry.external_attr = 3, _MODE << 16  # Unix, whatever the system is
-            archive.writestr(entry, data, zipfile.ZIP_DEFLATED, _LEVEL)
-
-
-_KINDS: Final = {".tar.gz": _tar, ".zip": _zip}

@@ -27,7 +27,7 @@ from ...solutions.solution import read_solution
 from ..building.build import rebuilt
 from ..building.index import SUMS
 from ..checking.finding import FEASIBLE, is_better
-from ..documents.documents import Library, about_file, read_about, read_library
+from ..documents.documents import Library, about_file, folder_of, read_about, read_library
 from ..documents.lock import locked
 from ..ledger.ledger import FILE as LEDGER
 from ..ledger.ledger import Ledger, Record, SubmittedCertificate, read_ledger, write_ledger
@@ -125,9 +125,7 @@ def submit(
 
 def writable_library(folder: str | Path) -> Library:
     """Return the library in a folder. Raises InputError for an archive or a library of another version."""
-    if Path(folder).is_file():
-        raise InputError("is a file; unpack the archive and give its folder", file=folder)
-    library = read_library(folder)
+    library = read_library(folder_of(folder))
     if library.document["generator"] != generator():
         made = library.document["generator"]
         raise InputError(f"was built by {made}; submit with that version, or build it again", file=folder)

@@ -63,6 +63,15 @@ class Library:
         return spec_of(self.document["spec"], self.folder / INDEX)
 
 
+def folder_of(path: str | Path) -> Path:
+    """Return the path of a folder. Raises InputError for a file, such as a release, and for nothing."""
+    if Path(path).is_file():
+        raise InputError("is a file; unpack it, as with `tar -xzf`, and give the folder", file=path)
+    if not Path(path).is_dir():
+        raise InputError("there is no such folder; give the folder of a library or of points", file=path)
+    return Path(path)
+
+
 def read_library(folder: str | Path) -> Library:
     """Read the library in a folder. Raises InputError without one, InstanceError for a damaged index."""
     path = Path(folder) / INDEX

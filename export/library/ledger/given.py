@@ -7,9 +7,7 @@ processor. Results for another instance than the built one do not count.
 
 from __future__ import annotations
 
-import io
 import math
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,16 +16,14 @@ from typing import Any, Final
 from ....models.errors import CrossfieldError, InputError
 from ....models.field.file import field_of_json
 from ....models.instance.instance import Instance
-from ....models.storage import read_bytes, write_bytes
-from ..documents.archive import opened
-from ..documents.documents import about_file, are_whole, read_about, read_library
+from ....models.storage import make_folder, read_bytes, write_bytes
+from ..documents.documents import about_file, are_whole, folder_of, read_about, read_library
 from ..plan.recipe import digest
 from .certificates import METHOD, Certified, certified_by
 from .points import Known, Provenance, ours
 
 ROLES: Final = ("baseline", "least_1", "least_2")
 _SAME: Final = 1e-9  # processors round energies differently
-_DATE: Final = (1980, 1, 1, 0, 0, 0)  # of every member of an archive, so that its bytes follow from its files
 
 
 @dataclass(frozen=True)
@@ -77,10 +73,9 @@ def nothing(_instance: str) -> None:
 
 
 def read_points(path: str | Path) -> Points:
-    """Read the points in a folder or an archive. Raises InputError, InstanceError for a damaged one."""
-    with opened(path) as folder:
-        known = dict(_named(folder, each) for each in sorted(folder.glob("*.about.json")))
-    return known.get
+    """Read the points in a folder. Raises InputError, InstanceError for a damaged file."""
+    folder = folder_of(path)
+    return dict(_named(folder, each) for each in sorted(folder.glob("*.about.json"))).get
 
 
 def _named(folder: Path, path: Path) -> tuple[str, Given]:
@@ -104,21 +99,19 @@ def points_of(folder: Path) -> Points:
     return of
 
 
-def write_points(folder: str | Path, path: str | Path) -> int:
-    """Write the points of a library to an archive (.zip) and return the number of instances.
+def write_points(library: str | Path, folder: str | Path) -> int:
+    """Write the points of a library to a folder and return the number of instances.
 
-    The same points give the same bytes. Raises InputError where there is no library or a file is damaged,
-    InstanceError, OutputError.
+    Raises InputError where there is no library or a file is damaged, InstanceError, OutputError.
     """
-    folder = read_library(folder).folder
-    abouts = sorted(folder.glob("*.about.json"))
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_LZMA) as archive:
-        for each in abouts:
-            files = {each.name: read_bytes(each), **_given(folder, read_about(each)).files}
-            for name, data in files.items():
-                archive.writestr(zipfile.ZipInfo(name, _DATE), data, zipfile.ZIP_LZMA)
-    write_bytes(Path(path), buffer.getvalue())
+    source = read_library(library).folder
+    abouts = sorted(source.glob("*.about.json"))
+    files = {each.name: read_bytes(each) for each in abouts}
+    for each in abouts:
+        files |= _given(source, read_about(each)).files
+    target = make_folder(folder)
+    for name, data in files.items():
+        write_bytes(target / name, data)
     return len(abouts)
 
 

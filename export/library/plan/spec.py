@@ -8,7 +8,7 @@ Read from TOML and checked.
     formulations = ["..."]             all by default
     gauges = ["strokes"], facets = ["hull"]    may also stand in a rung, which then has its own
     ledger = "ledger.json"             what solvers found before, with its fields beside it; may be left out
-    points = "points.zip"              fields and certificates by `crossfield library points`; may be left out
+    points = "points"                  fields and certificates by `crossfield library points`; may be left out
 
     [release]                          what is cited; may be left out
     version = "1.0", date = "2026-11-22", authors = ["A. Name"]
@@ -199,7 +199,7 @@ class Sketch:
 class Spec:
     """A checked specification.
 
-    ledger: file of a ledger that the build uses, or None; points: a folder or an archive of fields and
+    ledger: file of a ledger that the build uses, or None; points: a folder of fields and
     certificates that replace searches, or None.
     """
 

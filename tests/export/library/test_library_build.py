@@ -104,8 +104,8 @@ def searched(tmp_path_factory):
 def spec(searched, tmp_path_factory):
     """The specification with those points, so that builds in other processes do not search either."""
     folder = tmp_path_factory.mktemp("spec")
-    write_points(searched.folder, folder / "points.zip")
-    return write_spec(folder, 'points = "points.zip"\n' + SPEC)
+    write_points(searched.folder, folder / "points")
+    return write_spec(folder, 'points = "points"\n' + SPEC)
 
 
 @pytest.fixture(scope="module")
@@ -785,7 +785,7 @@ def test_the_shipped_ledger_is_about_the_shipped_instances_and_contradicts_nothi
             assert problem.violation(point).worst <= 1e-12
             assert problem.objective_value(point) == pytest.approx(record.primal, rel=1e-12)
     named = {record.point for record in ledger.records if record.point is not None}
-    assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json", "points.zip"}
+    assert {path.name for path in spec.ledger.parent.iterdir()} == named | {"ledger.json", "points"}
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-import zipfile
 
 import pytest
 from crossfield.export.cli.app import invoke
@@ -94,9 +93,9 @@ def searched(tmp_path_factory):
 def spec(searched, tmp_path_factory):
     """A specification with the points of that library."""
     folder = tmp_path_factory.mktemp("points")
-    command = ["library", "points", str(searched), "-o", str(folder / "points.zip"), "--quiet"]
+    command = ["library", "points", str(searched), "-o", str(folder / "points"), "--quiet"]
     assert invoke(command) == 0
-    return write_spec(folder, 'points = "points.zip"')
+    return write_spec(folder, 'points = "points"')
 
 
 def on(processor, *arguments):
@@ -178,7 +177,7 @@ def test_a_submission_keeps_given_points_and_another_build_gives_the_same(search
 
 @pytest.mark.slow
 def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched, tmp_path):
-    text = spec.read_text().replace("seeds = [1]", "seeds = [2]").replace("points.zip", "known")
+    text = spec.read_text().replace("seeds = [1]", "seeds = [2]").replace('"points"', '"known"')
     known = shutil.copytree(searched, tmp_path / "known")
     other = "cf_rand_n003_s2"
     for path in [*known.glob(f"{STEM}.*"), *known.glob(f"{STEM}_box.*")]:
@@ -198,13 +197,8 @@ def test_points_of_another_instance_are_reported_and_do_not_count(spec, searched
 
 @pytest.mark.slow
 def test_points_that_are_missing_or_damaged_are_refused(searched, spec, tmp_path):
-    with pytest.raises(InputError, match=r"points: there is no points\.zip"):
-        read_spec(write_spec(tmp_path, 'points = "points.zip"'))
-    archive = tmp_path / "points.zip"
-    archive.write_bytes((spec.parent / "points.zip").read_bytes()[:-40])
-    with pytest.raises(InputError, match=r"points\.zip: is no archive, or damaged"):
-        build(read_spec(tmp_path / "spec.toml"), tmp_path / "lib")
-    assert not (tmp_path / "lib").exists()
+    with pytest.raises(InputError, match="points: there is no points"):
+        read_spec(write_spec(tmp_path, 'points = "points"'))
     known = shutil.copytree(searched, tmp_path / "known")
     (known / f"{STEM}.field.json").write_text("{}")
     with pytest.raises(InputError, match=rf"lists {STEM}\.field\.json, which is missing or another file"):
@@ -212,12 +206,10 @@ def test_points_that_are_missing_or_damaged_are_refused(searched, spec, tmp_path
 
 
 @pytest.mark.slow
-def test_the_same_points_are_the_same_archive(searched, spec, tmp_path):
-    assert invoke(["library", "points", str(searched), "-o", str(tmp_path / "again.zip"), "--quiet"]) == 0
-    assert (tmp_path / "again.zip").read_bytes() == (spec.parent / "points.zip").read_bytes()
-    with zipfile.ZipFile(tmp_path / "again.zip") as archive:
-        assert {name.split(".", 1)[1] for name in archive.namelist()} >= {"about.json", "certificate.npz"}
-        assert not [name for name in archive.namelist() if name.endswith((".instance.json", ".mps.gz"))]
+def test_points_are_fields_certificates_and_facts_alone(spec):
+    names = {path.name for path in (spec.parent / "points").iterdir()}
+    assert {name.split(".", 1)[1] for name in names} >= {"about.json", "field.json", "certificate.npz"}
+    assert not [name for name in names if name.endswith((".instance.json", ".mps.gz"))]
 
 
 # The library that ships
