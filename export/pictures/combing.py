@@ -9,7 +9,6 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.field.jumps import stepped
 from ...models.instance.angles import double_angle
-from ...models.instance.grid import Floats
 
 _Array = np.ndarray[Any, Any]
 
@@ -100,14 +99,11 @@ def _exchanges(field: CrossField, part: _Array) -> _Array:
 def _votes(field: CrossField, part: _Array) -> _Array:
     """1 for each part whose v carries more of the strokes (or lies more horizontally) than its u, else 0."""
     instance = field.instance
-    nearer = towards_u(field)
+    nearer = double_angle(field.u_angle) - double_angle(
+        field.v_angle
+    )  # products with it: positive nearer to u
     at = instance.stroke_index
     carried = instance.w * np.sum(double_angle(instance.theta) * nearer[at], axis=1)
     strokes = np.round(np.bincount(part[at], carried, part.max() + 1), 9)
     lying = np.round(np.bincount(part, nearer[:, 0]), 9)
     return (np.where(strokes != 0, strokes, lying) < 0).astype(np.int64)
-
-
-def towards_u(field: CrossField) -> Floats:
-    """Vectors (n, 2) whose product with a line's double-angle vector is positive nearer to u than v."""
-    return double_angle(field.u_angle) - double_angle(field.v_angle)
