@@ -268,7 +268,7 @@ _SENTENCES: Final = ("doubts", "freedom")
 
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
-    from ..surfaces.report import surface_facts
+    from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})

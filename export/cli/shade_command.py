@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ...models.field.field import CrossField
     from ...models.instance.instance import Instance
     from ...models.surface.hints import Hint
-    from ..shading.light import Light
+    from ..shading.colours import Light
     from ..solving.methods import Candidate
 
 FIELD: Final = "field.npz"
@@ -58,8 +58,7 @@ def shade_command(
     """
     from ...models.field.file import write_field
     from ...models.surface.lift import surface
-    from ..surfaces.files import write_surface
-    from ..surfaces.report import surface_document
+    from ..surfaces.files import surface_document, write_surface
 
     hints, lamp = hints_of(hint), light_of(light)
     with progress(quiet=printing.quiet) as show:
@@ -125,7 +124,7 @@ def hints_of(texts: list[str] | None) -> tuple[Hint, ...]:
 
 def light_of(text: str | None) -> Light:
     """Light from a text in degrees, or from the upper left. Raises InputError for a malformed text."""
-    from ..shading.light import UPPER_LEFT, Light
+    from ..shading.colours import UPPER_LEFT, Light
 
     if text is None:
         return UPPER_LEFT

@@ -34,7 +34,7 @@ def fitted(points: Floats, tolerance: float) -> Floats:
             break
         smoothing /= 4
     knots, coordinates, degree = spline
-    curves = np.stack(
+    curves: Floats = np.stack(
         [BPoly.from_power_basis(PPoly.from_spline((knots, each, degree))).c.T for each in coordinates],
         axis=-1,
     )

@@ -106,7 +106,8 @@ class _Crosses:
 
     def nearest(self, place: tuple[Labels, Labels], heading: Positions) -> Labels:
         """Number 0..3 of the direction nearest to a heading at places of the table."""
-        return np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1)
+        number: Labels = np.argmax((self.directions[place] * heading.conj()[..., None]).real, axis=-1)
+        return number
 
     def heading(self, z: Positions, before: Positions) -> Positions:
         """Unit vectors of the lines at z that continue the headings before."""
@@ -116,7 +117,8 @@ class _Crosses:
         weight = np.where(_CORNERS[0], down, 1 - down) * np.where(_CORNERS[1], across, 1 - across)
         chosen = np.take_along_axis(self.directions[place], self.nearest(place, before)[..., None], axis=-1)
         total = np.sum(weight * chosen[..., 0], axis=0)
-        return total / np.maximum(np.abs(total), 1e-12)
+        unit: Positions = total / np.maximum(np.abs(total), 1e-12)
+        return unit
 
     def allowed(self, z: Positions, target: Positions) -> Bools:
         """Which lines may go from z to a target: not where pixels meet only in a corner."""
@@ -143,8 +145,8 @@ class _Walk:
         """The run of points round the seed that holds no bad one."""
         if not bad.any():
             return self
-        first = max(np.flatnonzero(bad[: self.seed + 1]), default=-1) + 1
-        stop = self.seed + min(np.flatnonzero(bad[self.seed :]), default=len(bad) - self.seed)
+        first = max(np.flatnonzero(bad[: self.seed + 1]).tolist(), default=-1) + 1
+        stop = self.seed + min(np.flatnonzero(bad[self.seed :]).tolist(), default=len(bad) - self.seed)
         return _Walk(self.z[first:stop], self.family[first:stop], self.seed - first)
 
     def apart(self, distance: float) -> _Walk:

@@ -7,7 +7,6 @@ import pytest
 from crossfield.export.pictures.cubics import fitted
 from crossfield.export.pictures.draw import draw
 from crossfield.export.pictures.layers import Place, trimmed
-from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import sample
@@ -101,11 +100,6 @@ def test_the_picture_shows_the_layers_where_the_drawing_has_them(tmp_path):
     assert width / height == pytest.approx(70 / 60, rel=0.01)
     assert across.min() / width == pytest.approx(20 / 70, abs=0.02)
     assert down.min() / height == pytest.approx(30 / 60, abs=0.02)
-
-
-def test_layers_take_the_drawing_and_no_polylines(tmp_path):
-    with pytest.raises(InputError, match="give the drawing as underlay"):
-        draw(level(), tmp_path / "a.svg", sketch=[[(0, 0), (1, 1)]])
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(4, 60), st.booleans())
