@@ -8,20 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import InputError, shortened
 from ...models.processes.progress import Progress
+from . import options
 from .inputs import SAVED, drawing_of, field_or_instance, known
-from .options import (
-    FieldOrInput,
-    Flip,
-    Folder,
-    Hints,
-    Lamp,
-    On,
-    PrintOptions,
-    Scale,
-    SecondsInAll,
-    ShadedMethod,
-    Underlay,
-)
 from .output import print_notice, progress, show_surface
 from .sketch_options import SketchOptions
 
@@ -37,19 +25,19 @@ FIELD: Final = "field.npz"
 
 
 def shade_command(
-    source: FieldOrInput,
-    output: Folder,
+    source: options.FieldOrInput,
+    output: options.Folder,
     *,
-    flip: Flip = False,
-    hint: Hints = None,
-    light: Lamp = None,
-    scale: Scale = None,
-    method: ShadedMethod = None,
-    on: On = None,
-    underlay: Underlay = None,
+    flip: options.Flip = False,
+    hint: options.Hints = None,
+    light: options.Lamp = None,
+    scale: options.Scale = None,
+    method: options.ShadedMethod = None,
+    on: options.On = None,
+    underlay: options.Underlay = None,
     sketch: SketchOptions,
-    time_limit: SecondsInAll = 60.0,
-    printing: PrintOptions,
+    time_limit: options.SecondsInAll = 60.0,
+    printing: options.PrintOptions,
 ) -> None:
     """Compute the surface whose curvature lines are the crosses: normals, shaded pictures, heights, mesh.
 

@@ -9,20 +9,8 @@ import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
+from . import options
 from .inputs import formulations_of, known, read_start
-from .options import (
-    Folder,
-    FormulationName,
-    FormulationOptions,
-    Gap,
-    Input,
-    MethodName,
-    PrintOptions,
-    SecondsInAll,
-    SolverName,
-    Start,
-    Threads,
-)
 from .output import print_line, print_notice, progress, show_facts
 from .sketch_options import SketchOptions
 
@@ -33,19 +21,19 @@ if TYPE_CHECKING:
 
 
 def solve_command(
-    source: Input,
-    output: Folder,
+    source: options.Input,
+    output: options.Folder,
     *,
-    formulation: FormulationName = None,
-    method: MethodName = None,
-    solver: SolverName = None,
+    formulation: options.FormulationName = None,
+    method: options.MethodName = None,
+    solver: options.SolverName = None,
     sketch: SketchOptions,
-    formulating: FormulationOptions,
-    start: Start = None,
-    time_limit: SecondsInAll = 60.0,
-    gap: Gap = 1e-6,
-    threads: Threads = 0,
-    printing: PrintOptions,
+    formulating: options.FormulationOptions,
+    start: options.Start = None,
+    time_limit: options.SecondsInAll = 60.0,
+    gap: options.Gap = 1e-6,
+    threads: options.Threads = 0,
+    printing: options.PrintOptions,
 ) -> None:
     """Compute a field by a method (-m), or solve one formulation with a solver (-f).
 
@@ -140,7 +128,7 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
 
 
 def _print_candidate(
-    candidate: Candidate, proven: Proven | None, field: Path, printing: PrintOptions
+    candidate: Candidate, proven: Proven | None, field: Path, printing: options.PrintOptions
 ) -> None:
     """Print the facts of a method's field and the path of its file."""
     from ..solving.proven import NOTHING
@@ -162,7 +150,7 @@ def _print_candidate(
         print_notice("interrupted; the best field so far was kept")
 
 
-def print_solution(solution: Solution, field: Path, printing: PrintOptions) -> None:
+def print_solution(solution: Solution, field: Path, printing: options.PrintOptions) -> None:
     """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
     from ..solving.run import facts_with_energies
 
