@@ -56,18 +56,11 @@ def place(found, picture):
 
 
 @pytest.mark.slow
-@for_each("kind, suffix", [("field", ".png"), ("field", ".svg"), ("energy", ".pdf")])
-def test_every_suffix_is_written_the_same_twice(tmp_path, kind, suffix):
-    check_the_same_twice(tmp_path, kind, suffix)
-
-
-@pytest.mark.slow
-@for_each("kind", KINDS)
-def test_every_kind_is_written_the_same_twice(tmp_path, kind):
-    check_the_same_twice(tmp_path, kind, ".svg" if kind == "overview" else ".png")
-
-
-def check_the_same_twice(tmp_path, kind, suffix):
+@for_each(
+    "kind, suffix",
+    [("field", ".svg"), ("energy", ".pdf"), ("overview", ".svg"), *((kind, ".png") for kind in KINDS)],
+)
+def test_every_kind_and_suffix_is_written_the_same_twice(tmp_path, kind, suffix):
     field = singular(5)
     first = draw(field, tmp_path / f"first{suffix}", kind=kind, title="A sketch")
     assert first == tmp_path / f"first{suffix}"
