@@ -87,12 +87,15 @@ def _points(z: Positions) -> Floats:
 class _Crosses:
     """Directions of the crosses at any place.
 
-    directions: complex (height + 2, width + 2, 4), u, v, -u, -v of each pixel, 0 outside of the mask.
+    directions: complex (height + 2, width + 2, 4), u, v, -u, -v of each pixel, 0 outside of the mask; u and v
+    point to the right.
     """
 
     def __init__(self, field: CrossField) -> None:
         mask, found = field.instance.mask, field.singularities
         lines = np.exp(1j * np.stack([field.u_angle, field.v_angle], axis=1))
+        leftwards = np.round(lines.real, 9) + 1e-12 * lines.imag < 0  # upright ones: downwards
+        lines[leftwards] *= -1
         self.directions = np.zeros((*np.add(mask.shape, 2), 4), dtype=np.complex128)
         self.directions[1:-1, 1:-1][mask] = np.concatenate([lines, -lines], axis=1)
         self.inside: Bools = np.pad(mask, 1)
@@ -187,7 +190,7 @@ def _halves(
     """
     near = CLOSEST * cover.separation
     line = np.flatnonzero(crosses.allowed(seeds, seeds))
-    z, step, way = seeds[line], np.full(len(line), min(0.7 * cover.separation, _LONGEST)), np.zeros(len(line))
+    z, step, way = seeds[line], np.full(len(line), min(0.5 * cover.separation, _LONGEST)), np.zeros(len(line))
     heading = crosses.heading(z, crosses.directions[*crosses.pixel(z), labels[line]])
     begun = np.zeros_like(seeds)
     begun[line] = heading
