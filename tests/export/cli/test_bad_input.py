@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.models.memory import available_memory
 from loops import for_each
@@ -235,87 +234,38 @@ def good_solution(tmp_path, exported, manifest, instance):
     return tmp_path / "good.sol"
 
 
-def read(solution, manifest, output):
-    return "read", solution, "--manifest", manifest, "-o", output
-
-
-def test_the_good_solution_is_read(tmp_path, good_solution, manifest, capsys):
-    arguments = [str(argument) for argument in read(good_solution, manifest, tmp_path / "field.npz")]
-    assert invoke([*arguments, "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
-    assert facts["status"] == "optimal-global"
-    assert facts["objective_recomputed"] == pytest.approx(facts["objective_reported"], abs=1e-9)
-    assert facts["worst_violation"] < 1e-6
-    assert cf.read_field(tmp_path / "field.npz").energy(1).total == pytest.approx(facts["energy_1_norm"])
-
-
-def test_truncated_solutions_are_refused(tmp_path, refused, good_solution, manifest):
-    text = good_solution.read_bytes()
-    for length in np.linspace(0, text.index(b"# Rows") - 3, 8).astype(int):
-        good_solution.write_bytes(text[:length])
-        line = refused(*read(good_solution, manifest, tmp_path / "field.npz"))
-        assert line.startswith(f"{good_solution}: ")
-
-
-@pytest.mark.parametrize("binary", [False, True])
-def test_truncated_sol_files_are_refused(tmp_path, refused, instance, manifest, binary):
-    problem = cf.formulate(instance, "milp-mccormick")
-    whole = tmp_path / "whole.sol"
-    point = problem.point(cf.greedy_field(instance))[Layout(problem).order]
-    write_ampl_sol(whole, "solved", point, problem.n_rows, 0, binary=binary)
-    content = whole.read_bytes()
-    end = content.index(b"objno") if not binary else len(content)
-    for length in np.linspace(1, end - 3, 12).astype(int):
-        whole.write_bytes(content[:length])
-        line = refused(*read(whole, manifest, tmp_path / "field.npz"))
-        assert line.startswith(f"{whole}: ")
-    whole.write_bytes(content)
-    assert invoke([str(argument) for argument in (*read(whole, manifest, tmp_path / "field.npz"), "-q")]) == 0
-
-
-def test_unknown_and_missing_names_in_a_solution_are_refused(tmp_path, refused, good_solution, manifest):
-    text = good_solution.read_text()
-    good_solution.write_text(text.replace("alpha_00_00 ", "omega_00_00 "))
-    line = refused(*read(good_solution, manifest, tmp_path / "field.npz"))
-    assert "1 of " in line
-    assert "missing" in line
-    assert "another instance, formulation or option" in line
-
-
-def test_a_solution_of_another_instance_is_refused(tmp_path, refused, instance, good_solution, manifest):
-    other = cf.sample("skew", 8)
-    problem = cf.formulate(other, "milp-mccormick")
-    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
-    line = refused(*read(tmp_path / "other.sol", manifest, tmp_path / "field.npz"))
-    assert line.startswith(f"{tmp_path / 'other.sol'}: ")
-    cf.write_problem(problem, tmp_path / "skew", formats=["nl"])
-    other_manifest = tmp_path / "skew" / "skew.milp-mccormick.manifest.json"
-    assert "another instance" in refused(*read(good_solution, other_manifest, tmp_path / "field.npz"))
-
-
-def test_a_manifest_next_to_another_instance_is_refused(
-    tmp_path, refused, instance, exported, good_solution, manifest
-):
-    turned = instance.turned()
-    cf.write_instance(turned, exported / "tiny.instance.json")
-    line = refused(*read(good_solution, manifest, tmp_path / "field.npz"))
-    assert line.startswith(f"{exported / 'tiny.instance.json'}: is another instance")
-    (exported / "tiny.instance.json").unlink()
-    assert "tiny.instance.json: cannot be read" in refused(
-        *read(good_solution, manifest, tmp_path / "field.npz")
+@pytest.fixture
+def unread(tmp_path, refused, manifest):
+    """Function that reads a solution, which must fail, and returns the line of error."""
+    return lambda solution, of=manifest: refused(
+        "read", solution, "--manifest", of, "-o", tmp_path / "field.npz"
     )
 
 
-def test_damaged_manifests_are_refused(tmp_path, refused, good_solution, manifest):
+def test_damaged_solutions_are_refused(unread, good_solution):
+    text = good_solution.read_text()
+    for length in np.linspace(0, text.index("# Rows") - 3, 8).astype(int):
+        good_solution.write_text(text[:length])
+        assert unread(good_solution).startswith(f"{good_solution}: ")
+    good_solution.write_text(text.replace("alpha_00_00 ", "omega_00_00 "))
+    assert re.search("1 of .*missing.*another instance, formulation or option", unread(good_solution))
+
+
+def test_a_solution_of_another_instance_is_refused(tmp_path, unread, good_solution):
+    other = cf.sample("skew", 8)
+    problem = cf.formulate(other, "milp-mccormick")
+    write_ampl_sol(tmp_path / "other.sol", "solved", problem.point(cf.greedy_field(other)), problem.n_rows, 0)
+    assert unread(tmp_path / "other.sol").startswith(f"{tmp_path / 'other.sol'}: ")
+    described = cf.write_problem(problem, tmp_path / "skew", formats=["nl"])
+    assert "another instance" in unread(good_solution, described.path)
+
+
+def test_damaged_manifests_are_refused(unread, good_solution, manifest):
     """The others: tests/export/bundle/test_manifest.py."""
     document = json.loads(manifest.read_text())
-    for change, reason in (
-        ({"version": 7}, "version 7"),
-        ({"columns": None}, "columns"),
-        ({"sha256": "0" * 64}, "fit"),
-    ):
+    for change, reason in (({"version": 7}, "version 7"), ({"sha256": "0" * 64}, "fit")):
         manifest.write_text(json.dumps(document | change))
-        line = refused(*read(good_solution, manifest, tmp_path / "field.npz"))
+        line = unread(good_solution)
         assert line.startswith(f"{manifest}: ")
         assert reason in line
 
@@ -323,20 +273,14 @@ def test_damaged_manifests_are_refused(tmp_path, refused, good_solution, manifes
 WITHOUT_POINT = "Model status\n{}\n\n# Primal solution values\nNone\n\n# Dual solution values\nNone\n"
 
 
-@pytest.mark.parametrize(
-    "words,status", [("Infeasible", "infeasible"), ("Time limit reached", "limit-without-point")]
-)
-def test_solutions_without_a_point_are_refused(tmp_path, refused, manifest, words, status):
-    (tmp_path / "none.sol").write_text(WITHOUT_POINT.format(words))
-    line = refused(*read(tmp_path / "none.sol", manifest, tmp_path / "field.npz"))
-    assert line.startswith(f"{tmp_path / 'none.sol'}: holds no point: {status}")
-
-
-def test_an_infeasible_sol_file_is_refused(tmp_path, refused, instance, manifest):
-    problem = cf.formulate(instance, "milp-mccormick")
+def test_solutions_without_a_point_are_refused(tmp_path, unread, instance):
     path = tmp_path / "none.sol"
+    for words, status in (("Infeasible", "infeasible"), ("Time limit reached", "limit-without-point")):
+        path.write_text(WITHOUT_POINT.format(words))
+        assert unread(path).startswith(f"{path}: holds no point: {status}")
+    problem = cf.formulate(instance, "milp-mccormick")
     write_ampl_sol(path, "no solution", np.zeros(0), problem.n_rows, 220, columns=problem.n_columns)
-    assert "holds no point: infeasible; no solution" in refused(*read(path, manifest, tmp_path / "field.npz"))
+    assert "holds no point: infeasible; no solution" in unread(path)
 
 
 # The machine: missing solvers, folders that cannot be written, full disks
