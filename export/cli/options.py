@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal
 import typer
 
 from ...models.processes.side_by_side import MOST
-from .output import print_json
+from .output import print_json, print_line, show_facts
 
 _KINDS_OF_SKETCH: Final = (
     "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or an instance file"
@@ -115,6 +115,16 @@ class PrintOptions:
             print_json(document)
         elif not self.quiet:
             show()
+
+    def show_facts(self, title: str, facts: dict[str, Any], *lines: str) -> None:
+        """Print facts as JSON, or as a table with some lines below, or do nothing if quiet."""
+
+        def show() -> None:
+            show_facts(title, facts)
+            for line in lines:
+                print_line(line)
+
+        self.show(facts, show)
 
 
 # Formulations and formats

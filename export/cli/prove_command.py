@@ -140,8 +140,4 @@ def _check(path: Path, printing: options.PrintOptions) -> None:
         show("checking the certificate")
         found = read_certificate(path)
 
-    def show_valid() -> None:
-        show_facts(found.field.instance.summary, facts(found))
-        print_line("the certificate is valid")
-
-    printing.show(facts(found), show_valid)
+    printing.show_facts(found.field.instance.summary, facts(found), "the certificate is valid")

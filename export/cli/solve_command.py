@@ -11,7 +11,7 @@ from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
 from . import options
 from .inputs import formulations_of, known, read_start
-from .output import print_line, print_notice, progress, show_facts
+from .output import print_notice, progress
 from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
@@ -137,13 +137,8 @@ def _print_candidate(
     if proven:
         facts |= proven.facts(facts["energy_2_norm"])
 
-    def show() -> None:
-        show_facts(candidate.field.instance.summary, facts)
-        print_line(f"field: {field}")
-        if proven:
-            print_line(f"certificate: {proven.certificate}")
-
-    printing.show(facts, show)
+    lines = [f"field: {field}", *([f"certificate: {proven.certificate}"] if proven else [])]
+    printing.show_facts(candidate.field.instance.summary, facts, *lines)
     if candidate.proof is not None and proven is None:
         print_notice(NOTHING)
     if candidate.interrupted:
@@ -157,11 +152,7 @@ def print_solution(solution: Solution, field: Path, printing: options.PrintOptio
     facts = facts_with_energies(solution)
     written = solution.point is not None and not solution.doubt
 
-    def show() -> None:
-        show_facts(solution.problem.instance.summary, facts)
-        if written:
-            print_line(f"field: {field}")
-
-    printing.show(facts, show)
+    lines = [f"field: {field}"] if written else []
+    printing.show_facts(solution.problem.instance.summary, facts, *lines)
     if solution.interrupted:
         print_notice("interrupted; the best point so far was kept" if written else "interrupted")
