@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
-    from .export.shading.light import Light as Light
+    from .export.shading.colours import Light as Light
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.evaluate import Evaluation as Evaluation
@@ -96,7 +96,7 @@ _HOME: Final = {
     "InputError": ".models.errors",
     "Instance": ".models.instance.instance",
     "InstanceError": ".models.errors",
-    "Light": ".export.shading.light",
+    "Light": ".export.shading.colours",
     "Limits": ".models.processes.limits",
     "MissingSolverError": ".models.errors",
     "NoStrokeError": ".models.errors",

@@ -15,11 +15,9 @@ from typing import Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.pictures.drawing import read_drawing
-from crossfield.export.shading.light import lit
-from crossfield.export.shading.matcap import matcap
-from crossfield.export.shading.normal_map import coloured, eight_bit
+from crossfield.export.shading.colours import coloured, eight_bit, lit, matcap
 from crossfield.export.shading.raster import raster
-from crossfield.export.surfaces.overlay import over, strokes
+from crossfield.export.surfaces.files import over, strokes
 from crossfield.models.instance.grid import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface

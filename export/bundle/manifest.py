@@ -10,10 +10,10 @@ Names come only from the instance and the formulation, so that a later export re
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,7 +28,7 @@ from ...models.errors import (
 )
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import FORMULATIONS, declaration_of
-from ...models.formulations.declaration import Options
+from ...models.formulations.declaration import Declaration, Options
 from ...models.formulations.problem import Problem, formulate, lifted, tightened
 from ...models.formulations.windows import Windows
 from ...models.input_limits import MAX_BYTES
@@ -150,9 +150,7 @@ def write_problem(
     if not is_recordable(problem):
         what = f"{problem.name} with columns fixed or products lifted"
         raise InputError(f"a manifest cannot record {what}; write it as a single file")
-    sets = _Sets(problem.instance, Path(folder), tuple(formats), start, dialects or {}, compress)
-    with sets.threads(jobs):
-        return sets.begin(problem)()
+    return _write_sets([problem], folder, formats, start, dialects or {}, compress=compress, jobs=jobs)[0]
 
 
 def write_all(
@@ -180,93 +178,80 @@ def write_all(
     unknown format, FormulationError for an unknown formulation, InstanceError for a start on another
     instance, and OutputError.
     """
-    sets = _Sets(
-        instance,
-        Path(folder),
-        tuple(formats),
-        start,
-        dialects or {},
-        compress,
-        jumps_of or start,
-        windows,
-        options or {},
+    options = options or {}
+    declarations = [declaration_of(name) for name in formulations]
+
+    def formulated(declaration: Declaration) -> Problem:
+        unfit = {*Options.__dataclass_fields__} - declaration.settable
+        chosen = {key: value for key, value in options.items() if key not in unfit}
+        jumps = fixed_jumps(instance, declaration.name, jumps_of or start)
+        return _narrowed(formulate(instance, declaration.name, p=jumps, **chosen), windows)
+
+    problems = (formulated(declaration) for declaration in declarations)
+    return _write_sets(
+        problems, folder, formats, start, dialects or {}, compress=compress, jobs=jobs, progress=progress
     )
-    names = [declaration_of(name).name for name in formulations]
-    manifests = []
-    with sets.threads(jobs):
-        waiting = {name: sets.begin(sets.problem(name)) for name in names}
-        for name in list(waiting):
-            progress(name)
-            manifests.append(waiting.pop(name)())
+
+
+def _write_sets(
+    problems: Iterable[Problem],
+    folder: str | Path,
+    formats: Iterable[str],
+    start: CrossField | None,
+    dialects: dict[str, str],
+    *,
+    compress: bool,
+    jobs: int,
+    progress: Progress = silent,
+) -> list[Manifest]:
+    """Write problems by several threads, for NumPy, zlib and hashlib run in parallel; return the manifests.
+
+    After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
+    existing file is complete.
+    """
+    folder, formats = Path(folder), tuple(formats)
+    for name in formats:
+        if name not in FORMATS:
+            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+    with ThreadPoolExecutor(checked(jobs)) as pool:
+        make_folder(folder)
+
+        def begin(problem: Problem) -> dict[str, Future[Written]]:
+            problem.complete()  # threads share the problem
+            stem = folder / f"{problem.instance.name}.{problem.name}"
+            paths = {name: f"{stem}{FORMATS[name].suffix}{'.gz' if compress else ''}" for name in formats}
+            return {
+                name: pool.submit(write, problem, path, dialect=dialects.get(name), start=start)
+                for name, path in paths.items()
+            }
+
+        try:
+            waiting = deque((problem, begin(problem)) for problem in problems)
+            manifests = []
+            while waiting:
+                problem, files = waiting.popleft()
+                progress(problem.name)
+                manifests.append(_finished(problem, files, folder, start))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     return manifests
 
 
-@dataclass(eq=False)
-class _Sets:
-    """Common settings of the sets of files of an instance; dialects by format."""
-
-    instance: Instance
-    folder: Path
-    formats: tuple[str, ...]
-    start: CrossField | None
-    dialects: dict[str, str]
-    compress: bool
-    jumps_of: CrossField | None = None
-    windows: Windows | None = None
-    options: dict[str, Any] = field(default_factory=dict)
-    pool: ThreadPoolExecutor = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Check that the formats are known."""
-        for name in self.formats:
-            if name not in FORMATS:
-                raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
-
-    @contextmanager
-    def threads(self, jobs: int) -> Iterator[None]:
-        """Threads that write files: most of the time goes to NumPy, zlib and hashlib, which run in parallel.
-
-        After a failure or Ctrl-C no further file is started. Files in progress are finished, so that every
-        existing file is complete.
-        """
-        with ThreadPoolExecutor(checked(jobs)) as self.pool:
-            make_folder(self.folder)
-            try:
-                yield
-            except BaseException:
-                self.pool.shutdown(cancel_futures=True)
-                raise
-
-    def problem(self, name: str) -> Problem:
-        """A formulation of the instance, with the options that it has."""
-        unfit = {*Options.__dataclass_fields__} - declaration_of(name).settable
-        chosen = {key: value for key, value in self.options.items() if key not in unfit}
-        problem = formulate(self.instance, name, p=fixed_jumps(self.instance, name, self.jumps_of), **chosen)
-        return _narrowed(problem, self.windows)
-
-    def begin(self, problem: Problem) -> Callable[[], Manifest]:
-        """Start writing the files of a problem; return a function that waits for its manifest."""
-        stem = f"{self.instance.name}.{problem.name}"
-        problem.complete()  # threads share the problem
-        files = {name: self._submit(problem, stem, name) for name in self.formats}
-
-        def manifest() -> Manifest:
-            written: list[Written] = []
-            refused: dict[str, str] = {}
-            for name, file in files.items():
-                try:
-                    written.append(file.result())
-                except UnsupportedByFormatError as error:
-                    refused[name] = str(error)
-            if self.start is not None:
-                write_starts(problem, self.start, self.folder, stem)
-            return _kept(_document(problem, self.folder, written, refused), self.folder)
-
-        return manifest
-
-    def _submit(self, problem: Problem, stem: str, name: str) -> Future[Written]:
-        path = self.folder / f"{stem}{FORMATS[name].suffix}{'.gz' if self.compress else ''}"
-        return self.pool.submit(write, problem, path, dialect=self.dialects.get(name), start=self.start)
+def _finished(
+    problem: Problem, files: dict[str, Future[Written]], folder: Path, start: CrossField | None
+) -> Manifest:
+    """Wait for the files of a problem, write its starts and its manifest, and return the manifest."""
+    written: list[Written] = []
+    refused: dict[str, str] = {}
+    for name, file in files.items():
+        try:
+            written.append(file.result())
+        except UnsupportedByFormatError as error:
+            refused[name] = str(error)
+    if start is not None:
+        write_starts(problem, start, folder, f"{problem.instance.name}.{problem.name}")
+    return _kept(_document(problem, folder, written, refused), folder)
 
 
 def is_recordable(problem: Problem) -> bool:
@@ -335,6 +320,9 @@ def _document(
 ) -> dict[str, Any]:
     instance, formulation, options = problem.instance, problem.formulation, problem.formulation.options
     form = Canonical(problem)
+    tightening = {}
+    if problem.windows is not None:  # and the sentence about it in the files' headers
+        tightening = {"tightened": problem.tightened, "windows": problem.windows.document()}
     files = [
         {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
         for entry in written
@@ -370,17 +358,12 @@ def _document(
             for row in problem.rows
         ],
         "jumps": _nonzero(problem),
-        **({} if problem.windows is None else _windows(problem, problem.windows)),
+        **tightening,
         "sha256": problem.sha256,
         "files": files,
         "refused": refused,
         "solvers": {name: taking._asdict() for name, taking in takers(smallest(formulation)).items()},
     }
-
-
-def _windows(problem: Problem, windows: Windows) -> dict[str, Any]:
-    """The narrowed windows, and the sentence about them in the files' headers."""
-    return {"tightened": problem.tightened, "windows": windows.document()}
 
 
 def _columns(problem: Problem) -> list[dict[str, Any]]:

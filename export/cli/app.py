@@ -16,39 +16,12 @@ from typing import Annotated, Final, NoReturn
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
+from . import options
 from .evaluate_command import evaluate_command
 from .help_texts import Command
 from .inputs import SAVED, drawing_of, field_or_instance, formulations_of, known, read_start, require_suffix
 from .library_command import library
 from .option_groups import with_option_groups
-from .options import (
-    DialectOptions,
-    Facet,
-    FieldOrInstance,
-    Folder,
-    FormatNames,
-    FormulationNames,
-    FormulationOptions,
-    Gap,
-    Gzip,
-    Input,
-    Jobs,
-    Json,
-    Kind,
-    Manifest,
-    On,
-    Output,
-    PrintOptions,
-    Quiet,
-    SecondsPerMethod,
-    SolutionFile,
-    Start,
-    Threads,
-    Tightened,
-    Title,
-    Tolerance,
-    Underlay,
-)
 from .output import (
     INTERRUPTED,
     escape_unencodable,
@@ -103,17 +76,17 @@ def root(
 
 @command("run")
 def run_command(
-    source: Input,
-    output: Folder,
+    source: options.Input,
+    output: options.Folder,
     *,
     sketch: SketchOptions,
-    facet: Facet = None,
-    time_limit: SecondsPerMethod = 60.0,
-    gap: Gap = 1e-6,
-    threads: Threads = 0,
-    jobs: Jobs = 1,
-    dialects: DialectOptions,
-    printing: PrintOptions,
+    facet: options.Facet = None,
+    time_limit: options.SecondsPerMethod = 60.0,
+    gap: options.Gap = 1e-6,
+    threads: options.Threads = 0,
+    jobs: options.Jobs = 1,
+    dialects: options.DialectOptions,
+    printing: options.PrintOptions,
 ) -> None:
     """Do all steps for one sketch: write the solver files, try the methods, keep a field and draw it.
 
@@ -146,7 +119,9 @@ def run_command(
 
 
 @command("instance")
-def instance_command(source: Input, output: Output, *, sketch: SketchOptions, quiet: Quiet = False) -> None:
+def instance_command(
+    source: options.Input, output: options.Output, *, sketch: SketchOptions, quiet: options.Quiet = False
+) -> None:
     """Write a sketch or a sample as an instance (.json, .npz): its strokes on a grid of pixels.
 
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
@@ -166,19 +141,19 @@ def instance_command(source: Input, output: Output, *, sketch: SketchOptions, qu
 
 @command("export")
 def export_command(
-    source: Input,
-    output: Folder,
+    source: options.Input,
+    output: options.Folder,
     *,
-    formulation: FormulationNames = None,
-    file_format: FormatNames = None,
+    formulation: options.FormulationNames = None,
+    file_format: options.FormatNames = None,
     sketch: SketchOptions,
-    formulating: FormulationOptions,
-    start: Start = None,
-    tightened: Tightened = None,
-    dialects: DialectOptions,
-    compress: Gzip = False,
-    jobs: Jobs = 1,
-    printing: PrintOptions,
+    formulating: options.FormulationOptions,
+    start: options.Start = None,
+    tightened: options.Tightened = None,
+    dialects: options.DialectOptions,
+    compress: options.Gzip = False,
+    jobs: options.Jobs = 1,
+    printing: options.PrintOptions,
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
 
@@ -223,12 +198,12 @@ command("evaluate")(evaluate_command)
 
 @command("read")
 def read_command(
-    solution: SolutionFile,
-    manifest: Manifest,
-    output: Output,
+    solution: options.SolutionFile,
+    manifest: options.Manifest,
+    output: options.Output,
     *,
-    tolerance: Tolerance = 1e-5,
-    printing: PrintOptions,
+    tolerance: options.Tolerance = 1e-5,
+    printing: options.PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
 
@@ -262,14 +237,14 @@ def read_command(
 
 @command("draw")
 def draw_command(
-    source: FieldOrInstance,
-    output: Output,
+    source: options.FieldOrInstance,
+    output: options.Output,
     *,
-    on: On = None,
-    kind: Kind = None,
-    underlay: Underlay = None,
-    title: Title = None,
-    quiet: Quiet = False,
+    on: options.On = None,
+    kind: options.Kind = None,
+    underlay: options.Underlay = None,
+    title: options.Title = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Draw a field or an instance as PNG, SVG or PDF.
 
@@ -292,7 +267,7 @@ command("verify")(verify_command)
 
 
 @command("list")
-def list_command(*, as_json: Json = False) -> None:
+def list_command(*, as_json: options.Json = False) -> None:
     """List formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
@@ -304,7 +279,7 @@ def list_command(*, as_json: Json = False) -> None:
 
 
 @command("samples")
-def samples_command(*, as_json: Json = False) -> None:
+def samples_command(*, as_json: options.Json = False) -> None:
     """List the built-in samples."""
     from .tables import sample_rows
 

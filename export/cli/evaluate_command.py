@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from . import options
 from .inputs import known
-from .options import Curves, Input, MethodNames, PrintOptions, ReportFolder, SecondsPerField
 from .output import print_line, print_notice, progress, show_table
 from .sketch_options import SketchOptions
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 def evaluate_command(
-    source: Input,
-    output: ReportFolder = None,
+    source: options.Input,
+    output: options.ReportFolder = None,
     *,
-    method: MethodNames = None,
-    curves: Curves = 8,
+    method: options.MethodNames = None,
+    curves: options.Curves = 8,
     sketch: SketchOptions,
-    time_limit: SecondsPerField = 5.0,
-    printing: PrintOptions,
+    time_limit: options.SecondsPerField = 5.0,
+    printing: options.PrintOptions,
 ) -> None:
     """Measure methods on hidden curves: each curve of a drawing is hidden in turn.
 

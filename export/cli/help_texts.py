@@ -47,7 +47,7 @@ NAMES: Final = {
     "pictures": _of("..pictures.draw", "KINDS"),
     "picture side": _of("..shading.raster", "SIDE", lambda side: [str(side)]),
     "light": _of(
-        "..shading.light",
+        "..shading.colours",
         "UPPER_LEFT",
         lambda light: [f"{math.degrees(light.azimuth):.0f},{math.degrees(light.elevation):.0f}"],
     ),

@@ -10,9 +10,8 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from ...models.errors import InputError
-from ...models.processes.side_by_side import MOST, checked
-from .output import print_json
+from ...models.processes.side_by_side import MOST
+from .output import print_json, print_line, show_facts
 
 _KINDS_OF_SKETCH: Final = (
     "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples}; or an instance file"
@@ -24,18 +23,13 @@ _method = partial(typer.Option, "-m", "--method", metavar="NAME")
 _formulation = partial(typer.Option, "-f", "--formulation", metavar="NAME")
 _time_limit = partial(typer.Option, "--time-limit", min=0.1, metavar="SECONDS")
 _gap = partial(typer.Option, "--gap", min=0.0)
+_jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
 
 
-def _between(least: int, what: str) -> Callable[[int], int]:
-    """Check of a number of threads or processes, which raises BadParameter."""
-
-    def check(count: int) -> int:
-        try:
-            return checked(count, what, least=least)
-        except InputError as error:
-            raise typer.BadParameter(str(error)) from error
-
-    return check
+def _norm(option: str, what: str) -> Any:
+    """Option for a norm."""
+    words = f"{what} in absolute values (1) or squares (2), where a formulation offers both."
+    return typer.Option(option, min=1, max=2, help=words)
 
 
 # Input and output
@@ -122,6 +116,16 @@ class PrintOptions:
         elif not self.quiet:
             show()
 
+    def show_facts(self, title: str, facts: dict[str, Any], *lines: str) -> None:
+        """Print facts as JSON, or as a table with some lines below, or do nothing if quiet."""
+
+        def show() -> None:
+            show_facts(title, facts)
+            for line in lines:
+                print_line(line)
+
+        self.show(facts, show)
+
 
 # Formulations and formats
 
@@ -136,25 +140,8 @@ class FormulationOptions:
     """Options of the formulations."""
 
     facet: Facet = None
-    stroke_norm: Annotated[
-        int | None,
-        typer.Option(
-            "--stroke-norm",
-            min=1,
-            max=2,
-            help="Distance from the strokes in absolute values (1) or squares (2), where a formulation offers"
-            " both.",
-        ),
-    ] = None
-    beta_norm: Annotated[
-        int | None,
-        typer.Option(
-            "--beta-norm",
-            min=1,
-            max=2,
-            help="Skew beta in absolute values (1) or squares (2), where a formulation offers both.",
-        ),
-    ] = None
+    stroke_norm: Annotated[int | None, _norm("--stroke-norm", "Distance from the strokes")] = None
+    beta_norm: Annotated[int | None, _norm("--beta-norm", "Skew beta")] = None
     relax: Annotated[
         bool,
         typer.Option(
@@ -294,29 +281,11 @@ Curves = Annotated[
     int, typer.Option("--curves", min=1, metavar="N", help="Number of hidden curves, the longest first.")
 ]
 Solve = Annotated[bool, typer.Option("--solve", help="Solve every problem too, and compare the optima.")]
-Jobs = Annotated[
-    int,
-    typer.Option(
-        "--jobs",
-        callback=_between(1, "jobs"),
-        help=f"Number of solver files that are written in parallel; 1 to {MOST}.",
-    ),
-]
-Processes = Annotated[
-    int,
-    typer.Option(
-        "--jobs",
-        callback=_between(1, "jobs"),
-        help=f"Number of processes that work in parallel; 1 to {MOST}.",
-    ),
-]
+Jobs = Annotated[int, _jobs(help="Number of solver files that are written in parallel.")]
+Processes = Annotated[int, _jobs(help="Number of processes that work in parallel.")]
 Threads = Annotated[
     int,
-    typer.Option(
-        "--threads",
-        callback=_between(0, "threads"),
-        help=f"Threads of HiGHS and of the search; 1 to {MOST}, or 0: they choose.",
-    ),
+    typer.Option("--threads", min=0, max=MOST, help="Threads of HiGHS and of the search; 0: they choose."),
 ]
 
 # Pictures and surfaces

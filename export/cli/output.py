@@ -6,8 +6,11 @@ import io
 import json
 import sys
 import textwrap
+import threading
+import time
+from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +18,6 @@ import typer
 
 from ...models.errors import CrossfieldError, printable
 from ...models.processes.progress import Progress, silent
-from .progress_lines import progress_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
 
 WIDTH: Final = 80
 """Columns of the tables where the output is no terminal."""
+
+EVERY: Final = 5.0
+"""Seconds between two lines of progress, and before the first one: shorter work prints no line."""
 
 INTERRUPTED: Final = "interrupted; all written files are complete"
 
@@ -45,12 +50,7 @@ def progress(*, quiet: bool) -> Iterator[Progress]:
     from rich.console import Console
 
     console = Console(stderr=True)
-    if quiet:
-        shown: AbstractContextManager[Progress] = nullcontext(silent)
-    elif console.is_terminal:
-        shown = _spinning(console)
-    else:
-        shown = progress_lines(lambda line: typer.echo(printable(line), err=True))
+    shown = nullcontext(silent) if quiet else _spinning(console) if console.is_terminal else _lines()
     try:
         with shown as show:
             yield show
@@ -71,6 +71,25 @@ def _spinning(console: Console) -> Iterator[Progress]:
     with rich.Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting")
         yield lambda text: bar.update(task, description=text)
+
+
+@contextmanager
+def _lines() -> Iterator[Progress]:
+    """Function that sets the current step, which a thread prints every few seconds with the time so far."""
+    steps, ended, begin = deque(["starting"], maxlen=1), threading.Event(), time.monotonic()
+
+    def watch() -> None:
+        with suppress(OSError, ValueError):  # the stream was closed: the work continues without lines
+            while not ended.wait(EVERY):
+                typer.echo(printable(f"[{time.monotonic() - begin:.0f} s] {steps[-1]}"), err=True)
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield steps.append
+    finally:
+        ended.set()
+        thread.join()
 
 
 def escape_unencodable() -> None:
@@ -268,7 +287,7 @@ _SENTENCES: Final = ("doubts", "freedom")
 
 def show_surface(surface: Surface, folder: Path) -> None:
     """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files."""
-    from ..surfaces.report import surface_facts
+    from ..surfaces.files import surface_facts
 
     facts = surface_facts(surface)
     show_facts(surface.instance.summary, {key: facts[key] for key in facts if key not in _SENTENCES})
@@ -300,32 +319,27 @@ def _text(value: object) -> str:
 
 def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
     """Print the tables of formulations, formats, solvers, methods and readers, and their combinations."""
-    formulations = tables["formulations"][1]
-    columns = ("name", "short", "paper", "class", "summary")
-    show_table("formulations", columns, _cells(formulations, columns))
-    formats, solvers = tables["formats"], tables["solvers"]
-    names = [row["name"] for row in formats[1]]
-    carried = [[row["name"], *(str(row[name]).partition(":")[0] for name in names)] for row in formulations]
+
+    def show(title: str, name: str, columns: Sequence[str] = ()) -> None:
+        of_table, rows = tables[name]
+        show_table(title, columns or of_table, _cells(rows, columns or of_table))
+
+    show("formulations", "formulations", ("name", "short", "paper", "class", "summary"))
+    names = [row["name"] for row in tables["formats"][1]]
+    carried = [
+        [row["name"], *(row[name].partition(":")[0] for name in names)] for row in tables["formulations"][1]
+    ]
     show_table("formulations in each format (--json: alternatives)", ("formulation", *names), carried)
-    marked = [
-        [row[solvers[0][0]], *("yes" if row[name] == "yes" else "-" for name in solvers[0][1:])]
-        for row in solvers[1]
-    ]
-    externals = tables["externals"]
-    show_table("formulations that each bundled solver solves (--json: reasons)", solvers[0], marked)
-    takes = [
-        [name, ", ".join(row["formulation"] for row in externals[1] if row[name] == "yes")]
-        for name in externals[0][1:]
-    ]
-    show_table(
-        "formulations whose optimum each solver proves from our files (--json: reasons)",
-        ("solver", "formulations"),
-        takes,
-    )
-    show_table("formats", formats[0], _cells(formats[1], formats[0]))
-    methods, readers = tables["methods"], tables["readers"]
-    show_table("methods (solve --method)", methods[0], _cells(methods[1], methods[0]))
-    show_table("readers of solution files", readers[0], _cells(readers[1], readers[0]))
+    (first, *bundled), rows = tables["solvers"]
+    marked = [[row[first], *("yes" if row[name] == "yes" else "-" for name in bundled)] for row in rows]
+    show_table("formulations that each bundled solver solves (--json: reasons)", (first, *bundled), marked)
+    (first, *solvers), rows = tables["externals"]
+    takes = [[name, ", ".join(row[first] for row in rows if row[name] == "yes")] for name in solvers]
+    title = "formulations whose optimum each solver proves from our files (--json: reasons)"
+    show_table(title, ("solver", "formulations"), takes)
+    show("formats", "formats")
+    show("methods (solve --method)", "methods")
+    show("readers of solution files", "readers")
 
 
 def _cells(rows: list[dict[str, Any]], columns: Sequence[str]) -> list[list[str]]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import typer
 
 from ...models.errors import SolverError
+from . import options
 from .inputs import read_start
-from .options import Check, Norm, OptionalInput, PrintOptions, ProofFolder, ProofGap, SecondsOfProof, Start
 from .output import print_line, print_notice, progress, show_facts
 from .sketch_options import SketchOptions
 
@@ -25,16 +25,16 @@ UNPROVEN: Final = "unproven"
 
 
 def prove_command(
-    source: OptionalInput = None,
-    output: ProofFolder = None,
+    source: options.OptionalInput = None,
+    output: options.ProofFolder = None,
     *,
-    norm: Norm = 2,
+    norm: options.Norm = 2,
     sketch: SketchOptions,
-    start: Start = None,
-    time_limit: SecondsOfProof = 60.0,
-    gap: ProofGap = 0.0,
-    check: Check = None,
-    printing: PrintOptions,
+    start: options.Start = None,
+    time_limit: options.SecondsOfProof = 60.0,
+    gap: options.ProofGap = 0.0,
+    check: options.Check = None,
+    printing: options.PrintOptions,
 ) -> None:
     """Compute a field and prove how far its energy can be from the minimum.
 
@@ -132,7 +132,7 @@ def _show(proof: Proof, document: dict[str, Any], folder: Path) -> None:
     print_line(f"field, {certificate}report: {folder}")
 
 
-def _check(path: Path, printing: PrintOptions) -> None:
+def _check(path: Path, printing: options.PrintOptions) -> None:
     """Check a certificate and print its facts."""
     from ...models.proof.certificate import read_certificate
 
@@ -140,8 +140,4 @@ def _check(path: Path, printing: PrintOptions) -> None:
         show("checking the certificate")
         found = read_certificate(path)
 
-    def show_valid() -> None:
-        show_facts(found.field.instance.summary, facts(found))
-        print_line("the certificate is valid")
-
-    printing.show(facts(found), show_valid)
+    printing.show_facts(found.field.instance.summary, facts(found), "the certificate is valid")

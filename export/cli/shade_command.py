@@ -8,20 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import InputError, shortened
 from ...models.processes.progress import Progress
+from . import options
 from .inputs import SAVED, drawing_of, field_or_instance, known
-from .options import (
-    FieldOrInput,
-    Flip,
-    Folder,
-    Hints,
-    Lamp,
-    On,
-    PrintOptions,
-    Scale,
-    SecondsInAll,
-    ShadedMethod,
-    Underlay,
-)
 from .output import print_notice, progress, show_surface
 from .sketch_options import SketchOptions
 
@@ -29,7 +17,7 @@ if TYPE_CHECKING:
     from ...models.field.field import CrossField
     from ...models.instance.instance import Instance
     from ...models.surface.hints import Hint
-    from ..shading.light import Light
+    from ..shading.colours import Light
     from ..solving.methods import Candidate
 
 FIELD: Final = "field.npz"
@@ -37,19 +25,19 @@ FIELD: Final = "field.npz"
 
 
 def shade_command(
-    source: FieldOrInput,
-    output: Folder,
+    source: options.FieldOrInput,
+    output: options.Folder,
     *,
-    flip: Flip = False,
-    hint: Hints = None,
-    light: Lamp = None,
-    scale: Scale = None,
-    method: ShadedMethod = None,
-    on: On = None,
-    underlay: Underlay = None,
+    flip: options.Flip = False,
+    hint: options.Hints = None,
+    light: options.Lamp = None,
+    scale: options.Scale = None,
+    method: options.ShadedMethod = None,
+    on: options.On = None,
+    underlay: options.Underlay = None,
     sketch: SketchOptions,
-    time_limit: SecondsInAll = 60.0,
-    printing: PrintOptions,
+    time_limit: options.SecondsInAll = 60.0,
+    printing: options.PrintOptions,
 ) -> None:
     """Compute the surface whose curvature lines are the crosses: normals, shaded pictures, heights, mesh.
 
@@ -58,8 +46,7 @@ def shade_command(
     """
     from ...models.field.file import write_field
     from ...models.surface.lift import surface
-    from ..surfaces.files import write_surface
-    from ..surfaces.report import surface_document
+    from ..surfaces.files import surface_document, write_surface
 
     hints, lamp = hints_of(hint), light_of(light)
     with progress(quiet=printing.quiet) as show:
@@ -125,7 +112,7 @@ def hints_of(texts: list[str] | None) -> tuple[Hint, ...]:
 
 def light_of(text: str | None) -> Light:
     """Light from a text in degrees, or from the upper left. Raises InputError for a malformed text."""
-    from ..shading.light import UPPER_LEFT, Light
+    from ..shading.colours import UPPER_LEFT, Light
 
     if text is None:
         return UPPER_LEFT

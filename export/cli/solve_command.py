@@ -9,21 +9,9 @@ import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
+from . import options
 from .inputs import formulations_of, known, read_start
-from .options import (
-    Folder,
-    FormulationName,
-    FormulationOptions,
-    Gap,
-    Input,
-    MethodName,
-    PrintOptions,
-    SecondsInAll,
-    SolverName,
-    Start,
-    Threads,
-)
-from .output import print_line, print_notice, progress, show_facts
+from .output import print_notice, progress
 from .sketch_options import SketchOptions
 
 if TYPE_CHECKING:
@@ -33,19 +21,19 @@ if TYPE_CHECKING:
 
 
 def solve_command(
-    source: Input,
-    output: Folder,
+    source: options.Input,
+    output: options.Folder,
     *,
-    formulation: FormulationName = None,
-    method: MethodName = None,
-    solver: SolverName = None,
+    formulation: options.FormulationName = None,
+    method: options.MethodName = None,
+    solver: options.SolverName = None,
     sketch: SketchOptions,
-    formulating: FormulationOptions,
-    start: Start = None,
-    time_limit: SecondsInAll = 60.0,
-    gap: Gap = 1e-6,
-    threads: Threads = 0,
-    printing: PrintOptions,
+    formulating: options.FormulationOptions,
+    start: options.Start = None,
+    time_limit: options.SecondsInAll = 60.0,
+    gap: options.Gap = 1e-6,
+    threads: options.Threads = 0,
+    printing: options.PrintOptions,
 ) -> None:
     """Compute a field by a method (-m), or solve one formulation with a solver (-f).
 
@@ -140,7 +128,7 @@ def _by_solver(name: str, solver: str | None, request: Request) -> tuple[Solutio
 
 
 def _print_candidate(
-    candidate: Candidate, proven: Proven | None, field: Path, printing: PrintOptions
+    candidate: Candidate, proven: Proven | None, field: Path, printing: options.PrintOptions
 ) -> None:
     """Print the facts of a method's field and the path of its file."""
     from ..solving.proven import NOTHING
@@ -149,31 +137,22 @@ def _print_candidate(
     if proven:
         facts |= proven.facts(facts["energy_2_norm"])
 
-    def show() -> None:
-        show_facts(candidate.field.instance.summary, facts)
-        print_line(f"field: {field}")
-        if proven:
-            print_line(f"certificate: {proven.certificate}")
-
-    printing.show(facts, show)
+    lines = [f"field: {field}", *([f"certificate: {proven.certificate}"] if proven else [])]
+    printing.show_facts(candidate.field.instance.summary, facts, *lines)
     if candidate.proof is not None and proven is None:
         print_notice(NOTHING)
     if candidate.interrupted:
         print_notice("interrupted; the best field so far was kept")
 
 
-def print_solution(solution: Solution, field: Path, printing: PrintOptions) -> None:
+def print_solution(solution: Solution, field: Path, printing: options.PrintOptions) -> None:
     """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
     from ..solving.run import facts_with_energies
 
     facts = facts_with_energies(solution)
     written = solution.point is not None and not solution.doubt
 
-    def show() -> None:
-        show_facts(solution.problem.instance.summary, facts)
-        if written:
-            print_line(f"field: {field}")
-
-    printing.show(facts, show)
+    lines = [f"field: {field}"] if written else []
+    printing.show_facts(solution.problem.instance.summary, facts, *lines)
     if solution.interrupted:
         print_notice("interrupted; the best point so far was kept" if written else "interrupted")

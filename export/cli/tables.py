@@ -51,15 +51,16 @@ def sample_rows() -> list[Row]:
     for entry in samples():
         instance = sample(entry.name)
         grid = instance.grid
-        share = len(instance.theta) / grid.size
-        row = {
-            "name": entry.name,
-            "kind": entry.kind,
-            "grid": f"{grid.width} x {grid.height}",
-            "pixels": grid.size,
-            "strokes": f"{share:.0%}",
-        }
-        rows.append(row | {"description": entry.description})
+        rows.append(
+            {
+                "name": entry.name,
+                "kind": entry.kind,
+                "grid": f"{grid.width} x {grid.height}",
+                "pixels": grid.size,
+                "strokes": f"{len(instance.theta) / grid.size:.0%}",
+                "description": entry.description,
+            }
+        )
     return rows
 
 

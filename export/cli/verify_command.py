@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from . import options
 from .inputs import known
-from .options import Exported, PrintOptions, ProgramNames, Seconds, Solve
 from .output import print_line, print_notice, progress, show_table
 
 if TYPE_CHECKING:
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def verify_command(
-    folder: Exported,
+    folder: options.Exported,
     *,
-    solve: Solve = False,
-    time_limit: Seconds = 10.0,
-    program: ProgramNames = None,
-    printing: PrintOptions,
+    solve: options.Solve = False,
+    time_limit: options.Seconds = 10.0,
+    program: options.ProgramNames = None,
+    printing: options.PrintOptions,
 ) -> None:
     """Read every exported file with every installed solver, and compare the result with the problem.
 

@@ -76,13 +76,12 @@ def _ink(axes: Any, sheet: Sheet) -> None:
         return
     ink, side = sheet.drawing.ink, sheet.drawing.scale
     high, wide = ink.shape
-    axes.imshow(
-        ink_colours()[ink],
-        extent=(0.0, side * wide, side * high, 0.0),
-        interpolation="hanning",
-        interpolation_stage="rgba",
-    )
-    axes.set_aspect("auto")
+    smooth_image(axes, ink_colours()[ink], (0.0, side * wide, side * high, 0.0))
+
+
+def smooth_image(axes: Any, image: Any, extent: tuple[float, float, float, float]) -> None:
+    """Draw colours with opacity (h, w, 4), smooth at any size. extent: left, right, bottom, top."""
+    axes.imshow(image, extent=extent, aspect="auto", interpolation="hanning", interpolation_stage="rgba")
 
 
 def _lines(axes: Any, part: Lines, scale: float, opacity: float, *, snap: bool) -> None:

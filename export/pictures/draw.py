@@ -9,22 +9,20 @@ no part.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...models.errors import InputError
 from ...models.field.field import CrossField
-from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
-from . import panels, reliefs
+from . import panels
 from .canvas import cover, page_of
 from .drawing import Drawing, read_drawing
 from .layers import sheet
@@ -81,16 +79,16 @@ KINDS: Final = {
 """Every kind of picture of instances and fields, by the name under which it is asked for."""
 
 SURFACE_KINDS: Final = {
-    "shaded": Kind("surface in the light of a lamp", (("", reliefs.draw_shaded),)),
-    "matcap": Kind("surface in the material of a glazed ball", (("", reliefs.draw_matcap),)),
-    "normals": Kind("map of the normals of a surface as colours", (("", reliefs.draw_normals),)),
+    "shaded": Kind("surface in the light of a lamp", (("", panels.draw_shaded),)),
+    "matcap": Kind("surface in the material of a glazed ball", (("", panels.draw_matcap),)),
+    "normals": Kind("map of the normals of a surface as colours", (("", panels.draw_normals),)),
     "relief": Kind(
         "strokes, normal map, shaded surface and matcap in a row",
         (
             ("strokes", panels.draw_instance),
-            ("normal map", reliefs.draw_normals),
-            ("shaded", reliefs.draw_shaded),
-            ("matcap", reliefs.draw_matcap),
+            ("normal map", panels.draw_normals),
+            ("shaded", panels.draw_shaded),
+            ("matcap", panels.draw_matcap),
         ),
         size=170.0,
     ),
@@ -121,7 +119,6 @@ def draw(
     path: str | Path,
     *,
     kind: str | None = None,
-    sketch: Sequence[ArrayLike] | None = None,
     underlay: str | Path | Drawing | None = None,
     title: str | None = None,
 ) -> Path:
@@ -137,9 +134,6 @@ def draw(
         A name in KINDS, for a Surface in SURFACE_KINDS; an Instance has only `instance`. The default is
         `shaded` for a Surface, `instance` for an Instance, `layers` for a field as SVG or with an underlay,
         and `field` otherwise.
-    sketch
-        Polylines (k, 2) in the coordinates of the sketch (y down), drawn faintly below the picture. The
-        instance's origin and pixel_size map them to the grid. Not for `layers`.
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
@@ -154,8 +148,8 @@ def draw(
     Raises
     ------
     InputError
-        For an unknown kind or suffix, a kind that needs a field, a malformed sketch, and a drawing that
-        cannot be read or has another position.
+        For an unknown kind or suffix, a kind that needs a field, and a drawing that cannot be read or has
+        another position.
     OutputError
         When the file cannot be written.
 
@@ -165,20 +159,18 @@ def draw(
     kind = kind or _fitting(what, suffix, underlaid=underlay is not None)
     chosen = _kind(kind, what)
     if kind == LAYERS and isinstance(what, CrossField):
-        if sketch:
-            raise InputError("layers lie over the drawing itself; give the drawing as underlay, no polylines")
         return write_bytes(path, _layers(what, suffix, underlay, title))
     if underlay is not None:
         raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}, or leave it out")
     with own_settings():
-        return write_bytes(path, _saved(_panels(what, chosen, sketch or (), title), suffix))
+        return write_bytes(path, _saved(_panels(what, chosen, title), suffix))
 
 
 def preview(what: Subject) -> bytes:
     """A small picture for notebooks, as PNG."""
     kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
-        return _saved(_panels(what, kind, (), None), ".png", dots=_PREVIEW_DOTS)
+        return _saved(_panels(what, kind, None), ".png", dots=_PREVIEW_DOTS)
 
 
 def _fitting(what: Subject, suffix: str, *, underlaid: bool) -> str:
@@ -202,11 +194,11 @@ def _layers(
         return _saved(page_of(layers), suffix, title=title)
 
 
-def _panels(what: Subject, kind: Kind, sketch: Sequence[ArrayLike], title: str | None) -> Any:
+def _panels(what: Subject, kind: Kind, title: str | None) -> Any:
     instance = what if isinstance(what, Instance) else what.instance
     field = what if isinstance(what, CrossField) else None
     surface = what if isinstance(what, Surface) else None
-    return _page(panels.Picture(instance, field, _on_grid(sketch, instance), kind.size, surface), kind, title)
+    return _page(panels.Picture(instance, field, kind.size, surface), kind, title)
 
 
 @contextmanager
@@ -263,23 +255,6 @@ def _kind(kind: str, what: Subject) -> Kind:
             "or use kind instance"
         )
     return table[kind]
-
-
-def _on_grid(sketch: Sequence[ArrayLike], instance: Instance) -> tuple[Floats, ...]:
-    """Polylines in pixel units, y up."""
-    lines = []
-    for number, polyline in enumerate(sketch):
-        try:
-            points = np.asarray(polyline, dtype=np.float64)
-        except (TypeError, ValueError):
-            points = np.array(np.nan)
-        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise InputError(
-                f"polyline {number} of the sketch is no list of finite points (x, y); "
-                "leave it out or repair it"
-            )
-        lines.append(panels.on_grid(points, instance))
-    return tuple(lines)
 
 
 def _page(picture: panels.Picture, kind: Kind, title: str | None) -> Any:

@@ -206,9 +206,8 @@ def _sides(mask: Bools, *, between: bool) -> Floats:
 
     Points are (x, y) with y down; pixel [row, column] reaches from (column, row) one further.
     """
-    first, second = (mask[1:, :], mask[:-1, :]), (mask[:, 1:], mask[:, :-1])
-    row, column = np.nonzero(first[0] & first[1] if between else first[0] != first[1])
-    level = np.stack([np.stack([column - 1, row], axis=1), np.stack([column, row], axis=1)], axis=1)
-    row, column = np.nonzero(second[0] & second[1] if between else second[0] != second[1])
-    upright = np.stack([np.stack([column, row - 1], axis=1), np.stack([column, row], axis=1)], axis=1)
-    return np.concatenate([level, upright]).astype(np.float64)
+    found = []
+    for one, other, step in ((mask[1:, :], mask[:-1, :], (1, 0)), (mask[:, 1:], mask[:, :-1], (0, 1))):
+        end = np.argwhere(one & other if between else one != other)[:, ::-1]
+        found.append(np.stack([end - step, end], axis=1))
+    return np.concatenate(found).astype(np.float64)

@@ -6,6 +6,7 @@ spacings do not depend on the size of a pixel, so that 24 and 200 pixels look al
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,13 +17,16 @@ from ...models.field.field import CrossField
 from ...models.instance.grid import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
-from .canvas import paint
-from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, Frame, Lines, Mark, straight
+from ..shading.colours import coloured, lit, matcap
+from ..shading.raster import Raster, raster
+from .canvas import paint, smooth_image
+from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, Frame, Lines
 
 COLLAPSED: Final = "#b9a3d6"
 OUTSIDE: Final = "#ececec"
 OPENING: Final = "#3056d3"
 
+_DOTS_PER_POINT: Final = 3  # of a surface, as in a PNG
 SPACING: Final = 6.5
 """Points between streamlines of one family in a panel of full size."""
 
@@ -31,13 +35,11 @@ SPACING: Final = 6.5
 class Picture:
     """Contents and size of a panel.
 
-    size: points of the longer side of the grid. sketch: polylines (k, 2) in pixel units, drawn faintly below.
-    surface: of its field, where the picture shows one.
+    size: points of the longer side of the grid. surface: of its field, where the picture shows one.
     """
 
     instance: Instance
     field: CrossField | None
-    sketch: tuple[Floats, ...]
     size: float
     surface: Surface | None = None
 
@@ -72,18 +74,13 @@ class Picture:
         return self.field
 
 
-def on_grid(points: Floats, instance: Instance) -> Floats:
-    """Points (k, 2) of the sketch, y down, in pixel units, y up."""
-    scaled: Floats = ((points - instance.origin) / instance.pixel_size - 0.5) * np.array([1.0, -1.0])
-    return scaled
-
-
 def draw_instance(axes: Any, picture: Picture) -> None:
     """Mask and strokes, and the gaps in the outline that were bridged when the drawing was read."""
     frame, reading = picture.frame, picture.instance.reading
     openings = () if reading is None else reading.openings
-    gaps = [straight(frame.at(on_grid(np.array(ends), picture.instance))) for ends in openings]
-    paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask), *_sketch(picture)])
+    origin, scale = picture.instance.origin, picture.unit / picture.instance.pixel_size
+    gaps = [scale * (np.array(ends) - origin)[None] for ends in openings]
+    paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask)])
     paint(axes, frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6))))
     _border(axes, picture)
     paint(axes, [Lines(OPENING, 2.6 * picture.ink, gaps)])
@@ -159,13 +156,9 @@ def legend_of(picture: Picture) -> list[Any]:
 
 
 def _under(axes: Any, picture: Picture) -> None:
-    """The sketch, or the strokes where it is not given, faintly, and the border."""
-    paint(axes, _sketch(picture) if picture.sketch else picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8))
+    """The strokes, faintly, and the border."""
+    paint(axes, picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8))
     _border(axes, picture)
-
-
-def _sketch(picture: Picture) -> list[Mark]:
-    return [Lines(FAINT, 1.6 * picture.ink, [straight(picture.frame.at(line)) for line in picture.sketch])]
 
 
 def _border(axes: Any, picture: Picture) -> None:
@@ -192,3 +185,27 @@ def _bar(axes: Any, image: Any, picture: Picture, label: str, **style: Any) -> N
     else:
         bar.set_ticks([bar.vmin, bar.vmax])
     inset.tick_params(labelsize=6.5, length=2, width=0.5)
+
+
+def draw_shaded(axes: Any, picture: Picture) -> None:
+    """The surface in the light of a lamp."""
+    _draw_surface(axes, picture, lit)
+
+
+def draw_matcap(axes: Any, picture: Picture) -> None:
+    """The surface in the material of a ball."""
+    _draw_surface(axes, picture, matcap)
+
+
+def draw_normals(axes: Any, picture: Picture) -> None:
+    """The normals as colours, smooth."""
+    _draw_surface(axes, picture, coloured)
+
+
+def _draw_surface(axes: Any, picture: Picture, colours: Callable[[Raster], Floats]) -> None:
+    """An image over the whole grid, smooth at any size; a picture without a surface has none."""
+    if picture.surface is None:
+        return
+    scale = max(1, round(_DOTS_PER_POINT * picture.unit))
+    image = colours(raster(picture.instance, picture.surface.normals, scale))
+    smooth_image(axes, image, picture.extent)

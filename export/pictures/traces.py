@@ -74,15 +74,11 @@ def trace_picture(curves: list[Curve]) -> bytes:
             marks.append(line(hue, each.bounds, each.end, dashed=False))
         if each.objectives:
             marks.append(line(hue, each.objectives, each.end, dashed=True))
-        marks += _key(hue, _HEIGHT + _BELOW + _LEGEND * (place + 0.3), each.name)
+        y = _HEIGHT + _BELOW + _LEGEND * (place + 0.3)
+        marks += [Lines(hue, _PEN, segments([(0, y, 22, y)])), Text(each.name, 30, y + 3.5)]
     bottom = _HEIGHT + _BELOW + _LEGEND * len(curves)
-    left = 8 + max(wide(_written(tick)) for tick in values.ticks)
+    left = 8 + max(wide(_written(tick)) for tick in values)
     return picture(-left, -_ABOVE, _WIDTH + _RIGHT, bottom, marks)
-
-
-def _key(hue: str, y: float, name: str) -> list[Mark]:
-    """A line of the legend."""
-    return [Lines(hue, _PEN, segments([(0, y, 22, y)])), Text(name, 30, y + 3.5)]
 
 
 def _worth(curves: list[Curve]) -> list[float]:
@@ -94,15 +90,8 @@ def _worth(curves: list[Curve]) -> list[float]:
     return [min(max(value, low - room), high + room) for value in values]
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """A scale from the first tick to the last."""
-
-    ticks: tuple[float, ...]
-
-
-def _axis(values: list[float]) -> _Axis:
-    """A scale with round ticks that holds all values."""
+def _axis(values: list[float]) -> list[float]:
+    """Round ticks of a scale that holds all values."""
     low, high = min(values), max(values)
     if high - low <= 1e-9 * max(1.0, abs(high)):
         low, high = low - 0.5 * max(abs(low), 1e-3), high + 0.5 * max(abs(high), 1e-3)
@@ -110,18 +99,18 @@ def _axis(values: list[float]) -> _Axis:
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(each * power for each in (1, 2, 5, 10) if each * power >= raw * (1 - 1e-9))
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return _Axis(tuple(place * step for place in range(first, last + 1)))
+    return [place * step for place in range(first, last + 1)]
 
 
-def _at(value: float, axis: _Axis) -> float:
+def _at(value: float, ticks: list[float]) -> float:
     """The place of a value on a scale, from 0 to 1; one beyond it lies at its end."""
-    return min(max((value - axis.ticks[0]) / (axis.ticks[-1] - axis.ticks[0]), 0.0), 1.0)
+    return min(max((value - ticks[0]) / (ticks[-1] - ticks[0]), 0.0), 1.0)
 
 
-def _scales(seconds: _Axis, values: _Axis) -> list[Mark]:
+def _scales(seconds: list[float], values: list[float]) -> list[Mark]:
     """Grid, ticks and their numbers, and the keys of both kinds of lines."""
-    heights = [(_HEIGHT * (1 - _at(tick, values)), tick) for tick in values.ticks]
-    places = [(_WIDTH * _at(tick, seconds), tick) for tick in seconds.ticks]
+    heights = [(_HEIGHT * (1 - _at(tick, values)), tick) for tick in values]
+    places = [(_WIDTH * _at(tick, seconds), tick) for tick in seconds]
     grid = [(0.0, y, _WIDTH, y) for y, _ in heights] + [(x, 0.0, x, _HEIGHT) for x, _ in places]
     corner = straight(np.array([(0.0, 0.0), (0.0, _HEIGHT), (_WIDTH, _HEIGHT)]))
     return [

@@ -48,22 +48,28 @@ def raster(instance: Instance, normals: Floats, scale: int | None = None) -> Ras
 
     scale: 1 or more; None: chosen so that the longer side is about SIDE. Raises InputError for another one.
     """
+    from scipy import ndimage
+
     scale = scale_of(instance, scale)
     mask = np.pad(instance.mask, _REACH)
+    image = np.zeros((*mask.shape, 3))
+    image[mask] = normals
     up, across = (_splines(count, scale)[_REACH * scale : -_REACH * scale] for count in mask.shape)
 
     def spread(values: Floats) -> Floats:
         return np.asarray(up @ (across @ values.T).T)
 
-    inside = spread(mask.astype(np.float64))
-    summed = np.stack([spread(_on_grid(mask, part)) for part in normals.T], axis=-1)
+    summed = np.stack([spread(part) for part in np.moveaxis(image, -1, 0)], axis=-1)
     length = np.linalg.norm(summed, axis=-1, keepdims=True)
     viewer = np.array([0.0, 0.0, 1.0])
     unit = np.where(length > 1e-9, summed / np.maximum(length, 1e-9), viewer)
     thin = spread(_thin(mask).astype(np.float64))
     within = _DRAWN * drawn_border(instance) * (1 - thin)
-    narrow, wide = inside - _SLOPE * within, spread(_blurred(mask)) - _BLURRED_SLOPE * within
-    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, *_moved(thin))))
+    solid = mask.astype(np.float64)
+    blurred = ndimage.gaussian_filter(solid, _BLUR, mode="constant")
+    narrow, wide = spread(solid) - _SLOPE * within, spread(blurred) - _BLURRED_SLOPE * within
+    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
+    return Raster(unit, _opacity(narrow + np.clip(wide - narrow, -most, most)))
 
 
 def scale_of(instance: Instance, scale: int | None) -> int:
@@ -77,13 +83,6 @@ def scale_of(instance: Instance, scale: int | None) -> int:
             f"and the picture no more than {MAX_PIXELS // 10**6} million pixels; choose another scale"
         )
     return scale
-
-
-def _on_grid(mask: Bools, values: Floats) -> Floats:
-    """Values of the pixels [height, width], 0 outside of the mask."""
-    image = np.zeros(mask.shape)
-    image[mask] = values
-    return image
 
 
 def _splines(count: int, scale: int) -> Any:
@@ -100,13 +99,6 @@ def _splines(count: int, scale: int) -> Any:
     return sparse.csr_array(entries, shape=(len(place), count))
 
 
-def _blurred(mask: Bools) -> Floats:
-    from scipy import ndimage
-
-    blurred: Floats = ndimage.gaussian_filter(mask.astype(np.float64), _BLUR, mode="constant")
-    return blurred
-
-
 def _thin(mask: Bools) -> Bools:
     """Pixels in or next to a part of the mask, or a gap in it, too thin for 3 x 3 pixels, but not a tip."""
     from scipy import ndimage
@@ -118,12 +110,6 @@ def _thin(mask: Bools) -> Bools:
     long = np.bincount(part.ravel()) > _TIP
     thin: Bools = ndimage.binary_dilation(changed & long[part], block)[3:-3, 3:-3]
     return thin
-
-
-def _moved(thin: Floats) -> tuple[Floats, Floats]:
-    """Greatest corrections of the inside share, down and up, in [0, 1]; smaller at thin places."""
-    most = _MOVED + thin * (_MOVED_THIN - _MOVED)
-    return -most, most
 
 
 def drawn_border(instance: Instance) -> float:

@@ -23,8 +23,7 @@ from ..formats.registry import generator
 from ..pictures.drawing import Drawing, read_drawing
 from ..pictures.mask import has_mask, write_mask
 from ..solutions.solution import Solution
-from ..surfaces.files import SHADED, write_shaded
-from ..surfaces.report import surface_facts
+from ..surfaces.files import SHADED, surface_facts, write_shaded
 from .compiling import compiling
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven

@@ -11,16 +11,19 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.instance.grid import Floats
+from ...models.instance.instance import Instance
 from ...models.storage import make_folder, write_bytes
 from ...models.surface.surface import Surface
+from ...models.surface.trust import off_right_angles
+from ..formats.registry import generator
+from ..pictures.canvas import pixels_of
+from ..pictures.draw import own_settings
 from ..pictures.drawing import Drawing, read_drawing
-from ..shading.light import UPPER_LEFT, Light, lit
-from ..shading.matcap import matcap
-from ..shading.normal_map import eight_bit, normal_map
+from ..pictures.layers import strokes_sheet
+from ..shading.colours import UPPER_LEFT, Light, eight_bit, lit, matcap, normal_map
 from ..shading.raster import raster, scale_of
 from .mesh import to_mtl, to_obj
-from .overlay import on_paper, over, strokes
-from .report import surface_document
 
 NORMALS: Final = "normals.png"
 SHADED: Final = "shaded.png"
@@ -43,6 +46,7 @@ FILES: Final = {
     REPORT: "facts, doubts and freedom",
 }
 """The files of a surface, and the content of each."""
+_PAPER: Final = (0.93, 0.91, 0.88)
 
 
 def write_surface(
@@ -71,7 +75,7 @@ def write_surface(
     found = raster(surface.instance, surface.normals, fine)
     shaded, ink = lit(found, light), strokes(surface.instance, drawing, fine)
     write_bytes(folder / NORMALS, png_of(normal_map(surface.instance, surface.normals, scale or 1)))
-    pictures = {SHADED: shaded, MATCAP: matcap(found), OVERLAY: over(ink, shaded), DRAWING: on_paper(ink)}
+    pictures = {SHADED: shaded, MATCAP: matcap(found), OVERLAY: over(ink, shaded), DRAWING: _on_paper(ink)}
     for name, picture in pictures.items():
         write_bytes(folder / name, png_of(eight_bit(picture)))
     write_bytes(folder / HEIGHTS, _npy(surface.heights))
@@ -100,3 +104,72 @@ def _npy(heights: NDArray[np.float64]) -> bytes:
     stream = io.BytesIO()
     np.save(stream, heights, allow_pickle=False)
     return stream.getvalue()
+
+
+def strokes(instance: Instance, drawing: Drawing | None, scale: int) -> Floats:
+    """Red, green, blue and opacity (h, w, 4) in [0, 1] of the strokes, `scale` pixels per pixel of the grid.
+
+    They come from the drawing, or are pieces of line at the stroke pixels without one.
+    """
+    height, width = (side * scale for side in instance.mask.shape)
+    with own_settings():
+        drawn: Floats = pixels_of(strokes_sheet(instance, drawing), width, height) / 255.0
+    return drawn
+
+
+def over(above: Floats, below: Floats) -> Floats:
+    """One picture (h, w, 4) laid over another, both with opacity as fourth value."""
+    front, back = above[..., 3:], below[..., 3:] * (1 - above[..., 3:])
+    opacity = front + back
+    colour = (front * above[..., :3] + back * below[..., :3]) / np.maximum(opacity, 1e-9)
+    return np.concatenate([colour, opacity], axis=-1)
+
+
+def _on_paper(drawn: Floats) -> Floats:
+    """Red, green and blue (h, w, 3) of the strokes on paper, as the texture of a mesh."""
+    return over(drawn, np.broadcast_to((*_PAPER, 1.0), drawn.shape))[..., :3]
+
+
+def surface_document(surface: Surface, about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The report of a surface as JSON. about: how it was made, for instance the method of its field."""
+    instance = surface.instance
+    return {
+        "format": "crossfield-surface",
+        "version": 1,
+        "generator": generator(),
+        "instance": {
+            "name": instance.name,
+            "source": instance.source,
+            "sha256": instance.sha256,
+            "height": instance.grid.height,
+            "width": instance.grid.width,
+            "pixels": instance.grid.size,
+            "pixel_size": instance.pixel_size,
+        },
+        **(about or {}),
+        **surface_facts(surface),
+    }
+
+
+def surface_facts(surface: Surface) -> dict[str, Any]:
+    """Whether a surface can be trusted, doubts, and freedom; in pixels and degrees."""
+    off = np.degrees(off_right_angles(surface.field, surface.heights))
+    slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
+    return {
+        "trusted": not surface.doubts,
+        "doubts": list(surface.doubts),
+        "freedom": list(surface.freedom),
+        "firmness": _rounded(surface.firmness),
+        "confidence_mean": _rounded(surface.confidence.mean()),
+        "confidence_least_tenth": _rounded(np.percentile(surface.confidence, 10)),
+        "right_angle_error_mean_degrees": _rounded(off.mean()),
+        "right_angle_error_90_percent_degrees": _rounded(np.percentile(off, 90)),
+        "slant_mean_degrees": _rounded(slant.mean()),
+        "slant_most_degrees": _rounded(slant.max()),
+        "height_range_pixels": _rounded(np.ptp(surface.corners)),
+    }
+
+
+def _rounded(value: Any) -> float:
+    """A number to four decimals, so that files are short."""
+    return round(float(value), 4)

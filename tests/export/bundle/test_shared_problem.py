@@ -62,11 +62,6 @@ def test_no_cost_is_lost_when_threads_share_a_problem(frequent_switches):
     assert spoiled(150) == 0
 
 
-@pytest.mark.slow
-def test_no_cost_is_lost_in_thousands_of_problems(frequent_switches):
-    assert spoiled(10_000) == 0
-
-
 def anew(self: cached_property, owner: object, kind: type | None = None):
     """A `cached_property` that computes the arrays that threads share again at every access."""
     if isinstance(owner, Problem | PlacedFamily | Instance | Grid):

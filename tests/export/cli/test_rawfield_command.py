@@ -1,57 +1,35 @@
 """Fields by other programs on the command line, for pictures and as starts."""
 
+from pathlib import Path
+
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
 
 
-@pytest.fixture
-def theirs(tmp_path):
-    """Files of a raw field, the greedy field, and of its instance."""
+@pytest.fixture(autouse=True)
+def files(tmp_path, monkeypatch):
+    """A raw field, its instance, and a field on another instance, in the current folder."""
+    monkeypatch.chdir(tmp_path)
     instance = cf.sample("bottle", 10)
-    cf.write_instance(instance, tmp_path / "bottle.json")
-    return cf.write_field(cf.greedy_field(instance), tmp_path / "theirs.rawfield"), tmp_path / "bottle.json"
+    cf.write_instance(instance, "bottle.json")
+    cf.write_field(cf.greedy_field(instance), "theirs.rawfield")
+    cf.write_field(cf.greedy_field(cf.sample("mouse", 10)), "mouse.npz")
 
 
-def test_a_raw_field_is_drawn_on_its_instance(theirs, tmp_path):
-    field, instance = theirs
-    picture = tmp_path / "field.svg"
-    assert invoke(["draw", str(field), "--on", str(instance), "-o", str(picture)]) == 0
-    assert picture.exists()
-
-
-def test_a_raw_field_alone_is_refused_with_the_remedy(theirs, tmp_path, capsys):
-    assert invoke(["draw", str(theirs[0]), "-o", str(tmp_path / "field.svg")]) == 1
+def test_a_raw_field_is_drawn_on_its_instance_and_no_other(capsys):
+    assert invoke(["draw", "theirs.rawfield", "--on", "bottle.json", "-o", "field.svg"]) == 0
+    assert Path("field.svg").exists()
+    assert invoke(["draw", "theirs.rawfield", "-o", "other.svg"]) == 1
     assert "holds no instance; give its instance with --on" in capsys.readouterr().err
-
-
-def test_a_field_of_another_instance_is_refused(theirs, tmp_path, capsys):
-    other = cf.write_field(cf.greedy_field(cf.sample("mouse", 10)), tmp_path / "mouse.npz")
-    assert invoke(["draw", str(other), "--on", str(theirs[1]), "-o", str(tmp_path / "field.svg")]) == 1
+    assert invoke(["draw", "mouse.npz", "--on", "bottle.json", "-o", "other.svg"]) == 1
     assert "the field is on another instance" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_a_search_starts_at_a_raw_field(theirs, tmp_path):
-    field, instance = theirs
-    folder = tmp_path / "out"
-    assert (
-        invoke(
-            [
-                "solve",
-                str(instance),
-                "-m",
-                "search",
-                "--time-limit",
-                "2",
-                "--start",
-                str(field),
-                "-o",
-                str(folder),
-            ]
-        )
-        == 0
-    )
-    (found,) = folder.glob("*.field.npz")
-    start = cf.read_field(field, on=cf.read_instance(instance)).energy().total
+def test_a_search_starts_at_a_raw_field():
+    line = "solve bottle.json -m search --time-limit 2 --start theirs.rawfield -o {}"
+    assert invoke(line.format("out").split()) == 0
+    (found,) = Path("out").glob("*.field.npz")
+    start = cf.read_field("theirs.rawfield", on=cf.read_instance("bottle.json")).energy().total
     assert cf.read_field(found).energy().total <= start + 1e-9

@@ -49,17 +49,7 @@ def test_a_saved_field_is_flipped_hinted_and_lit(saved, tmp_path, capsys):
     plain, turned = tmp_path / "plain", tmp_path / "turned"
     assert invoke(["shade", saved, "--scale", "3", "-q", "-o", str(plain)]) == 0
     assert capsys.readouterr().out == ""
-    given = [
-        "--flip",
-        "--hint",
-        "5,6,20,90",
-        "--hint",
-        "2,8,30.5,-45",
-        "--light",
-        "0,30",
-        "--underlay",
-        "mouse",
-    ]
+    given = "--flip --hint 5,6,20,90 --hint 2,8,30.5,-45 --light 0,30 --underlay mouse".split()  # noqa: SIM905
     assert invoke(["shade", saved, *given, "--scale", "3", "--json", "-o", str(turned)]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert report(turned) == printed | {"files": FILES}

@@ -4,10 +4,8 @@ import io
 
 import numpy as np
 import pytest
-from crossfield.export.shading.light import CLAY, Light, lit
-from crossfield.export.shading.matcap import ball as matcap_ball
-from crossfield.export.shading.matcap import matcap
-from crossfield.export.shading.normal_map import normal_map
+from crossfield.export.shading.colours import CLAY, Light, lit, matcap, normal_map
+from crossfield.export.shading.colours import ball as matcap_ball
 from crossfield.export.shading.raster import Raster, raster
 from crossfield.export.surfaces.files import png_of
 from crossfield.models.errors import InputError

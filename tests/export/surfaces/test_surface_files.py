@@ -7,9 +7,8 @@ import crossfield as cf
 import matplotlib as mpl
 import numpy as np
 import pytest
-from crossfield.export.surfaces.files import FILES, write_surface
+from crossfield.export.surfaces.files import FILES, surface_facts, write_surface
 from crossfield.export.surfaces.mesh import to_obj
-from crossfield.export.surfaces.report import surface_facts
 from crossfield.models.errors import InputError, OutputError
 from hypothesis import given
 from hypothesis import strategies as st
