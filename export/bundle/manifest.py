@@ -120,7 +120,26 @@ class Manifest:
 
 
 def read_manifest(path: str | Path) -> Manifest:
-    """Read a manifest from a file. Raises InputError, and InstanceError when it breaks its schema."""
+    """Read a manifest, with which `read_solution` reads answers back.
+
+    Parameters
+    ----------
+    path
+        A .manifest.json file.
+
+    Returns
+    -------
+    Manifest
+        The manifest.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    InstanceError
+        If it breaks its schema.
+
+    """
     try:
         document = parse_json(read_bytes(path, MAX_BYTES).decode())
         check_version(document, FORMAT, VERSION)
@@ -141,11 +160,32 @@ def write_problem(
     compress: bool = False,
     jobs: int = 1,
 ) -> Manifest:
-    """Write the problem in each of the formats and the instance, and return the manifest.
+    """Write one problem in several formats, with its instance and manifest.
 
-    Formats that cannot carry the problem are listed in the manifest as refused. The other arguments are those
-    of `write_all`. Raises OutputError, and InputError for an unknown format and for a problem that no
-    manifest records: with columns fixed, or with products lifted beforehand.
+    Parameters
+    ----------
+    problem
+        The problem.
+    folder
+        Folder to write to; created if it does not exist.
+    formats
+        Names of formats. Those that cannot carry the problem are listed in the manifest as refused.
+    start, dialects, compress, jobs
+        As for `write_all`.
+
+    Returns
+    -------
+    Manifest
+        The manifest.
+
+    Raises
+    ------
+    InputError
+        For an unknown format, and for a problem that no manifest records: with columns fixed one by one, or
+        with products lifted beforehand.
+    OutputError
+        If a file cannot be written.
+
     """
     if not is_recordable(problem):
         what = f"{problem.name} with columns fixed or products lifted"
@@ -168,15 +208,51 @@ def write_all(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> list[Manifest]:
-    """Write every formulation in every format that carries it, and return the manifests.
+    """Write formulations of an instance in every format that carries them.
 
-    start: a field for starting points, also in separate files, and for the jumps of `qp-fixed`. jumps_of: a
-    field for these jumps only; without either, see `fixed_jumps`. windows: narrower ones, for all
-    formulations. options: facet, stroke_norm, beta_norm, relax, each used where a formulation has it.
-    dialects: by format, `text` or `binary` for nl, `indexed` or `scalar` for gms. compress: model files as
-    .gz. jobs: number of files written at once. progress: called with each name. Raises InputError for an
-    unknown format, FormulationError for an unknown formulation, InstanceError for a start on another
-    instance, and OutputError.
+    Parameters
+    ----------
+    instance
+        The instance.
+    folder
+        Folder to write to; created if it does not exist.
+    formulations
+        Names of formulations; all by default.
+    formats
+        Names of formats; nl, gms, lp and mps by default.
+    start
+        A field for starting points, also in separate files, and for the jumps of `qp-fixed`.
+    jumps_of
+        A field for the jumps of `qp-fixed` only.
+    windows
+        Narrower windows of alpha and beta and ranges of jumps, for all formulations.
+    options
+        `facet`, `stroke_norm`, `beta_norm` and `relax`, each used where a formulation has it.
+    dialects
+        By format: `text` or `binary` for nl, `indexed` or `scalar` for gms.
+    compress
+        Whether to write model files as .gz.
+    jobs
+        Number of files that are written in parallel.
+    progress
+        Receives the name of each formulation.
+
+    Returns
+    -------
+    list of Manifest
+        One manifest per formulation.
+
+    Raises
+    ------
+    InputError
+        For an unknown format.
+    FormulationError
+        For an unknown formulation.
+    InstanceError
+        For a start on another instance.
+    OutputError
+        If a file cannot be written.
+
     """
     options = options or {}
     declarations = [declaration_of(name) for name in formulations]

@@ -167,7 +167,19 @@ def draw(
 
 
 def preview(what: Subject) -> bytes:
-    """A small picture for notebooks, as PNG."""
+    """Draw a small picture for notebooks.
+
+    Parameters
+    ----------
+    what
+        An instance, a field or a surface.
+
+    Returns
+    -------
+    bytes
+        A PNG.
+
+    """
     kind = _kind(_fitting(what, ".png", underlaid=False), what)
     with own_settings():
         return _saved(_panels(what, kind, None), ".png", dots=_PREVIEW_DOTS)

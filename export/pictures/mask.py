@@ -20,12 +20,30 @@ _TINT: Final = (170, 195, 255)  # of bridged gaps; as light as that, it counts a
 
 
 def write_mask(instance: Instance, path: str | Path) -> Path:
-    """The path of the PNG that now holds the mask: white where the field is solved, black elsewhere.
+    """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
 
-    It is as large as the bitmap that the instance was read from, or as the page of a vector sketch, rounded:
-    what read_sketch takes as `mask`. Gaps in the outline that were bridged are tinted light blue, and count
-    as white. Raises InputError for an instance that was read from no page, or from one too small or too large
-    for a picture, and OutputError.
+    Gaps in the outline that were closed are light blue, which counts as white.
+
+    Parameters
+    ----------
+    instance
+        An instance that was read from a drawing.
+    path
+        File to write. It has the size of the bitmap or page that was read: what `read_sketch` takes as
+        `mask`.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    InputError
+        For an instance from another source, or from a page that is too small or too large for a picture.
+    OutputError
+        If the file cannot be written.
+
     """
     from PIL import Image, ImageDraw
 

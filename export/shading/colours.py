@@ -42,9 +42,19 @@ _RIM: Final = 3.0  # sharpness of the light along the border of the ball
 class Light:
     """Position of a distant lamp.
 
-    azimuth: radians counter-clockwise from the right, as the tilt of a normal; by default upper left.
-    elevation: radians above the plane of the drawing, 0 to pi/2, which is straight from the viewer.
-    Raises InputError for another elevation and for values that are not finite.
+    Parameters
+    ----------
+    azimuth
+        Direction in the plane of the drawing, in radians counter-clockwise from the right; upper left by
+        default.
+    elevation
+        Angle above the plane of the drawing, 0 to pi/2 radians; pi/2 is the viewer's position.
+
+    Raises
+    ------
+    InputError
+        For an elevation out of range, and for values that are not finite.
+
     """
 
     azimuth: float = np.radians(130.0)

@@ -58,14 +58,39 @@ def write_surface(
     scale: int | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write all of FILES to a folder, pictures, heights, a mesh and a report, and return the folder.
+    """Write a surface as pictures, heights, a mesh and a report. Equal surfaces give equal bytes.
 
-    Equal surfaces give equal bytes.
-    drawing: file or sample that the instance was read from, for the strokes; None: pieces of line at the
-    stroke pixels. scale: pixels of a picture per pixel of the grid; None: one in the normal map, and in the
-    others as many as make about 1000 on the longer side. about: facts for the report on how the surface was
-    made. Every file is complete or absent; the report is written last. Raises InputError for a drawing
-    that is unreadable or does not match the instance and for a scale out of range, and OutputError.
+    Every file is complete or absent, and the report is written last.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    folder
+        Folder to write to; created if it does not exist.
+    drawing
+        File or sample from which the instance was read, for the strokes; None shows a short line at each
+        stroke pixel.
+    light
+        Position of the lamp.
+    scale
+        Pixels of a picture per pixel of the grid. None: 1 in the normal map, and in other pictures enough for
+        about 1000 on the longer side.
+    about
+        Facts for the report on how the surface was made.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        For a drawing that is unreadable or does not match the instance, and for a scale out of range.
+    OutputError
+        If a file cannot be written.
+
     """
     if drawing is not None and not isinstance(drawing, Drawing):
         drawing = read_drawing(drawing, on=surface.instance)

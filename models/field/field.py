@@ -80,12 +80,26 @@ class Singularities:
 
 @dataclass(frozen=True, eq=False)
 class CrossField(Pictured):
-    """Angles alpha, beta (n,) in radians and integer jumps p (m,) on the grid of an instance.
+    """Angles of crosses and jumps between neighbours, on the grid of an instance with n pixels and m pairs.
 
-    n pixels and m pairs in the order of `instance.grid`. Line u is at alpha + beta, line v at alpha + pi/2 -
-    beta, counter-clockwise from +x with y up; p compares the label of a pair's first pixel with that of its
-    second (docs/mathematics.md, 2 and 3).
-    Raises InstanceError when a shape does not fit the grid or a value is not finite.
+    Line u is at alpha + beta and line v at alpha + pi/2 - beta, in radians counter-clockwise from +x with y
+    up. A jump compares the label of a pair's first pixel with that of its second (docs/mathematics.md, 2 and
+    3).
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    alpha, beta
+        Direction and skew of each cross, shape (n,), in the order of `instance.grid`.
+    p
+        Jump of each pair, integers of shape (m,).
+
+    Raises
+    ------
+    InstanceError
+        If a shape does not fit the grid, or a value is not finite.
+
     """
 
     instance: Instance

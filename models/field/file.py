@@ -52,11 +52,28 @@ _Kind = TypeVar("_Kind")
 
 
 def write_field(field: CrossField, path: str | Path) -> Path:
-    """Write the field and return the path; the suffix .npz, .json or .rawfield chooses the format.
+    """Write a field. Equal fields give equal bytes.
 
-    A .rawfield gets two companions of the same name: its mesh (.obj) and its singularities (.sings). Equal
-    fields give equal bytes.
-    Raises InputError for another suffix and OutputError when a file cannot be written.
+    Parameters
+    ----------
+    field
+        The field.
+    path
+        File to write; the suffix .npz, .json or .rawfield selects the format. A .rawfield comes with its mesh
+        (.obj) and its singularities (.sings).
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    InputError
+        For another suffix.
+    OutputError
+        If a file cannot be written.
+
     """
     path = Path(path)
     write = _of_suffix(_WRITERS, path, "written")
@@ -67,13 +84,28 @@ def write_field(field: CrossField, path: str | Path) -> Path:
 
 
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
-    """Read a field and its instance from a .npz, .json or .rawfield file.
+    """Read a field with its instance.
 
-    on: the instance that the field must be on, if given. A .rawfield holds no instance and needs it: its
-    faces are the triangles of the .obj that `write_field` writes, or one per pixel. Its four vectors
-    u, v, -u, -v, of any length and in any order, become the two lines of `CrossField.from_lines`.
-    Raises InputError for another suffix, an unreadable file, and a .rawfield without an instance. Raises
-    InstanceError, with file and place, for a damaged file and another instance.
+    Parameters
+    ----------
+    path
+        A .npz, .json or .rawfield file. A .rawfield has four vectors per face, in any order and of any
+        length: u, v, -u and -v. Its faces are the triangles that `write_field` writes, or one per pixel.
+    on
+        The instance that the field must be on. A .rawfield needs it, because it contains none.
+
+    Returns
+    -------
+    CrossField
+        The field.
+
+    Raises
+    ------
+    InputError
+        For another suffix, an unreadable file, and a .rawfield without an instance.
+    InstanceError
+        For a damaged file and for another instance; the message names the place.
+
     """
     path = Path(path)
     if path.suffix.lower() == ".rawfield":

@@ -49,11 +49,28 @@ class Violation:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A formulation bound to an instance.
+    """A formulation bound to an instance; `formulate` makes it.
 
-    jumps: the data p of `qp-fixed`, shape (m,), else None. pinned: a field at whose jumps the integer columns
-    are fixed (equal bounds, continuous), or None. windows: narrower ones than those
-    of the gauge, or None.
+    Its columns are blocks of variables, one after the other, and its rows families of constraints.
+
+    Parameters
+    ----------
+    instance
+        The instance.
+    formulation
+        The declared formulation with its options.
+    jumps
+        Jumps that are data, shape (m,), for `qp-fixed`; else None.
+    pinned
+        Field at whose jumps the integer columns are fixed, or None.
+    windows
+        Windows narrower than those of the gauge, or None.
+
+    Raises
+    ------
+    FormulationError
+        For jumps that are missing, or that are given to a formulation in which they are variables.
+
     """
 
     instance: Instance
@@ -404,21 +421,56 @@ def _at_field(problem: Problem, name: str, given: dict[str, Any]) -> Floats:
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
-    """The problem of a formulation on the instance.
+    """Bind a formulation to an instance.
 
-    name: full or short, as `crossfield list` shows them. options, where the formulation has them: facet
-    (`hull`, `printed`), stroke_norm and beta_norm (1, 2), relax (True: integers made continuous). p: the
-    jumps (m,), for `qp-fixed` only.
-    Raises FormulationError for an unknown name, option or value (docs/formulations.md has the formulas).
+    Parameters
+    ----------
+    instance
+        The instance.
+    name
+        Full or short name of a formulation, as `crossfield list` shows them.
+    p
+        Jumps of the pairs, shape (m,), for `qp-fixed` only.
+    options
+        Where the formulation has them: `facet` (`hull` or `printed`), `stroke_norm` and `beta_norm` (1 or 2),
+        and `relax` (True makes integers continuous).
+
+    Returns
+    -------
+    Problem
+        The problem; docs/formulations.md has its formulas.
+
+    Raises
+    ------
+    FormulationError
+        For an unknown name, option or value.
+
     """
     return Problem(instance, declare(name, **options), p)
 
 
 def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
-    """The same problem with its integer columns fixed at the jumps of a field: a continuous problem.
+    """Return a problem with its integer columns fixed at the jumps of a field: a continuous problem.
 
-    Fixed columns stay, with equal bounds; names and order do not change. Raises InstanceError when the field
-    is on another instance.
+    Fixed columns stay, with equal bounds; names and order do not change.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    field
+        A field on its instance.
+
+    Returns
+    -------
+    Problem
+        The continuous problem.
+
+    Raises
+    ------
+    InstanceError
+        For a field on another instance.
+
     """
     return replace(problem, pinned=field)
 

@@ -53,9 +53,21 @@ processors round differently.
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A claim: no field has an energy below `bound`; with status `optimal`, the field's energy is the least.
+    """A checked claim: no field has a 2-norm energy below the bound.
 
-    field, energy: the field and its 2-norm energy. verdict: findings of the checker.
+    Parameters
+    ----------
+    field
+        The field. With status `optimal`, its energy is the minimum.
+    energy
+        Its 2-norm energy.
+    bound
+        Proven lower bound of the energy of all fields.
+    status
+        `optimal` or `gap`.
+    verdict
+        Findings of the checker.
+
     """
 
     field: CrossField
@@ -120,14 +132,29 @@ def write_certificate(proof: Proof, path: str | Path, *, stop: Stop | None = Non
 
 
 def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certificate:
-    """Read and check the certificate in a file.
+    """Read and check a certificate.
 
-    The checker reads the file, once. Field, instance, energy, bound and status come from the arrays that it
-    has checked.
+    Field, instance, energy, bound and status come from the arrays that the checker has checked.
 
-    on: the instance that the field must be on, if given.
-    Raises InputError for an unreadable file, another instance and a claim that does not hold, InstanceError
-    for a field or an instance that breaks its rules.
+    Parameters
+    ----------
+    path
+        The file.
+    on
+        The instance that the field must be on, if given.
+
+    Returns
+    -------
+    Certificate
+        The claim, which holds.
+
+    Raises
+    ------
+    InputError
+        For an unreadable file, another instance, and a claim that does not hold.
+    InstanceError
+        For a field or an instance that breaks its rules.
+
     """
     path = Path(path)
     try:

@@ -60,16 +60,34 @@ class LevelRecord:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """The best field that was found and what is proven of it.
+    """The best field that was found, and what is proven of it.
 
-    field, energy: U, its energy in the norm. bound: no field has less energy. status: `optimal` where the
-    bound is the energy but for rounding, energy - bound <= 1e-9 (1 + energy): then the jumps are forced, and
-    the field solves the convex problem that is left; else `gap`. forced: number of pairs whose jump is that
-    of the levels' centre in every field that could be better. levels: the last chain of lattices, coarsest
-    first. seconds: of the whole work. ended: `optimal`, `gap` (the one asked for is reached), `time`, `work`,
-    `interrupted`, or `labels` where the next level would be too large. norm: 1 or 2. parents: the number of
-    the level from which each follows, -1 for the first; empty where each follows from the one before. Where
-    several follow from one, they are branches: the alpha of one pixel is cut.
+    Parameters
+    ----------
+    field
+        The field.
+    energy
+        Its energy in the norm of the proof.
+    bound
+        No field has a lower energy.
+    status
+        `optimal` if energy - bound <= 1e-9 (1 + energy), else `gap`. If it is optimal, all jumps are forced
+        and the field solves the convex problem that remains.
+    forced
+        Number of pairs with the same jump in every field that could be better.
+    levels
+        The last chain of lattices, coarsest first.
+    seconds
+        Duration of the whole work.
+    ended
+        `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, or `labels` if the next level
+        would be too large.
+    norm
+        1 or 2.
+    parents
+        Number of the level from which each one follows, -1 for the first. Empty if each follows from the one
+        before. Levels with the same parent are branches: they divide the alpha of one pixel.
+
     """
 
     field: CrossField

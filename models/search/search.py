@@ -56,9 +56,19 @@ _CLOSING: Final = (0.05, 0.5)  # share of the seconds, and seconds, for the last
 
 @dataclass(frozen=True)
 class Search:
-    """Result of a search: field, whole rounds, (round, energy) of every improvement, its end.
+    """Result of a search.
 
-    ended: `time`, `rounds`, `patience` (no improvement for long) or `interrupted`.
+    Parameters
+    ----------
+    field
+        The field of lowest energy.
+    rounds
+        Number of complete rounds.
+    energies
+        Round and energy of every improvement.
+    ended
+        `time`, `rounds`, `patience` (no improvement for long) or `interrupted`.
+
     """
 
     field: CrossField
