@@ -36,8 +36,7 @@ from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
-from ..programs.calls import call
-from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError
+from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call
 from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in

@@ -13,7 +13,7 @@ import numpy as np
 from crossfield.export.programs import asl as asl_program
 from crossfield.export.programs import highs as highs_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.programs.nl_model import read_nl
+from crossfield.export.programs.casadi import read_nl
 from crossfield.export.programs.reading import Meaning as Model
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import of_problem
