@@ -460,23 +460,21 @@ floats = st.floats(allow_nan=False, allow_infinity=False)
     rows=st.integers(0, 9),
     code=st.integers(0, 600),
 )
-@pytest.mark.parametrize("binary", [False, True])
-def test_what_is_written_is_read_back(tmp_path_factory, binary, values, message, rows, code):
+def test_what_is_written_is_read_back(tmp_path_factory, values, message, rows, code):
     path = tmp_path_factory.getbasetemp() / "written.sol"
-    assert write_ampl_sol(path, message, np.array(values), rows, code, binary=binary) == path
+    assert write_ampl_sol(path, message, np.array(values), rows, code) == path
     raw = read_raw(path)
     assert raw.values.tobytes() == np.array(values).tobytes()
-    assert (raw.rows, raw.reader) == (rows, "ampl-binary" if binary else "ampl-text")
+    assert (raw.rows, raw.reader) == (rows, "ampl-text")
     if code > 99:
         assert raw.status == parse_raw(ampl(tail=f"objno 0 {code}\n")).status
 
 
-@pytest.mark.parametrize("binary", [False, True])
-def test_a_file_without_point_says_how_many_columns_there_are(tmp_path, binary):
-    path = write_ampl_sol(tmp_path / "a.sol", "no luck", np.empty(0), 3, 200, columns=7, binary=binary)
+def test_a_file_without_point_says_how_many_columns_there_are(tmp_path):
+    path = write_ampl_sol(tmp_path / "a.sol", "no luck", np.empty(0), 3, 200, columns=7)
     raw = read_raw(path)
     assert (raw.status, raw.message, raw.rows, raw.has_point) == ("infeasible", "no luck", 3, False)
-    assert (struct.pack("<4i", 3, 0, 7, 0) if binary else b"\n3\n0\n7\n0\n") in path.read_bytes()
+    assert b"\n3\n0\n7\n0\n" in path.read_bytes()
 
 
 def test_pyomo_reads_what_is_written(tmp_path):
@@ -505,16 +503,6 @@ def test_pyomo_and_this_reader_agree_on_files_of_scip(path):
         theirs = other.parse_asl_sol_file(stream)
     raw = read_raw(path)
     assert (raw.values.tolist(), raw.message) == (theirs.primals, theirs.message)
-
-
-def test_binary_files_are_laid_out_as_the_ampl_solver_library_does(tmp_path):
-    real = (HERE / "asl-20190605_binary.sol").read_bytes()
-    duals = struct.pack("<I2dI", 16, -2.5, -2.5, 16)
-    without_duals = real.replace(struct.pack("<4i", 2, 2, 5, 5), struct.pack("<4i", 2, 0, 5, 5)).replace(
-        duals, bytes(8)
-    )
-    ours = write_ampl_sol(tmp_path / "a.sol", "", np.full(5, 0.1), 2, 403, binary=True).read_bytes()
-    assert ours == without_duals + struct.pack("<4i", 8, 0, 403, 8)
 
 
 def test_the_same_solution_gives_the_same_bytes(tmp_path):

@@ -39,12 +39,12 @@ def by_name(path, names, values, *, objective=1.0, status="Optimal"):
     return path
 
 
-def by_position(path, problem, point, *, binary=False):
-    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0, binary=binary)
+def by_position(path, problem, point):
+    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0)
 
 
 @for_each("name", FORMULATIONS)
-@for_each("kind", ["names", "text", "binary"])
+@for_each("kind", ["names", "positions"])
 def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
     problem = problem_of(field, name)
     point = problem.point(field)
@@ -53,7 +53,7 @@ def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
         shuffled = np.random.default_rng(1).permutation(len(point))
         by_name(path, np.array(names_of(problem))[shuffled], point[shuffled])
     else:
-        by_position(path, problem, point, binary=kind == "binary")
+        by_position(path, problem, point)
     solution = read_solution(path, problem)
     assert solution.point.tolist() == point.tolist()
     assert solution.objective == problem.objective_value(point)

@@ -456,7 +456,7 @@ FAULTS = {
     "cplex_value_is_nan": "line 33: a variable has no name, or a value that is not a number",
     "gams_csv_na": "line 5: 'NA' is not a number",
     "gams_csv_no_columns": "line 3: no columns follow",
-    "gams_csv_no_solver_status": "line 2: 'status' stands where solver_status should",
+    "gams_csv_no_solver_status": "line 2: 'status,1' stands where solver_status should",
     "gams_csv_state_is_a_word": "line 1: 'two' is not the number of a state",
     "gams_csv_undf": "line 5: 'UNDF' is not a number",
     "gams_lst_cut": "cut off in the summary of its last solve; run GAMS again",
