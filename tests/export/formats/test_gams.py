@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 import places
 import pytest
-from cases import CASES, make_field, make_problem, names_of, points_of, problem_of
+from cases import CASES, make_field, make_problem, names_of, problem_of
 from crossfield import templates
 from crossfield.export.formats import gams_indexed
 from crossfield.export.formats import gams_scalar as gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
-from crossfield.export.programs.reading import Points
 from crossfield.export.solving.local import solve
-from crossfield.export.verify.comparison import evaluation_difference, values_at
+from crossfield.export.verify.comparison import evaluation_difference
 from crossfield.export.writing.canonical import Canonical
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each
+from oracles import random_points
 
 GOLDEN = places.GOLDEN
 LAYOUTS = {"scalar": gams.generate, "indexed": gams_indexed.generate}
@@ -63,8 +63,7 @@ def test_gams_reads_the_problem(label: str, layout: str, tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)  # where GAMS puts its files
     problem = problem_of(label)
     write(problem, tmp_path / "model.gms", dialect=layout)
-    values = points_of(problem, 5)
-    points = Points(names_of(column_names(problem)), values, values_at(problem, values)[0], len(values))
+    points = random_points(problem)
     found = gams_program.evaluate(tmp_path / "model.gms", points)
     assert evaluation_difference(found, problem, points) == ""
 
