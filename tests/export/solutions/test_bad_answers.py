@@ -307,8 +307,8 @@ def test_damaged_files_are_refused_or_read(path, damages):
 
 
 @for_each("part", [
-        b"\n", b" ", b"1", b"1 ", b"a\n", b"*** ", b'"', b"[", b"<a>", b"<a ", b",", b"c\n", b"# \n", b"\0", b"-",
-        b"Options", b"Options\n", b"objno ", b"1.#INF",
+        b"\n", b" ", b"1", b"1 ", b"a\n", b"*** ", b'"', b"[", b"<a>", b"<a ", b",", b"c\n", b"# \n", b"\0",
+        b"-", b"Options", b"Options\n", b"objno ", b"1.#INF",
     ])  # fmt: skip
 @for_each("head", HEADS)
 @pytest.mark.slow
