@@ -17,9 +17,6 @@ Segments: C (rows), O, x (start), r, b, k (cumulative column counts, N4), J, G; 
 (N6). Opcodes: o0 + , o2 * , o5 power, o16 minus, o46 cos, o54 sum of three or more (N14). The objective is
 written as declared, factored, with its constant inside; of a nonlinear row the linear part stands in J and
 the constant in r. Binary: one letter, little-endian int32 and float64.
-
-Counted while writing: columns (b), rows (C, r and J), costs (G) and coefficients of rows (J) other than 0,
-places of columns in the objective's tree (O) and factors of the rows' products (C).
 """
 
 from __future__ import annotations
@@ -30,6 +27,7 @@ from typing import Any, Final
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from ...models.formulations.families import Monomial, PlacedFamily
 from ...models.formulations.names import name_length
@@ -42,6 +40,7 @@ from ..writing.nl_layout import Layout, nonlinear_terms, runs
 from ..writing.records import (
     Counted,
     Decimals,
+    Part,
     Piece,
     Pieces,
     Raw,
@@ -58,7 +57,7 @@ _FACTORS: Final = "factors of products in rows"
 _FUNCTIONS: Final = {sp.cos: COSINE}
 
 
-Numbers = Ints | Floats | int | float
+Numbers = NDArray[Any] | int | float
 
 
 class Text:
@@ -71,11 +70,12 @@ class Text:
         """Begin to count the content of one file."""
         self.counts = Counter[str]()
 
-    def number(self, value: Numbers) -> Piece:
+    def number(self, value: Numbers) -> bytes | Part:
         """A number within a token, decimal if it is whole by its type."""
         if isinstance(value, int):
             return str(value).encode()
-        return Decimals(value) if np.asarray(value).dtype.kind == "i" else words(value)
+        values = np.asarray(value)
+        return Decimals(values) if values.dtype.kind == "i" else words(values)
 
     def token(self, name: bytes, *numbers: Numbers | Counted) -> list[Piece]:
         """A letter with numbers, numbers alone, or a digit with numbers, which then stand apart from it."""
@@ -106,7 +106,7 @@ class Binary(Text):
     head = (b"b3 1 1 0", 1)
     padded = False
 
-    def number(self, value: Numbers) -> Piece:
+    def number(self, value: Numbers) -> bytes | Part:
         """A number within a token, of four bytes if it is whole by its type."""
         if isinstance(value, int):
             return value.to_bytes(4, "little", signed=True)
@@ -116,8 +116,8 @@ class Binary(Text):
 
     def token(self, name: bytes, *numbers: Numbers | Counted) -> list[Piece]:
         """A letter or a digit, if any, and numbers."""
-        found = [each if isinstance(each, Counted) else self.number(each) for each in numbers]
-        return [name, *found] if name else found
+        found = (each if isinstance(each, Counted) else self.number(each) for each in numbers)
+        return [name, *found] if name else [*found]
 
 
 def generate(

@@ -35,13 +35,11 @@ __all__ = [
     "by_scip",
     "of_problem",
     "random_points",
-    "scip_columns",
 ]
 
 by_highs = highs_program.read
 by_scip = scip_program.read
 by_casadi = read_nl
-scip_columns = scip_program.columns
 
 
 def by_gurobi(path: Path) -> Model:
