@@ -177,7 +177,6 @@ class Solvers:
         """Prepare without starting a process."""
         self._stack = ExitStack()
         self._children: dict[str, Child] = {}
-        self._versions: dict[str, str] = {}
 
     def __enter__(self) -> Self:
         """Create the folder for the programs' own files."""
@@ -200,11 +199,6 @@ class Solvers:
 
         Raises SolverError when the program does not report it.
         """
-        if solver not in self._versions:
-            self._versions[solver] = self._version(solver)
-        return self._versions[solver]
-
-    def _version(self, solver: str) -> str:
         program = PROGRAMS[SOLVERS[solver].program]
         if program.name != solver:
             try:

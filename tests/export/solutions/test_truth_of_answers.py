@@ -393,15 +393,6 @@ def test_the_column_that_scip_adds_for_a_constant_is_known(tmp_path):
     assert (found.unknown, found.status) == (0, "feasible")
 
 
-def test_a_file_of_scip_without_a_point_says_what_it_knows():
-    def of(words):
-        return parse_raw(words + b"no solution available\n").status
-
-    assert of(b"") == of(b"solution status: unknown\n") == Status.NO_POINT
-    assert of(b"solution status: infeasible\n") == Status.INFEASIBLE
-    assert of(b"solution status: time limit reached\n") == Status.LIMIT_WITHOUT_POINT
-
-
 # the standalone checker
 
 
