@@ -62,26 +62,17 @@ _GLOBAL = re.compile(
 # SCIP writes those three words instead of its name; Ipopt writes them after its own
 
 
-class _Code(NamedTuple):
-    """Meaning of solve codes up to `last`, with values in the file and without."""
-
-    last: int
-    with_point: Status
-    without_point: Status
-
-
-_FAILURE: Final = _Code(-1, Status.ERROR, Status.ERROR)  # codes below 0 and from 500 on
 _CODES: Final = (
-    _FAILURE,
-    _Code(99, Status.OPTIMAL_LOCAL, Status.ERROR),
-    _Code(199, Status.FEASIBLE, Status.ERROR),
-    _Code(299, Status.INFEASIBLE, Status.INFEASIBLE),
-    _Code(399, Status.UNBOUNDED, Status.UNBOUNDED),
-    _Code(449, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    # up to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
-    _Code(469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    _Code(499, Status.LIMIT_WITHOUT_POINT, Status.LIMIT_WITHOUT_POINT),
+    (-1, Status.ERROR),
+    (99, Status.OPTIMAL_LOCAL),
+    (199, Status.FEASIBLE),
+    (299, Status.INFEASIBLE),
+    (399, Status.UNBOUNDED),
+    # from 450 to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
+    (469, Status.LIMIT_WITH_POINT),
+    (499, Status.LIMIT_WITHOUT_POINT),
 )
+"""Greatest code of each status; greater codes are failures."""
 
 
 def _recognises_text(head: bytes) -> bool:
@@ -203,8 +194,8 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
         return Status.OPTIMAL_GLOBAL
     if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():
         return Status.INFEASIBLE
-    entry = next((entry for entry in _CODES if code <= entry.last), _FAILURE)
-    return entry.with_point if with_point else entry.without_point
+    status = next((status for last, status in _CODES if code <= last), Status.ERROR)
+    return status if with_point else status.without_point
 
 
 def parse_binary(data: bytes) -> RawSolution:

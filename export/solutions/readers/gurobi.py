@@ -65,7 +65,6 @@ _STATUS: Final = {
     19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # proves nothing, and has no point
 }
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
-_WITHOUT_POINT: Final = {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.FEASIBLE: Status.ERROR}
 
 
 def _recognises(head: bytes) -> bool:
@@ -124,7 +123,7 @@ def parse_json(data: bytes) -> RawSolution:
     if variables is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError("the file states optimal but holds no Vars; let Gurobi write it again")
-        return without_point(_WITHOUT_POINT.get(status, status), words)
+        return without_point(status.without_point, words)
     names, values = _columns(variables)
     objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
     return RawSolution(status, words, objective, names, values, omits_zeros=True, bound=bound)

@@ -95,11 +95,7 @@ def _expect(cursor: Cursor, expected: bytes) -> None:
 
 def _status(words: bytes, *, feasible: bool) -> Status:
     status = _STATUS.get(words, Status.ERROR)
-    if feasible:
-        return status
-    return {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.OPTIMAL_GLOBAL: Status.ERROR}.get(
-        status, status
-    )
+    return status if feasible else status.without_point
 
 
 def _without_point(words: bytes) -> RawSolution:

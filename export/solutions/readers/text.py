@@ -77,12 +77,19 @@ class Status(StrEnum):
     @property
     def promises_point(self) -> bool:
         """Whether the status implies a feasible point."""
-        return self in _PROMISING
+        return self in {
+            Status.OPTIMAL_GLOBAL,
+            Status.OPTIMAL_LOCAL,
+            Status.FEASIBLE,
+            Status.LIMIT_WITH_POINT,
+        }
 
-
-_PROMISING: Final = frozenset(
-    {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL, Status.FEASIBLE, Status.LIMIT_WITH_POINT}
-)
+    @property
+    def without_point(self) -> Status:
+        """The status of a file that states this one, but holds no point."""
+        if self is Status.LIMIT_WITH_POINT:
+            return Status.LIMIT_WITHOUT_POINT
+        return Status.ERROR if self.promises_point else self
 
 
 @dataclass(frozen=True, eq=False)
