@@ -15,9 +15,6 @@ the tests do. AMPL itself is not free; no test runs it.
 
 Names: alpha[1,2] is alpha_01_02, p1[1,2,"u"] is p1_01_02_u; row tags are those of the other formats. The .mod
 ends with comments that print an answer with our names, as a readable solution file.
-
-Counted while the .dat is written, because columns and rows are sums over sets: pixels, strokes,
-jumps other than 0, and elements with narrowed bounds. The .mod holds no data.
 """
 
 from __future__ import annotations

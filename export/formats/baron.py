@@ -15,9 +15,6 @@
 Our names fit: a letter first, at most 15 characters (B3). BARON's results name its columns, in the order of
 its own sections, and no rows (B5). There are no OPTIONS, because these belong to the user. B-numbers:
 docs/format-rules.md; sections and grammar: BARON's user manual, section 4.
-
-Counted while writing: declared columns, declared rows, rows with an expression, coefficients and products of
-rows other than 0, and the places of columns in the objective's expression.
 """
 
 from __future__ import annotations

@@ -12,9 +12,6 @@ label and no pair. Names are case-insensitive (G4), so the set is S_c and not S.
 functions of GAMS, but a declared symbol of that name takes precedence, so variables keep the names of the
 paper (tested through CONVERT). Type, options, signs, powers, the start and the CSV of `--RESULTS` are as in
 the scalar layout (gams_scalar.py).
-
-Counted while writing, because columns and rows are sums over sets: pixels in the runs, strokes with a
-direction, reliabilities other than 0, jumps other than 0, and narrowed bounds.
 """
 
 from __future__ import annotations
@@ -35,8 +32,8 @@ from ...models.instance.instance import Instance
 from ...templates import stream
 from ..writing.canonical import Canonical
 from ..writing.counting import Expected, check
-from ..writing.records import Counted, Piece, Words, number, render, words
-from .gams_scalar import MODEL_TYPES, SENSES, power
+from ..writing.records import Counted, Words, number, render, words
+from .gams_scalar import MODEL_TYPES, SENSES, Scalar
 from .indexed import Indexed, check_indexed, described, narrowed
 
 SETS: Final[dict[IndexSet, str]] = {"pixels": "I", "strokes": "S_c", "pairs": "E"}
@@ -202,21 +199,16 @@ class _Gams(Indexed):
     second = SECOND
     brackets = "()"
 
+    power = Scalar.power
+
     def exact(self, constant: sp.Expr) -> str:
-        return _exact(constant)
-
-    def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        return power(base, exponent)
-
-
-def _exact(constant: sp.Expr) -> str:
-    """A positive rational multiple of a power of pi: `2`, `pi/4`, `19*sqr(pi)`."""
-    numerator, denominator = sp.fraction(constant)
-    rational, rest = numerator.as_coeff_Mul()
-    base, exponent = rest.as_base_exp()
-    pi = {0: "", 1: "pi", 2: "sqr(pi)"}[int(exponent) if base == sp.pi else 0]
-    text = "*".join(filter(None, (str(rational) if rational != 1 or not pi else "", pi)))
-    return text if denominator == 1 else f"{text}/{denominator}"
+        """A positive rational multiple of a power of pi: `2`, `pi/4`, `19*sqr(pi)`."""
+        numerator, denominator = sp.fraction(constant)
+        rational, rest = numerator.as_coeff_Mul()
+        base, exponent = rest.as_base_exp()
+        pi = {0: "", 1: "pi", 2: "sqr(pi)"}[int(exponent) if base == sp.pi else 0]
+        text = "*".join(filter(None, (str(rational) if rational != 1 or not pi else "", pi)))
+        return text if denominator == 1 else f"{text}/{denominator}"
 
 
 def _condition(family: PlacedFamily) -> str:

@@ -20,9 +20,6 @@ place of a minus. Without a solution they are the start, so check the status fir
 column in no term, which is not in GAMS's model (G11).
 
 G-numbers: docs/format-rules.md.
-
-Counted while writing: declared columns, columns with bounds, declared rows, rows with an expression, and the
-places of columns in the expressions of objective and rows.
 """
 
 from __future__ import annotations
@@ -113,11 +110,6 @@ def generate(form: Canonical, header: list[str], *, start: Floats | None = None)
     )
 
 
-def power(base: list[Piece], exponent: int) -> list[Piece]:
-    """A power in a form that GAMS evaluates for bases of any sign (G1)."""
-    return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
-
-
 def bracketed(values: Floats) -> Texts:
     """Numbers, in brackets if negative: `3`, `(-0.5)`."""
     texts = numbers(values)
@@ -153,8 +145,8 @@ class Scalar(Language):
         return _number_words(values, signed=signed)
 
     def power(self, base: list[Piece], exponent: int) -> list[Piece]:
-        """A power in the form of GAMS."""
-        return power(base, exponent)
+        """A power in a form that GAMS evaluates for bases of any sign (G1)."""
+        return [b"sqr(", *base, b")"] if exponent == 2 else [b"power(", *base, f",{exponent})".encode()]
 
 
 def _number_words(values: Floats | float, *, signed: bool) -> Piece:

@@ -18,9 +18,6 @@ r"""CPLEX-style LP, in the subset that HiGHS, Gurobi, CPLEX, SCIP, Xpress, CBC a
 The column ONE, fixed to 1, carries a constant (L1, L2). Each line has one term, so that no line is long
 (L30). A model without rows gets the row `c_ONE: + 1 ONE = 1` (L27). Numbers are shortest round trip.
 L-numbers: docs/format-rules.md.
-
-Counted while writing, without ONE: columns with their costs, columns with their bounds, costs and
-coefficients of rows other than 0, products of the objective and of rows, and rows.
 """
 
 from __future__ import annotations

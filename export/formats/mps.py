@@ -12,9 +12,6 @@
     ENDATA
 
 The objective's constant is the cost of a column ONE fixed to 1. M-numbers: docs/format-rules.md.
-
-Counted while writing, without ONE: columns with their costs, columns with their bounds, costs and
-coefficients of rows other than 0, products of the objective and of rows (one half of each), and rows.
 """
 
 from __future__ import annotations

@@ -17,9 +17,6 @@ Read in reader_osil.c of SCIP (github.com/scipopt/scip): a cost given twice is n
 each stands once; `mult` of variables and rows is not taken, so each has its line; <sum> and <product> take
 any number of arguments, <square> and <cos> one; a constant of the objective becomes a fixed variable
 `objconstvar`. O-numbers: docs/format-rules.md.
-
-Counted while writing: columns, costs other than 0, products of the objective and of rows, rows, coefficients
-of rows other than 0, and the places of columns in the expressions beyond quadratic.
 """
 
 from __future__ import annotations

@@ -24,9 +24,6 @@ those.
 
 Order and types: qplib.zib.de/doc.html, and appendix B of Furini and others, QPLIB: a library of quadratic
 programming instances, Mathematical Programming Computation 11 (2019).
-
-Counted while writing: names of columns and of rows, costs other than 0 (the usual one for every column that
-is not listed), products of the objective and of rows, and coefficients of rows other than 0.
 """
 
 from __future__ import annotations

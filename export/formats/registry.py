@@ -6,10 +6,11 @@ declared a relaxation otherwise; any other problem is refused by name before the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
@@ -23,69 +24,19 @@ from ..writing.canonical import Canonical
 from ..writing.sink import is_packed, saving
 
 
-def _nl(form: Canonical, _header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
-    from . import nl
-
-    return nl.generate(form, binary=dialect == "binary", start=start)
-
-
-def _gms(form: Canonical, header: list[str], start: Floats | None, dialect: str) -> Iterator[bytes]:
-    from . import gams_indexed
-    from . import gams_scalar as gams
-
-    generate = gams.generate if dialect == "scalar" else gams_indexed.generate
-    return generate(form, header, start=start)
-
-
-def _lp(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import lp
-
-    return lp.generate(form, header)
-
-
-def _mps(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import mps
-
-    return mps.generate(form, header)
-
-
-def _mod(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import ampl as mod
-
-    return mod.generate(form, header)
-
-
-def _osil(form: Canonical, header: list[str], _start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import osil
-
-    return osil.generate(form, header)
-
-
-def _qplib(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import qplib
-
-    return qplib.generate(form, header, start=start)
-
-
-def _bar(form: Canonical, header: list[str], start: Floats | None, _dialect: str) -> Iterator[bytes]:
-    from . import baron as bar
-
-    return bar.generate(form, header, start=start)
-
-
 @dataclass(frozen=True)
 class Format:
     """A file format: its capabilities and its writer.
 
-    degree: greatest degree of a polynomial it holds (99: any function); dialects: named variants, the default
-    first; starts: whether it has a place for a starting point; default: whether it is written when no format
-    is requested.
+    degree: greatest degree of a polynomial it holds (99: any function); module: of its writer in this folder;
+    dialects: named variants, the default first; starts: whether it has a place for a starting point; default:
+    whether it is written when no format is requested.
     """
 
     name: str
     summary: str
     degree: int
-    generate: Callable[[Canonical, list[str], Floats | None, str], Iterator[bytes]]
+    module: str
     dialects: tuple[str, ...] = ("",)
     starts: bool = False
     default: bool = True
@@ -95,30 +46,41 @@ class Format:
         """Suffix of its files, with the dot."""
         return f".{self.name}"
 
+    def generate(
+        self, form: Canonical, header: list[str], start: Floats | None = None, dialect: str = ""
+    ) -> Iterator[bytes]:
+        """The bytes of a file, as its writer makes them; the module of the writer is loaded only here."""
+        options: dict[str, Any] = {"start": start} if self.starts else {}
+        if dialect == "binary":
+            options["binary"] = True
+        writer = import_module(f"{__package__}.{self.module.format(dialect=dialect or self.dialects[0])}")
+        content: Iterator[bytes] = writer.generate(form, header, **options)
+        return content
+
 
 FORMATS: Final = {
     entry.name: entry
     for entry in (
         Format(
             "nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro",
-            ANY_DEGREE, _nl, ("text", "binary"), starts=True,
+            ANY_DEGREE, "nl", ("text", "binary"), starts=True,
         ),
         Format(
             "gms", "GAMS model, self-contained: sets and equations, or scalar",
-            ANY_DEGREE, _gms, ("indexed", "scalar"), starts=True,
+            ANY_DEGREE, "gams_{dialect}", ("indexed", "scalar"), starts=True,
         ),
-        Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, _lp),
+        Format("lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK", 2, "lp"),
         Format(
             "mps", "free MPS with QUADOBJ and QCMATRIX, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
-            2, _mps,
+            2, "mps",
         ),
         Format(
             "mod", "AMPL model in the paper's notation with its data in a .dat; the linear ones for GLPK too",
-            ANY_DEGREE, _mod, default=False,
+            ANY_DEGREE, "ampl", default=False,
         ),
-        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, _osil, default=False),
-        Format("qplib", "QPLIB's own format, at most quadratic", 2, _qplib, starts=True, default=False),
-        Format("bar", "BARON's own format, polynomials", 4, _bar, starts=True, default=False),
+        Format("osil", "OSiL, XML, for SCIP and Optimization Services", ANY_DEGREE, "osil", default=False),
+        Format("qplib", "QPLIB's own format, at most quadratic", 2, "qplib", starts=True, default=False),
+        Format("bar", "BARON's own format, polynomials", 4, "baron", starts=True, default=False),
     )
 }  # fmt: skip
 """The table of formats; command line, docs and tests are generated from it."""
@@ -249,9 +211,7 @@ def _companions(
         yield path.with_name(f"{stem}.row"), form.layout.row_file()
         yield path.with_name(f"{stem}.col"), form.layout.column_file()
     if name == "mod":
-        from . import ampl as mod
+        from . import ampl
 
-        yield (
-            path.with_name(f"{stem}.dat{path.suffix if is_packed(path) else ''}"),
-            mod.data(form.problem, lines),
-        )
+        packed = path.suffix if is_packed(path) else ""
+        yield path.with_name(f"{stem}.dat{packed}"), ampl.data(form.problem, lines)

@@ -17,8 +17,9 @@ import os
 import shutil
 import signal
 import subprocess
+from importlib import import_module
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from ...models.errors import CrossfieldError
 from ...models.processes.control import on_stop
@@ -82,6 +83,19 @@ class Outcome(NamedTuple):
     message: str = ""
     bound: float | None = None
     nodes: int | None = None
+
+
+def call(program: str, step: str, *arguments: Any) -> Any:
+    """Call a function of a program's module: `version`, `read`, `evaluate` or `solve` (see protocol.py).
+
+    Raises the module's own errors, and FailedError for errors of the program's interface.
+    """
+    try:
+        return getattr(import_module(f"{__package__}.{program}"), step)(*arguments)
+    except CrossfieldError:
+        raise
+    except Exception as error:
+        raise FailedError(f"{type(error).__name__}: {error}") from error
 
 
 def run_program(name: str, *arguments: str, folder: Path | None = None) -> str:

@@ -97,15 +97,6 @@ def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, T
     return listed(linear, indices=2), listed(square, indices=3, products=2)
 
 
-def columns(path: Path) -> dict[str, tuple[bool, float, float]]:
-    """The columns of a file as SCIP reads them: whether each is discrete, and its bounds."""
-    scip = _load(path)  # its variables do not outlive it
-    ours = [v for v in scip.getVars() if v.name not in _OBJECTIVE_COLUMNS]
-    lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in ours])
-    ends = zip(lower.tolist(), upper.tolist(), strict=True)
-    return {v.name: (v.vtype() != "CONTINUOUS", *end) for v, end in zip(ours, ends, strict=True)}
-
-
 def evaluate(path: Path, points: Points) -> Evaluation:
     """The .nl or OSiL file as SCIP reads it: columns, linear rows, its judgement of the objective."""
     scip = _load(path)

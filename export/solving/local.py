@@ -36,8 +36,7 @@ from ...models.storage import make_folder
 from ..bundle.manifest import is_recordable, write_manifest
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, carried, write
-from ..programs.calls import call
-from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError
+from ..programs.protocol import FailedError, Job, Outcome, RefusedError, TooLargeError, call
 from ..solutions.readers.text import Status
 from ..solutions.solution import Solution, read_solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Taking, takes_in
@@ -178,7 +177,6 @@ class Solvers:
         """Prepare without starting a process."""
         self._stack = ExitStack()
         self._children: dict[str, Child] = {}
-        self._versions: dict[str, str] = {}
 
     def __enter__(self) -> Self:
         """Create the folder for the programs' own files."""
@@ -201,11 +199,6 @@ class Solvers:
 
         Raises SolverError when the program does not report it.
         """
-        if solver not in self._versions:
-            self._versions[solver] = self._version(solver)
-        return self._versions[solver]
-
-    def _version(self, solver: str) -> str:
         program = PROGRAMS[SOLVERS[solver].program]
         if program.name != solver:
             try:

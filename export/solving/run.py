@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -11,7 +12,7 @@ from ...models.errors import CrossfieldError
 from ...models.field.field import CrossField
 from ...models.field.file import write_field
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Deadline, Over, Stop, never, stop_function
+from ...models.processes.deadline import Clock, Deadline, Over, Stop, never, stop_function
 from ...models.processes.limits import Limits
 from ...models.processes.progress import Progress, silent
 from ...models.search.starts import first_field
@@ -28,7 +29,6 @@ from .compiling import compiling
 from .methods import METHODS, Candidate, Request, field_facts, finite, solution_facts
 from .proven import Proven
 from .run_page import PAGE, write_page
-from .stopwatch import Stopwatch
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
@@ -149,6 +149,23 @@ class Report:
                 m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
             },
         }
+
+
+@dataclass
+class Stopwatch:
+    """The seconds of consecutive stages, to 3 decimals: their sum is the whole time until the last lap."""
+
+    clock: Clock = time.perf_counter
+    stages: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Begin the first stage."""
+        self._begin = self.clock()
+
+    def lap(self, stage: str) -> None:
+        """End a stage and begin the next one; the rounding error goes to the next one too."""
+        passed = self.clock() - self._begin - sum(self.stages.values())
+        self.stages[stage] = round(self.stages.get(stage, 0.0) + max(passed, 0.0), 3)
 
 
 def plan(limits: Limits) -> str:

@@ -289,12 +289,11 @@ class _Bench:
 
     def _difference(self, subject: _Subject) -> str:
         """Return how the model that the program reads differs from the problem; empty if it does not."""
-        program = self.program.name
-        if subject.format in self.program.algebra:
-            model = self.solvers.ask(program, "read", subject.path, seconds=READING_SECONDS)
-            return difference(model, subject.held, self.program.tolerance, subject.points.values)
-        points = subject.points
-        found = self.solvers.ask(program, "evaluate", subject.path, points, seconds=READING_SECONDS)
+        program, points = self.program, subject.points
+        if subject.format in program.algebra:
+            model = self.solvers.ask(program.name, "read", subject.path, seconds=READING_SECONDS)
+            return difference(model, subject.held, program.tolerance, points.values)
+        found = self.solvers.ask(program.name, "evaluate", subject.path, points, seconds=READING_SECONDS)
         return evaluation_difference(found, subject.held, points)
 
     def _too_large(self, subject: _Subject) -> str:
@@ -388,39 +387,32 @@ def compared(checks: list[Check]) -> list[Check]:
 def _against(check: Check, checks: list[Check]) -> Check:
     if check.step != "solve" or check.verdict not in {Verdict.AGREES, Verdict.LIMIT}:
         return check
-    wrong = _against_others(check, checks) or _above_what_it_relaxes(check, checks)
+    wrong = _contradiction(check, _best(checks, check.group), _best(checks, check.relaxes))
     if wrong:
         return replace(check, verdict=Verdict.DIFFERS, reason=wrong)
     return replace(check, reason=_as_relaxation(check, checks)) if check.relaxes else check
 
 
-def _against_others(check: Check, checks: list[Check]) -> str:
-    """How a proven optimum or a bound contradicts the best point of the same problem; empty if not."""
-    best = _best(checks, check.group)
-    if best is None:
-        return ""
-    if check.proven and check.objective is not None and _above(check.objective, best):
-        return f"its optimum is {check.objective:.9g}, another has {best:.9g}"
-    if check.bound is not None and _above(check.bound, best):
-        return f"its bound {check.bound:.9g} is above a point of {best:.9g}"
+def _contradiction(check: Check, same_problem: float | None, relaxed: float | None) -> str:
+    """How an optimum or a bound contradicts the best point of its problem, or of the problem it relaxes."""
+    optimum = check.objective if check.proven else None
+    if same_problem is not None and optimum is not None and _above(optimum, same_problem):
+        return f"its optimum is {optimum:.9g}, another has {same_problem:.9g}"
+    if same_problem is not None and check.bound is not None and _above(check.bound, same_problem):
+        return f"its bound {check.bound:.9g} is above a point of {same_problem:.9g}"
+    lower = optimum if check.proven else check.bound
+    if relaxed is not None and lower is not None and _above(lower, relaxed):
+        return (
+            f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {relaxed:.9g}"
+        )
     return ""
-
-
-def _above_what_it_relaxes(check: Check, checks: list[Check]) -> str:
-    """How the proven optimum of a relaxation exceeds a point of the problem itself; empty if it does not."""
-    best = _best(checks, check.relaxes)
-    lower = check.objective if check.proven else check.bound
-    if best is None or lower is None or not _above(lower, best):
-        return ""
-    return f"it holds a relaxation, and its optimum is at least {lower:.9g}, above a point of {best:.9g}"
 
 
 def _as_relaxation(check: Check, checks: list[Check]) -> str:
     """Note on the solve of a relaxation, with the best point of the problem itself, if any."""
     best, reason = _best(checks, check.relaxes), f"; {check.reason}" if check.reason else ""
-    comparison = (
-        f", no higher than {best:.9g} of the problem itself" if best is not None and check.proven else ""
-    )
+    known = best is not None and check.proven
+    comparison = f", no higher than {best:.9g} of the problem itself" if known else ""
     return f"a relaxation: products lifted without integrality{comparison}{reason}"
 
 

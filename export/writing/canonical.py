@@ -17,7 +17,6 @@ from ...models.formulations.arrays import row_sides
 from ...models.formulations.families import Block, Coefficient, Monomial
 from ...models.formulations.problem import Problem
 from ...models.instance.grid import Bools, Floats, Ints
-from .glpk_order import glpk_order
 from .names import Names
 from .nl_layout import Layout
 from .records import Texts, check_coefficients, of_bytes
@@ -121,13 +120,38 @@ class Canonical:
         if file == "nl":
             return self.layout.order
         if file == "mod":
-            return glpk_order(self.problem)
+            return _glpk_order(self.problem)
         own, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns] * self.has_one
         return np.concatenate([one, own] if file == "lp" else [own, one]).astype(np.int32)
 
     def row_count(self, file: Order) -> int:
         """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
         return self.problem.n_rows + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
+
+
+def _glpk_order(problem: Problem) -> Ints:
+    """Columns (k,) in the order in which GLPK 5.0 numbers those of our .mod, without an angle in no row.
+
+    It numbers the columns of a block as they first occur. Every pair names its second pixel before its first
+    one: (14) and (16) have both on the right side, and GLPK adds from the back. Then the strokes follow, and
+    for the skew all pixels. `glpsol -m x.mod -d x.dat --wglp` names the columns that it numbers.
+    """
+    instance = problem.instance
+    grid = instance.grid
+    named = np.concatenate([np.stack([grid.second, grid.first], axis=1).ravel(), instance.stroke_index])
+    orders = {"alpha": _first(named), "beta": _first(np.concatenate([named, np.arange(grid.size)]))}
+    return np.concatenate(
+        [
+            block.offset + orders.get(name, np.arange(block.count, dtype=np.int64))
+            for name, block in problem.blocks.items()
+        ]
+    ).astype(np.int32)
+
+
+def _first(named: Ints) -> Ints:
+    """Every number once, in the order of first occurrence."""
+    numbers, places = np.unique(named, return_index=True)
+    return numbers[np.argsort(places)]
 
 
 def _zero_to_one(block: Block) -> Bools:

@@ -98,7 +98,7 @@ def test_a_program_that_is_hidden_is_absent_and_its_neighbours_are_not(tmp_path,
     [
         ("readModel", ["export/programs/highs.py"]),
         ("highspy.Highs", ["export/programs/highs.py", "models/formulations/highs_model.py"]),
-        ("NlpBuilder", ["export/programs/nl_model.py"]),
+        ("NlpBuilder", ["export/programs/casadi.py"]),
     ],
 )
 def test_highs_and_nl_are_loaded_in_one_place(called: str, places: list[str]):

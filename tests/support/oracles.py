@@ -6,17 +6,22 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cases import names_of, points_of
 from crossfield.export.programs import asl as asl_program
 from crossfield.export.programs import highs as highs_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.programs.nl_model import read_nl
+from crossfield.export.programs.casadi import read_nl
 from crossfield.export.programs.reading import Meaning as Model
+from crossfield.export.programs.reading import Points
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.export.verify.comparison import of_problem
+from crossfield.export.verify.comparison import of_problem, values_at
+from crossfield.models.formulations.names import column_names
+from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.grid import Floats
 
 __all__ = [
@@ -29,13 +34,12 @@ __all__ = [
     "by_highs",
     "by_scip",
     "of_problem",
-    "scip_columns",
+    "random_points",
 ]
 
 by_highs = highs_program.read
 by_scip = scip_program.read
 by_casadi = read_nl
-scip_columns = scip_program.columns
 
 
 def by_gurobi(path: Path) -> Model:
@@ -43,6 +47,12 @@ def by_gurobi(path: Path) -> Model:
     from crossfield.export.programs import gurobi as gurobi_program
 
     return gurobi_program.read(path)
+
+
+def random_points(problem: Problem, count: int = 5, beside: Sequence[Floats] = ()) -> Points:
+    """Random points by column name, then feasible ones `beside` them, and the objective there."""
+    values = np.stack([*points_of(problem, count), *beside])
+    return Points(names_of(column_names(problem)), values, values_at(problem, values)[0], count)
 
 
 def browser() -> str | None:

@@ -1,19 +1,270 @@
-"""The table of readers of logs, and the choice among them by content."""
+"""The table of readers of logs, one entry per solver, and the choice among them by content."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_LOG
 from ....models.storage import read_bytes
-from . import baron, cplex, gurobi, highs, scip, xpress
-from .run_log import LogReader, RunLog, Step, last, stamps, thinned
+from .run_log import RunLog, Step, at_least, last, number, seconds, stamps, thinned, whole
 
-LOG_READERS: Final[tuple[LogReader, ...]] = tuple(
-    module.READER for module in (baron, highs, gurobi, scip, xpress, cplex)
+_LONGEST: Final = 300  # most characters of a line of a table
+
+Row = tuple[str, str, str]
+"""Words of a row of a table of progress: time (empty if the row has none), dual bound, best objective."""
+
+
+@dataclass(frozen=True)
+class LogReader:
+    """A reader of the logs of one solver.
+
+    start: pattern of the start of a run. version: pattern of the version, which may precede the first run.
+    optimal, ended: patterns that state a proven optimum, and any end of the search. facts: patterns by
+    attribute of RunLog, the preferred one first; `rounded` is a bound that the log rounds. rows: the rows of
+    the table of progress. from_table: attributes that the table gives if no line does.
+    """
+
+    solver: str
+    title: str
+    start: re.Pattern[str]
+    version: str
+    optimal: str
+    ended: str
+    facts: dict[str, tuple[str, ...]]
+    rows: Callable[[str], Iterable[Row]]
+    from_table: tuple[str, ...] = ()
+
+    def parse(self, text: str) -> RunLog:
+        """The content of the text of one run."""
+        words = {name: _first(patterns, text) for name, patterns in self.facts.items()}
+        rows = list(self.rows(text))
+        bound, best = number(words.get("bound")), number(words.get("objective"))
+        trace = tuple(
+            Step(time, number(row[1]), number(row[2]))
+            for row in rows
+            if (time := seconds(row[0])) is not None
+        )
+        if bound is None and "bound" in self.from_table:
+            shown = (row[1] for row in reversed(rows) if number(row[1]) is not None)
+            bound = at_least(words.get("rounded") or next(shown, None))
+        if best is None and "objective" in self.from_table and trace:
+            best = trace[-1].objective
+        return RunLog(
+            self.solver,
+            ended=self._end(text, proven=bound is not None),
+            bound=bound,
+            objective=best,
+            seconds=seconds(words.get("seconds")),
+            threads=whole(words.get("threads")),
+            limit=number(words.get("limit")),
+            columns=whole(words.get("columns")),
+            rows=whole(words.get("rows")),
+            trace=trace,
+        )
+
+    def _end(self, text: str, *, proven: bool) -> Literal["optimal", "limit"] | None:
+        if proven and re.search(self.optimal, text, re.MULTILINE):
+            return "optimal"
+        return "limit" if re.search(f"{self.optimal}|{self.ended}", text, re.MULTILINE) else None
+
+
+def _first(patterns: tuple[str, ...], text: str) -> str | None:
+    return next(filter(None, (last(each, text) for each in patterns)), None)
+
+
+def _lines(text: str) -> Iterator[str]:
+    return (line for line in text.splitlines() if len(line) < _LONGEST)
+
+
+def _highs_rows(text: str) -> Iterator[Row]:
+    """From the right: time, iterations, conflicts, two counts, gap, objective, bound, share explored."""
+    for words in map(str.split, _lines(text)):
+        if len(words) >= 11 and words[-1].endswith("s") and words[-9].endswith("%"):
+            yield words[-1], words[-8], words[-7]
+
+
+def _gurobi_rows(text: str) -> Iterator[Row]:
+    """From the right: time, iterations per node, gap, bound, objective."""
+    for words in map(str.split, _lines(text)):
+        if len(words) >= 7 and words[-1].endswith("s") and (words[-3] == "-" or words[-3].endswith("%")):
+            yield words[-1], words[-4], words[-5]
+
+
+_SCIP_HEADER: Final = r"^ *time +\|.*\| *dualbound *\| *primalbound *\|.*$"
+
+
+def _scip_rows(text: str) -> Iterator[Row]:
+    """The header gives the columns of bounds, which differ between versions; a letter precedes the time."""
+    header = re.search(_SCIP_HEADER, text, re.MULTILINE)
+    if header is None:
+        return
+    names = [cell.strip() for cell in header[0].split("|")]
+    bound, best = names.index("dualbound"), names.index("primalbound")
+    for line in _lines(text):
+        cells = line.split("|")
+        if len(cells) == len(names) and cells[0].strip():
+            yield cells[0].split()[-1], cells[bound].strip(), cells[best].strip()
+
+
+_XPRESS_HEADER: Final = re.compile(r" +(?:Its Type|Node) +BestSoln +BestBound .* Time$")
+_XPRESS_ROW: Final = re.compile(r"[A-Za-z* ].{34}.* (\d+)$")
+
+
+def _xpress_rows(text: str) -> Iterator[Row]:
+    """The rows below a header, up to the next empty line; columns have a fixed width and may be blank."""
+    inside = False
+    for line in text.splitlines():
+        inside = bool(_XPRESS_HEADER.match(line)) or (inside and bool(line.strip()))
+        row = _XPRESS_ROW.match(line) if inside else None
+        if row and number(line[22:35].strip()) is not None:
+            yield row[1], line[22:35].strip(), line[9:22].strip()
+
+
+_CPLEX_HEADER: Final = "   Node  Left     Objective  IInf  Best Integer    Best Bound"
+_CPLEX_NODE: Final = re.compile(r"[* ] {0,7}\d+\+? +\d+ ")
+_CPLEX_TIME: Final = re.compile(r"Elapsed time = +(\S+) sec\.|Total \(root\+branch&cut\) = +(\S+) sec\.")
+
+
+def _cplex_rows(text: str) -> Iterator[Row]:
+    """Columns have a fixed width and may be blank; the time is on separate lines."""
+    bound = best = ""
+    for line in text.partition(_CPLEX_HEADER)[2].splitlines()[1:]:
+        if _CPLEX_NODE.match(line):
+            shown, integer = line[47:61].strip(), line[33:47].strip()
+            bound, best = (
+                new if number(new) is not None else old for new, old in ((shown, bound), (integer, best))
+            )
+            yield "", bound, best
+        elif time := _CPLEX_TIME.match(line):
+            yield time[1] or time[2], bound, best
+
+
+_BARON_BEFORE: Final = re.compile(r" *Lower bound is +(\S+)$")
+
+
+def _baron_rows(text: str) -> Iterator[Row]:
+    """Iteration, time, memory, bound, objective, progress; earlier versions have no memory and progress."""
+    for line in _lines(text):
+        words = [word for word in line.split() if word != "*" and not word.endswith(("B", "%"))]
+        if len(words) == 4 and whole(words[0]) is not None and number(words[2]) is not None:
+            yield words[1], words[2], words[3]
+        elif before := _BARON_BEFORE.match(line):
+            yield "", before[1], ""
+
+
+LOG_READERS: Final = (
+    LogReader(
+        "baron",
+        "BARON",
+        re.compile(r"^ *BARON version \d", re.MULTILINE),
+        version=r"^ *BARON version (\d[\d.]*\d)",
+        optimal=r"^ +\*\*\* Normal completion \*\*\* *$",
+        ended=r"^ +\*\*\* .+? \*\*\* *$",
+        facts={
+            "bound": (r"^Best possible += +(\S+)$",),
+            "objective": (r"^Solution += +(\S+)",),
+            "seconds": (r"^ *Wall clock time: +(\S+)$",),
+        },
+        rows=_baron_rows,
+        from_table=("bound", "objective"),
+    ),
+    LogReader(
+        "highs",
+        "HiGHS",
+        re.compile(r"^Running HiGHS ", re.MULTILINE),
+        version=r"^Running HiGHS (\S+)",
+        optimal=r"^ +Status +Optimal$",
+        ended=r"^ +Status +\S",
+        facts={
+            "bound": (r"^ +Dual bound +(\S+)$",),
+            "objective": (r"^ +Primal bound +(\S+)$",),
+            "seconds": (r"^ +Timing +(\S+)",),
+            "threads": (r"^ +Thread count (\d+) ",),
+            "columns": (r"^\S+ .*has \d+ rows; (\d+) cols;",),
+            "rows": (r"^\S+ .*has (\d+) rows; \d+ cols;",),
+        },
+        rows=_highs_rows,
+    ),
+    LogReader(
+        "gurobi",
+        "Gurobi",
+        re.compile(r"^Gurobi Optimizer version ", re.MULTILINE),
+        version=r"^Gurobi Optimizer version (\S+)",
+        optimal=r"^Optimal solution found",
+        ended=r"^(?:\w+ limit reached|Interrupt request received)",
+        facts={
+            "bound": (r"^Best objective \S+, best bound (\S+), gap",),
+            "objective": (r"^Best objective (\S+), best bound \S+, gap",),
+            "seconds": (r"^Explored .* in (\S+) seconds",),
+            "threads": (r"using up to (\d+) threads?",),
+            "limit": (r"^TimeLimit  (\S+)$",),
+            "columns": (r"^Optimize a model with \d+ rows, (\d+) columns",),
+            "rows": (r"^Optimize a model with (\d+) rows",),
+        },
+        rows=_gurobi_rows,
+    ),
+    LogReader(
+        "scip",
+        "SCIP",
+        re.compile(r"^(?:SCIP version |original problem has \d+ variables)", re.MULTILINE),
+        version=r"^SCIP version (\S+)",
+        optimal=r"^SCIP Status +: .*optimal solution found",
+        ended=r"^SCIP Status +: .",
+        facts={
+            "bound": (r"^Dual Bound +: (\S+)",),
+            "objective": (r"^Primal Bound +: (\S+)",),
+            "seconds": (r"^Solving Time \(sec\) : (\S+)$",),
+            "columns": (r"^original problem has (\d+) variables \([^)]*\) and \d+ constraints",),
+            "rows": (r"^original problem has \d+ variables \([^)]*\) and (\d+) constraints",),
+        },
+        rows=_scip_rows,
+    ),
+    LogReader(
+        "xpress",
+        "Xpress",
+        re.compile(r"^FICO Xpress .*v\d", re.MULTILINE),
+        version=r"Xpress.* v([\d.]+)",
+        optimal=r"\*\*\* Search completed \*\*\*",
+        ended=r"\*\*\* Search unfinished \*\*\*",
+        facts={
+            "bound": (r"^Final MIP bound +: (\S+)$",),
+            "objective": (r"^Final MIP objective +: (\S+)$",),
+            "seconds": (r"^ +Solution time / primaldual integral : +([\d.]+s)",),
+            "threads": (r"using (?:up to )?(\d+) threads?",),
+            "limit": (r"^TIMELIMIT = (\S+)$",),
+            "columns": (r"^Original problem has:\n +\d+ rows +(\d+) cols",),
+            "rows": (r"^Original problem has:\n +(\d+) rows +\d+ cols",),
+        },
+        rows=_xpress_rows,
+    ),
+    LogReader(
+        "cplex",
+        "CPLEX",
+        re.compile(
+            r"^(?:Version identifier: \d|Welcome to IBM.*CPLEX|--- GAMS/CPLEX|IBM ILOG CPLEX)", re.MULTILINE
+        ),
+        version=r"(?:Version identifier:|Interactive Optimizer) +([\d.]+)",
+        optimal=r"^(?:MIP - Integer optimal|Proven optimal solution)",
+        ended=r"^MIP - .*(?:limit|abort|exceeded)",
+        facts={
+            "bound": (
+                r"^Current MIP best bound = +(\S+)",
+                r"^MIP - Integer optimal solution: +Objective = +(\S+)",
+            ),
+            "rounded": (r"^Best possible: +(\S+)",),
+            "objective": (r"^MIP - .*Objective = +(\S+)", r"^MIP Solution: +(\S+)"),
+            "seconds": (r"^Total \(root\+branch&cut\) = +(\S+) sec", r"^Solution time = +(\S+) sec"),
+            "threads": (r"using (?:up to )?(\d+) threads?\.",),
+            "limit": (r"^CPXPARAM_TimeLimit +(\S+)$",),
+        },
+        rows=_cplex_rows,
+        from_table=("bound",),
+    ),
 )
 """The first one that recognises a log reads it: BARON and GAMS name the solvers that they call."""
 

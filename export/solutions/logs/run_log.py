@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Final, Literal, NamedTuple
@@ -13,7 +13,6 @@ MOST_STEPS: Final = 40
 """Steps of a trace that are kept: enough for a plot."""
 
 _HUGE: Final = 1e19  # solvers write infinity as 1e20 and more
-_LONGEST: Final = 300  # most characters of a line of a table
 _TIMES: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _STAMP: Final = re.compile(r"sha256_[0-9a-f]{12}(?![0-9a-f])")
 
@@ -51,20 +50,6 @@ class RunLog:
     text: str = ""
 
 
-@dataclass(frozen=True)
-class LogReader:
-    """A reader of the logs of one solver.
-
-    start: pattern of the start of a run in a log; parse: function for the text of a run; version: pattern of
-    the solver's version, which may precede the first run.
-    """
-
-    title: str
-    start: re.Pattern[str]
-    parse: Callable[[str], RunLog]
-    version: str
-
-
 def last(pattern: str, text: str) -> str | None:
     """The first group of the last match of a pattern with lines of a text."""
     found = re.findall(pattern, text, re.MULTILINE)
@@ -85,8 +70,9 @@ def whole(word: str | None) -> int | None:
     return int(word) if word is not None and re.fullmatch(r"\d{1,9}", word) else None
 
 
-def seconds(word: str) -> float | None:
+def seconds(word: str | None) -> float | None:
     """A time as `6.4s`, `12m`, `3h`, or a plain number of seconds."""
+    word = word or ""
     unit = _TIMES.get(word[-1:])
     value = number(word if unit is None else word[:-1])
     return None if value is None or value < 0 else value * (unit or 1.0)
@@ -126,17 +112,3 @@ def thinned(steps: Iterable[Step], bound: float | None) -> tuple[Step, ...]:
         return tuple(kept)
     apart = (len(kept) - 1) / (MOST_STEPS - 1)
     return tuple(kept[round(place * apart)] for place in range(MOST_STEPS))
-
-
-def step(time: str, bound: str, best: str) -> Step | None:
-    """A row of a table of progress; None if the first word is not a time."""
-    spent = seconds(time)
-    return None if spent is None else Step(spent, number(bound), number(best))
-
-
-def table_steps(
-    text: str, row: Callable[[list[str]], Step | None], mark: str | None = None
-) -> tuple[Step, ...]:
-    """Steps that a reader of rows makes from the words of each line, or from the cells between marks."""
-    found = (row(line.split(mark)) for line in text.splitlines() if len(line) < _LONGEST)
-    return tuple(each for each in found if each is not None)

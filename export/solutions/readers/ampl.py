@@ -1,4 +1,4 @@
-"""AMPL solution files (.sol), text and binary: read and written.
+"""AMPL solution files (.sol): text and binary are read, text is written.
 
 Text, as the AMPL Solver Library writes it (writesol.c, readsol.c of ampl/asl and ampl/mp):
 
@@ -62,26 +62,17 @@ _GLOBAL = re.compile(
 # SCIP writes those three words instead of its name; Ipopt writes them after its own
 
 
-class _Code(NamedTuple):
-    """Meaning of solve codes up to `last`, with values in the file and without."""
-
-    last: int
-    with_point: Status
-    without_point: Status
-
-
-_FAILURE: Final = _Code(-1, Status.ERROR, Status.ERROR)  # codes below 0 and from 500 on
 _CODES: Final = (
-    _FAILURE,
-    _Code(99, Status.OPTIMAL_LOCAL, Status.ERROR),
-    _Code(199, Status.FEASIBLE, Status.ERROR),
-    _Code(299, Status.INFEASIBLE, Status.INFEASIBLE),
-    _Code(399, Status.UNBOUNDED, Status.UNBOUNDED),
-    _Code(449, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    # up to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
-    _Code(469, Status.LIMIT_WITH_POINT, Status.LIMIT_WITHOUT_POINT),
-    _Code(499, Status.LIMIT_WITHOUT_POINT, Status.LIMIT_WITHOUT_POINT),
+    (-1, Status.ERROR),
+    (99, Status.OPTIMAL_LOCAL),
+    (199, Status.FEASIBLE),
+    (299, Status.INFEASIBLE),
+    (399, Status.UNBOUNDED),
+    # from 450 to 469: infeasible or unbounded, which points rule out; older SCIP uses 450 for interrupted
+    (469, Status.LIMIT_WITH_POINT),
+    (499, Status.LIMIT_WITHOUT_POINT),
 )
+"""Greatest code of each status; greater codes are failures."""
 
 
 def _recognises_text(head: bytes) -> bool:
@@ -203,8 +194,8 @@ def _status(code: int | None, message: str, *, with_point: bool) -> Status:
         return Status.OPTIMAL_GLOBAL
     if 450 <= code <= 469 and not with_point and "infeasible" in message.lower():
         return Status.INFEASIBLE
-    entry = next((entry for entry in _CODES if code <= entry.last), _FAILURE)
-    return entry.with_point if with_point else entry.without_point
+    status = next((status for last, status in _CODES if code <= last), Status.ERROR)
+    return status if with_point else status.without_point
 
 
 def parse_binary(data: bytes) -> RawSolution:
@@ -292,9 +283,8 @@ def write_ampl_sol(
     code: int,
     *,
     columns: int | None = None,
-    binary: bool = False,
 ) -> Path:
-    """Write an AMPL solution file, text or binary, and return its path.
+    """Write an AMPL solution file in text form and return its path.
 
     primal: values (n,) in the order of the .nl file, or empty when there is no point; then `columns` gives n.
     rows: number of constraints. code: solve code as in the head of this module. Reading gives the same
@@ -307,46 +297,21 @@ def write_ampl_sol(
         raise SolutionError("the solver returned a value that is not finite; nothing was written", file=path)
     counts = (rows, 0, len(primal) if columns is None else columns, len(primal))
     with replacing(path) as stream:
-        stream.writelines(
-            _binary_parts(message, primal, counts, code)
-            if binary
-            else _text_parts(message, primal, counts, code)
-        )
+        stream.writelines(_text_parts(message, primal, counts, code))
     return Path(path)
 
 
-def _lines_of(message: str) -> bytes:
-    """The message without lines that are empty or read Options."""
-    words = [
-        one_line(line.encode(errors="replace")) for line in message[:_LONGEST_MESSAGE].strip().splitlines()
-    ]
-    return "\n".join({"": " ", "Options": "Options."}.get(line, line) for line in words).encode()
-
-
 def _text_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:
-    head = [_lines_of(message).decode(), "", "Options", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts]
+    lines = message[:_LONGEST_MESSAGE].strip().splitlines()
+    words = (one_line(line.encode(errors="replace")) for line in lines)
+    # An empty line or this word would end the message.
+    kept = ({"": " ", "Options": "Options."}.get(line, line) for line in words)
+    head = ["\n".join(kept), "", "Options", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts]
     yield "\n".join(map(str, head)).encode() + b"\n"
     for start in range(0, len(primal), HEAD):
         text = "\n".join(map(repr, primal[start : start + HEAD].tolist())) + "\n"
         yield text.replace(".0\n", "\n").encode()
     yield f"objno 0 {code}\n".encode()
-
-
-def _binary_parts(message: str, primal: Floats, counts: tuple[int, ...], code: int) -> Iterator[bytes]:
-    text = _lines_of(message)
-    options = struct.pack("<8i", len(_OUR_OPTIONS), *_OUR_OPTIONS, *counts)
-    yield _MAGIC
-    if text:
-        yield _record(text)
-    yield from map(
-        _record,
-        (b"", _OPTIONS_WORD + options, b"", primal.astype("<f8").tobytes(), struct.pack("<2i", 0, code)),
-    )
-
-
-def _record(content: bytes) -> bytes:
-    length = len(content).to_bytes(4, "little")
-    return length + content + length
 
 
 READERS: Final = (

@@ -130,19 +130,15 @@ def _status(banner: bytes, *, has_table: bool, unbounded: bool) -> Status:
 def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:
     """Names and values of the best solution, and its objective."""
     cursor = Cursor(data, position)
-    for _ in range(3):
-        line = cursor.line("the table of the best solution")
-    if not line.startswith(_HEADER):
-        raise cursor.fault(f"{shown(line)} stands where the head of the table should")
+    for _ in range(2):
+        cursor.line("the table of the best solution")
+    cursor.after(_HEADER, "the head of the table")
     stop = data.find(b"\n\n", cursor.position - 1) + 1
     if not stop:
         raise cursor.fault("the table is cut off")
     names, values = labelled_numbers(data, cursor.position, stop, 4, label=0, numeric=(2,))
     cursor.position = stop + 1
-    line = cursor.line("the objective")
-    if not line.startswith(_OBJECTIVE):
-        raise cursor.fault(f"{shown(line)} stands where the objective should")
-    return names, values[:, 0], cursor.number(line.removeprefix(_OBJECTIVE).strip())
+    return names, values[:, 0], cursor.number(cursor.after(_OBJECTIVE, "the objective"))
 
 
 def parse_times(data: bytes) -> RawSolution:

@@ -26,8 +26,6 @@ from defusedxml.ElementTree import DefusedXMLParser
 from ....models.errors import SolutionError
 from .text import RawSolution, Reader, Status, begins, named_pairs, number_of, one_line, without_point
 
-_HEAD = re.compile(rb"\s*<[?!C]")
-_ROOT: Final = b"<CPLEXSolution"
 _OMITS_ZEROS: Final = "3"
 _INTEGERS_ONLY: Final = {"2", "4"}
 _CHUNK: Final = 1 << 20

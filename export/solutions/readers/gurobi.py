@@ -1,4 +1,4 @@
-"""Solution files of Gurobi: .sol and .json. COPT's .sol and plain lists of values are alike.
+"""Solution files of Gurobi: .sol and .json; lists like its .sol: of COPT, of MIPLIB, and plain ones.
 
     # Solution for model obj               comment lines, which vary; the first may be missing
     # Objective value = -1.44e+01
@@ -13,6 +13,9 @@ and holds only the integer columns. The .json (GRBwrite, attribute names of the 
 Columns at 0 are omitted unless JSONSolDetail is 1. Then each has a list PoolNX of its values in further
 solutions too, which are not read: X is the incumbent. Without a solution there is no Vars, and bounds are
 1e+100. Layouts: Gurobi 13.0.3.
+
+MIPLIB's .sol begins with `=obj= value`, and columns at 0 may be omitted. `=infeas=` instead denotes an
+infeasible instance (MIPLIB's solution checker). There is no other status: a point counts as feasible.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from .text import (
     is_number,
     named_numbers,
     named_pairs,
+    shown,
     without_point,
 )
 
@@ -61,7 +65,6 @@ _STATUS: Final = {
     19: (Status.LIMIT_WITH_POINT, "locally infeasible"),  # proves nothing, and has no point
 }
 _POINTLESS: Final = {Status.INFEASIBLE, Status.UNBOUNDED}
-_WITHOUT_POINT: Final = {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.FEASIBLE: Status.ERROR}
 
 
 def _recognises(head: bytes) -> bool:
@@ -95,6 +98,19 @@ def parse(data: bytes) -> RawSolution:
     return RawSolution(Status.FEASIBLE, "", objective, names, values)
 
 
+def parse_miplib(data: bytes) -> RawSolution:
+    """Read a .sol of MIPLIB. Raises SolutionError for words that are not numbers, and for a cut."""
+    cursor = Cursor(data)
+    label, *rest = cursor.line("the objective").split()
+    if label == b"=infeas=":
+        return without_point(Status.INFEASIBLE, label)
+    if label != b"=obj=" or len(rest) != 1:
+        raise cursor.fault(f"{shown(b' '.join([label, *rest]))} is not =obj= and a number")
+    objective = cursor.number(rest[0])
+    names, values = named_numbers(data, cursor.position, len(data), 2)
+    return RawSolution(Status.FEASIBLE, "", objective, names, values, omits_zeros=True)
+
+
 def parse_json(data: bytes) -> RawSolution:
     """Read the incumbent in a .json. Raises SolutionError for damaged JSON and invalid values."""
     content = _document(data)
@@ -107,7 +123,7 @@ def parse_json(data: bytes) -> RawSolution:
     if variables is None or status in _POINTLESS:
         if status is Status.OPTIMAL_GLOBAL:
             raise SolutionError("the file states optimal but holds no Vars; let Gurobi write it again")
-        return without_point(_WITHOUT_POINT.get(status, status), words)
+        return without_point(status.without_point, words)
     names, values = _columns(variables)
     objective, bound = _finite(information.get("ObjVal")), _finite(information.get("ObjBound"))
     return RawSolution(status, words, objective, names, values, omits_zeros=True, bound=bound)
@@ -156,5 +172,6 @@ def _is_column(entry: Any) -> bool:
 
 READERS: Final = (
     Reader("gurobi-json", "Gurobi .json", begins(rb'\s*\{\s*"SolutionInfo"'), parse_json),
+    Reader("miplib", "MIPLIB .sol", begins(rb"=obj=|=infeas="), parse_miplib),
     Reader("gurobi", "Gurobi .sol, or any list of names and values", _recognises, parse),
 )

@@ -67,7 +67,7 @@ def parse(data: bytes) -> RawSolution:
         return _without_point(words)
     if primal not in {b"Feasible", b"Infeasible"}:
         raise cursor.fault(f"{shown(primal)} is not Feasible, Infeasible or None")
-    objective = _objective(cursor)
+    objective = cursor.number(cursor.after(b"Objective ", "the objective"))
     sparse, names, values = _columns(cursor)
     status = _status(words, feasible=primal == b"Feasible")
     return RawSolution(status, one_line(words), objective, names, values, sparse, _rows(cursor))
@@ -95,11 +95,7 @@ def _expect(cursor: Cursor, expected: bytes) -> None:
 
 def _status(words: bytes, *, feasible: bool) -> Status:
     status = _STATUS.get(words, Status.ERROR)
-    if feasible:
-        return status
-    return {Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT, Status.OPTIMAL_GLOBAL: Status.ERROR}.get(
-        status, status
-    )
+    return status if feasible else status.without_point
 
 
 def _without_point(words: bytes) -> RawSolution:
@@ -108,14 +104,6 @@ def _without_point(words: bytes) -> RawSolution:
     return RawSolution(
         _status(words, feasible=False), one_line(words), None, np.empty(0, dtype="S1"), np.empty(0)
     )
-
-
-def _objective(cursor: Cursor) -> float:
-    line = cursor.line("the objective")
-    label, _, number = line.partition(b" ")
-    if label != b"Objective":
-        raise cursor.fault(f"{shown(line)} stands where the objective should")
-    return cursor.number(number.strip())
 
 
 def _columns(cursor: Cursor) -> tuple[bool, Bytes, Floats]:

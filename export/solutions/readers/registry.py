@@ -14,15 +14,14 @@ from typing import Final
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
-from . import ampl, baron, cbc, cplex, gams_csv, gams_lst, glpk, gurobi, highs, miplib, scip, xpress
+from . import ampl, baron, cbc, cplex, gams, glpk, gurobi, highs, scip, xpress
 from .text import HEAD, RawSolution, Reader, with_unix_ends
 
 _STAMP = re.compile(rb"sha256_[0-9a-f]{12}(?![0-9a-f])")
 _GZIP: Final = b"\x1f\x8b"
 _SMALLER: Final = "let the solver write it without columns at 0"
 
-
-_MODULES = (highs, gurobi, cplex, scip, xpress, cbc, glpk, gams_csv, gams_lst, baron, miplib, ampl)
+_MODULES = (highs, gurobi, cplex, scip, xpress, cbc, glpk, gams, baron, ampl)
 READERS: Final[tuple[Reader, ...]] = tuple(reader for module in _MODULES for reader in module.READERS)
 """The table of readers: the first that recognises a file reads it; no real file matches two."""
 

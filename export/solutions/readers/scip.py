@@ -43,12 +43,6 @@ _STATUS: Final = {
     b"unknown": Status.FEASIBLE,
 }
 
-_WITHOUT_POINT: Final = {
-    Status.LIMIT_WITH_POINT: Status.LIMIT_WITHOUT_POINT,
-    Status.FEASIBLE: Status.NO_POINT,
-    Status.OPTIMAL_GLOBAL: Status.ERROR,
-}
-
 
 def parse(data: bytes) -> RawSolution:
     """Read a file. Raises SolutionError for `unknown`, other words that are not numbers, and a cut."""
@@ -60,7 +54,8 @@ def parse(data: bytes) -> RawSolution:
         status = _status(words)
         line = cursor.line("the objective")
     if line == _NONE:
-        return without_point(_WITHOUT_POINT.get(status, status), words or line)
+        silent = status is Status.FEASIBLE
+        return without_point(Status.NO_POINT if silent else status.without_point, words or line)
     if not line.startswith(_OBJECTIVE_LABEL):
         raise cursor.fault(f"{shown(line)} stands where the objective should")
     text = line.removeprefix(_OBJECTIVE_LABEL).strip()

@@ -77,12 +77,19 @@ class Status(StrEnum):
     @property
     def promises_point(self) -> bool:
         """Whether the status implies a feasible point."""
-        return self in _PROMISING
+        return self in {
+            Status.OPTIMAL_GLOBAL,
+            Status.OPTIMAL_LOCAL,
+            Status.FEASIBLE,
+            Status.LIMIT_WITH_POINT,
+        }
 
-
-_PROMISING: Final = frozenset(
-    {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL, Status.FEASIBLE, Status.LIMIT_WITH_POINT}
-)
+    @property
+    def without_point(self) -> Status:
+        """The status of a file that states this one, but holds no point."""
+        if self is Status.LIMIT_WITH_POINT:
+            return Status.LIMIT_WITHOUT_POINT
+        return Status.ERROR if self.promises_point else self
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +102,7 @@ class RawSolution:
     number of constraints in the file, or None: then a positional file has a dual value for each row
     before the values. order: the order of the values without names. bound: the solver's dual
     bound, or None. of_rows: names (k,) that the file lists as names of rows, whose values are left out.
-    stamp: of the problem, if the solver repeated it, or empty. reader: name of the reader of
-    the file. nodes: of the search tree, if the solver reports them.
+    stamp: of the problem, if the solver repeated it, or empty. reader: name of the reader of the file.
     """
 
     status: Status
@@ -111,7 +117,6 @@ class RawSolution:
     of_rows: Bytes | None = None
     stamp: str = ""
     reader: str = ""
-    nodes: int | None = None
 
     @property
     def has_point(self) -> bool:
@@ -281,6 +286,13 @@ class Cursor:
             raise fault(self.data, self.position, f"the file is cut off where {expected} should be")
         self.before, self.position = self.position, end + 1
         return self.data[self.before : end].strip()
+
+    def after(self, label: bytes, expected: str) -> bytes:
+        """What follows a label on the next line, stripped. Raises SolutionError for another label."""
+        line = self.line(expected)
+        if not line.startswith(label):
+            raise self.fault(f"{shown(line)} stands where {expected} should")
+        return line.removeprefix(label).strip()
 
     def count(self, expected: str) -> int:
         """The next line as an integer that is not negative. Raises SolutionError."""

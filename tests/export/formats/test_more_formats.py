@@ -3,18 +3,15 @@
 .mod, .dat: GLPK reads the linear ones. Of the others it evaluates every expression once variables are
 parameters: its MathProg is a second implementation of the language, and AMPL itself cannot be had for free.
 .osil: SCIP, and the XML taken at its word. .qplib: pyqplib, where it is installed, and a reader after
-qplib.zib.de/doc.html. .bar: Pyomo's BARON writer, and BARON itself in its free size.
+qplib.zib.de/doc.html. .bar: BARON itself in its free size.
 """
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import importlib.util
-import os
 import re
 import subprocess
-import sys
 from collections.abc import Iterator
 from math import cos
 from pathlib import Path
@@ -33,7 +30,6 @@ from crossfield.export.solutions.solution import read_solution
 from crossfield.export.solvers_table import PROGRAMS
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
 from crossfield.export.verify.verify import Verdict, verify
-from crossfield.export.writing import records
 from crossfield.export.writing.curvature import probtype
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError
@@ -41,8 +37,8 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names, row_names
 from crossfield.models.formulations.problem import Problem, with_integers_fixed
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import sample
 from loops import for_each
+from oracles import random_points
 
 MORE = ("mod", "osil", "qplib", "bar")
 PINNED = [label for label in CASES if "pinned" in label]
@@ -75,9 +71,7 @@ def assert_values(found: list[float], expected: Any) -> None:
 
 
 def feasible_points(problem: Problem) -> Points:
-    fields = [problem.point(make_field(problem.instance, seed)) for seed in (2, 3)]
-    values = np.concatenate([points_of(problem, 2), np.array(fields)])
-    return Points(names(problem)[0], values, values_at(problem, values)[0], 2)
+    return random_points(problem, 2, [problem.point(make_field(problem.instance, seed)) for seed in (2, 3)])
 
 
 def tiny() -> Instance:
@@ -85,6 +79,12 @@ def tiny() -> Instance:
     pixels = [[0, 0], [0, 1]]
     return Instance(
         "small", np.ones((1, 2), bool), pixels, [2.2, 1.3], [1.0, 0.7], skew_coefficient=1e-2, gauge="box"
+    )
+
+
+def pixel() -> Instance:
+    return Instance(
+        "small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], skew_coefficient=1e-2, gauge="box"
     )
 
 
@@ -120,56 +120,6 @@ def test_they_are_written_only_when_asked_for(tmp_path: Path):
     for entry in read_manifest(manifest.path).document["files"]:
         data = (tmp_path / "more" / entry["name"]).read_bytes()
         assert entry["sha256"] == hashlib.sha256(data).hexdigest()
-
-
-@pytest.mark.parametrize("name", MORE)
-def test_compressed_files_hold_the_same_bytes(name: str, tmp_path: Path):
-    problem = problem_of("milp-mccormick gauge=strokes")
-    plain, packed = tmp_path / f"model.{name}", tmp_path / f"model.{name}.gz"
-    write(problem, plain)
-    for file in write(problem, packed).files:
-        assert file.endswith(".gz")
-        assert gzip.decompress((tmp_path / file).read_bytes()) == (tmp_path / file[:-3]).read_bytes()
-
-
-@for_each("name", MORE)
-@for_each("formulation", ["minlp-quartic", "miqcp-bilinear", "miqp-exact", "qp-fixed"])
-def test_no_record_is_lost_at_the_border_of_a_block(
-    formulation: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    problem = make_problem(formulation, make_instance("full"))
-    whole, parts = tmp_path / f"whole.{name}", tmp_path / f"parts.{name}"
-    files = write(problem, whole).files
-    monkeypatch.setattr(records, "BLOCK", 3)
-    write(problem, parts)
-    for file in files:
-        assert (tmp_path / file).read_bytes() == (tmp_path / file.replace("whole", "parts")).read_bytes()
-
-
-@pytest.mark.slow
-def test_bytes_do_not_depend_on_the_run_or_the_hash_seed(tmp_path: Path):
-    chosen = ["minlp-quartic", "miqcp-bilinear", "milp-mccormick"]
-    code = (
-        "import sys; from crossfield.export.bundle.manifest import write_all\n"
-        "from crossfield.models.sketch.samples import sample\n"
-        f"write_all(sample('skew', 6), sys.argv[1], formulations={chosen!r}, formats={MORE!r})"
-    )
-    here = tmp_path / "here"
-    write_all(sample("skew", 6), here, formulations=chosen, formats=MORE)
-    environment = os.environ | {"PYTHONHASHSEED": "7"}
-    subprocess.run([sys.executable, "-c", code, str(tmp_path / "there")], check=True, env=environment)
-    files = sorted(path.name for path in here.iterdir())
-    assert len(files) == 1 + 3 * (1 + 5)
-    for name in files:
-        assert (here / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
-
-
-@pytest.mark.parametrize("name", MORE)
-def test_an_extreme_weight_is_refused(name: str, tmp_path: Path):
-    problem = make_problem("milp-mccormick", make_instance(skew_coefficient=1e-12))
-    with pytest.raises(UnsupportedByFormatError, match="1e-12"):
-        write(problem, tmp_path / f"model.{name}")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
@@ -682,32 +632,6 @@ def test_bar_says_what_the_problem_is(label: str, tmp_path: Path):
     assert max(map(len, columns + rows)) <= 15
 
 
-@for_each("formulation", [name for name in FORMULATIONS if name != "minlp-parity"])
-def test_pyomos_baron_writer_says_the_same(formulation: str, tmp_path: Path):
-    """Kinds, bounds, and values at random points; Pyomo bounds binaries too, and adds ONE_VAR_CONST__."""
-    from crossfield.export.formats.pyomo_model import to_pyomo
-
-    problem = make_problem(formulation, make_instance("row"))
-    ours = bar_model(written(problem, tmp_path / "model.bar"))
-    model = to_pyomo(problem)
-    _, key = model.write(str(tmp_path / "theirs.bar"), format="bar")
-    symbols = model.solutions.symbol_map[key].bySymbol
-    place = lambda m: "_".join(["", m[1].zfill(2), m[2].zfill(2), *m[3]])  # noqa: E731
-    known = {symbol: re.sub(r"\[(\d+),(\d+),?(\w?)\]", place, part.name) for symbol, part in symbols.items()}
-    text = re.sub(r"\w+", lambda m: known.get(m[0], m[0]), (tmp_path / "theirs.bar").read_text())
-    theirs = bar_model(re.sub(r"minimize\s+", "minimize ", text))
-    columns, rows = names(problem)
-    used = [name for name in columns if name in theirs["kind"]]
-    assert len(used) >= len(columns) - 2
-    merged = lambda found: [found["kind"][name].replace("POSITIVE_", "") for name in used]  # noqa: E731
-    assert merged(theirs) == merged(ours)
-    for point in points_of(problem, 3):
-        mine, mine_rows = evaluated(ours, columns, point)
-        other, other_rows = evaluated(theirs, [*columns, "ONE_VAR_CONST__"], np.append(point, 1.0))
-        assert_values([mine], [other])
-        assert_values([mine_rows[name] for name in rows], [other_rows[name] for name in rows])
-
-
 BARON = importlib.util.find_spec("gamspy_baron")
 FITS = ["minlp-quartic", "minlp-cubic", "miqcp-bilinear", "miqp-mccormick", "miqp-exact", "qp-fixed"]
 """Formulations that fit BARON's free size on two pixels: 10 columns, 10 rows, 50 nonlinear operations."""
@@ -722,27 +646,14 @@ def by_baron(path: Path, problem: Problem) -> Any:
 
 
 @pytest.mark.needs("baron")
-@pytest.mark.parametrize("formulation", FITS)
+@pytest.mark.parametrize("formulation", [*FITS, "miqcp-bilinear-l1", "milp-mccormick"])
 def test_baron_solves_its_file_to_the_optimum(formulation: str, tmp_path: Path):
     """(9) takes BARON more than a minute as it stands, and nothing with its jumps fixed."""
-    problem = make_problem(formulation, tiny())
+    problem = make_problem(formulation, tiny() if formulation in FITS else pixel())
     if formulation == "minlp-cubic":
         problem = with_integers_fixed(problem, make_field(problem.instance))
     write(problem, tmp_path / "model.bar")
     solution = by_baron(tmp_path / "model.bar", problem)
     write(problem, tmp_path / "model.nl")
     assert solution.violation.worst < 1e-5
-    assert solution.objective == pytest.approx(scip_optimum(tmp_path / "model.nl"), rel=2e-4)
-
-
-@pytest.mark.needs("baron")
-@pytest.mark.parametrize("formulation", ["miqcp-bilinear-l1", "milp-mccormick"])
-def test_baron_takes_linear_files_of_one_pixel(formulation: str, tmp_path: Path):
-    pixel = Instance(
-        "small", np.ones((1, 1), bool), [[0, 0]], [2.2], [0.8], skew_coefficient=1e-2, gauge="box"
-    )
-    problem = make_problem(formulation, pixel)
-    write(problem, tmp_path / "model.bar")
-    solution = by_baron(tmp_path / "model.bar", problem)
-    skew = 2.2 - np.pi / 2
-    assert solution.objective == pytest.approx(1e-2 * skew, abs=1e-6)
+    assert solution.objective == pytest.approx(scip_optimum(tmp_path / "model.nl"), rel=2e-4, abs=1e-6)

@@ -13,12 +13,14 @@ from cases import CASES, make_field, make_instance, make_problem, points_of, pro
 from crossfield.export.formats import nl
 from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import write
+from crossfield.export.programs import casadi as casadi_program
+from crossfield.export.programs import scip as scip_program
+from crossfield.export.verify.comparison import evaluation_difference
 from crossfield.export.writing.canonical import Canonical
-from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.instance import Instance
 from loops import for_each
-from oracles import by_asl, by_casadi, scip_columns
+from oracles import by_asl, by_casadi, random_points
 from pyomo.repn.plugins.nl_writer import NLWriter
 
 GOLDEN = places.GOLDEN
@@ -36,30 +38,16 @@ def values_at(problem: Problem, point: np.ndarray) -> tuple[float, np.ndarray]:
     return problem.objective_value(point), np.concatenate([*rows, np.zeros(0)])
 
 
-def limits_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    rows = [(family.family.sense, limit) for family in nl.Layout(problem).rows for limit in family.limit]
-    lower = [-np.inf if sense == "<=" else limit for sense, limit in rows]
-    upper = [np.inf if sense == ">=" else limit for sense, limit in rows]
-    return np.array(lower), np.array(upper)
-
-
 @pytest.mark.slow
 @for_each("label", CASES)
 def test_casadi_sees_the_problem(label: str, tmp_path: Path):
-    problem = problem_of(label)
-    order = nl.Layout(problem).order
-    points = points_of(problem)
-    read = by_casadi(save(problem, tmp_path / "model.nl", start=points[0]))
-    np.testing.assert_array_equal(read.lower, problem.lower[order])
-    np.testing.assert_array_equal(read.upper, problem.upper[order])
-    np.testing.assert_array_equal((read.row_lower, read.row_upper), limits_of(problem))
-    np.testing.assert_array_equal(read.start, points[0][order])
-    assert read.discrete.tolist() == problem.integer[order].tolist()
-    for point in points:
-        objective, rows = read.evaluate(point[order])
-        expected = values_at(problem, point)
-        assert objective == pytest.approx(expected[0], rel=1e-9, abs=1e-9)
-        np.testing.assert_allclose(rows, expected[1], rtol=1e-9, atol=1e-9)
+    problem, field = problem_of(label), make_field(problem_of(label).instance)
+    write(problem, tmp_path / "model.nl", start=field)
+    points = random_points(problem, 20)
+    found = casadi_program.evaluate(tmp_path / "model.nl", points)
+    assert evaluation_difference(found, problem, points) == ""
+    start = by_casadi(tmp_path / "model.nl").start
+    np.testing.assert_array_equal(start, problem.point(field)[nl.Layout(problem).order])
 
 
 @pytest.mark.slow
@@ -94,16 +82,13 @@ def difference(problem: Problem, point: np.ndarray, column: int) -> tuple[float,
 @pytest.mark.slow
 @for_each("binary", [False, True])
 @for_each("label", CASES)
-def test_scip_sees_the_columns(label: str, binary: bool, tmp_path: Path):
-    """Names from .col, integrality and bounds; SCIP makes bounds of integers whole, and ours are."""
+def test_scip_sees_the_problem(label: str, binary: bool, tmp_path: Path):
+    """Names, integrality, bounds, linear rows; SCIP makes bounds of integers whole, and ours are."""
     problem = problem_of(label)
     write(problem, tmp_path / "model.nl", dialect="binary" if binary else "text")
-    found = scip_columns(tmp_path / "model.nl")
-    names = (tmp_path / "model.col").read_text().splitlines()
-    order = nl.Layout(problem).order
-    assert set(found) == set(names)
-    for name, column in zip(names, order, strict=True):
-        assert found[name] == (problem.integer[column], problem.lower[column], problem.upper[column])
+    points = random_points(problem, 2)
+    found = scip_program.evaluate(tmp_path / "model.nl", points)
+    assert evaluation_difference(found, problem, points) == ""
 
 
 # the header
@@ -197,24 +182,6 @@ def test_binary_holds_the_numbers_themselves():
     entries = np.frombuffer(data[place : place + 12 * problem.n_columns], dtype="<i4, <f8")
     np.testing.assert_array_equal(entries["f0"], np.arange(problem.n_columns))
     np.testing.assert_array_equal(entries["f1"], point[nl.Layout(problem).order])
-
-
-def test_start_is_the_complete_point_of_a_field(tmp_path: Path):
-    problem = problem_of("miqp-exact gauge=strokes")
-    field = make_field(problem.instance)
-    write(problem, tmp_path / "model.nl", start=field)
-    np.testing.assert_array_equal(
-        by_casadi(tmp_path / "model.nl").start, problem.point(field)[nl.Layout(problem).order]
-    )
-    write(problem, tmp_path / "without.nl")
-    assert b"\nx" not in (tmp_path / "without.nl").read_bytes()
-
-
-def test_a_weight_too_small_is_refused(tmp_path: Path):
-    problem = make_problem("milp-mccormick", make_instance(skew_coefficient=1e-12))
-    with pytest.raises(UnsupportedByFormatError, match="1e-12"):
-        write(problem, tmp_path / "model.nl")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_golden_file():

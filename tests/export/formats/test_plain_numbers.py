@@ -6,8 +6,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.bundle.manifest import write_all
-from crossfield.export.writing.records import check_coefficients
-from crossfield.models.errors import CrossfieldError, UnsupportedByFormatError
+from crossfield.models.errors import CrossfieldError
 
 ALL = ["nl", "gms", "lp", "mps", "mod", "osil", "qplib", "bar"]
 SCALAR = re.compile(r"np\.|\barray\(|dtype")
@@ -43,13 +42,6 @@ def test_the_advice_of_a_writer_helps(given, better, tmp_path):
     )
     assert not any(map(SCALAR.search, reasons))
     assert refusals(one_stroke(**better), tmp_path / "written") == []
-
-
-def test_a_coefficient_is_told_as_a_plain_number():
-    with pytest.raises(UnsupportedByFormatError, match=r"coefficient 1e\+16; .* smaller$"):
-        check_coefficients(np.array([1.0, 1e16]), "a row")
-    with pytest.raises(UnsupportedByFormatError, match=r"coefficient 2e-12; .* exactly 0$"):
-        check_coefficients(np.float64(2e-12), "a row")
 
 
 def test_messages_about_numbers_of_numpy_are_plain():

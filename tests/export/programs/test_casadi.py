@@ -7,9 +7,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.formats.nl import Layout
-from crossfield.export.programs.casadi import Watch
+from crossfield.export.programs.casadi import FEASIBLE, Watch, ca, read_nl
 from crossfield.export.programs.casadi import solve_model as solve
-from crossfield.export.programs.nl_model import FEASIBLE, ca, read_nl
 from crossfield.export.programs.protocol import RefusedError
 from crossfield.models.processes import control
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solutions.readers.gams_csv import parse as parse_csv
+from crossfield.export.solutions.readers.gams import parse_csv
 from crossfield.export.solutions.readers.registry import read_raw
 from crossfield.models.errors import SolutionError
 from crossfield.models.search.starts import first_field

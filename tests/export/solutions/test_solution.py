@@ -6,7 +6,7 @@ from cases import make_field, make_instance
 from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.text import Status
-from crossfield.export.solutions.solution import ROUND, Solution, read_solution
+from crossfield.export.solutions.solution import ROUND, read_solution
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.names import column_names
@@ -39,12 +39,12 @@ def by_name(path, names, values, *, objective=1.0, status="Optimal"):
     return path
 
 
-def by_position(path, problem, point, *, binary=False):
-    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0, binary=binary)
+def by_position(path, problem, point):
+    return write_ampl_sol(path, "solved", point[Layout(problem).order], problem.n_rows, 0)
 
 
 @for_each("name", FORMULATIONS)
-@for_each("kind", ["names", "text", "binary"])
+@for_each("kind", ["names", "positions"])
 def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
     problem = problem_of(field, name)
     point = problem.point(field)
@@ -53,7 +53,7 @@ def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
         shuffled = np.random.default_rng(1).permutation(len(point))
         by_name(path, np.array(names_of(problem))[shuffled], point[shuffled])
     else:
-        by_position(path, problem, point, binary=kind == "binary")
+        by_position(path, problem, point)
     solution = read_solution(path, problem)
     assert solution.point.tolist() == point.tolist()
     assert solution.objective == problem.objective_value(point)
@@ -160,22 +160,6 @@ def test_with_the_printed_facet_p_is_believed_and_z_is_not(tmp_path):
     assert solution.objective < solution.field.energy(1).total - 0.1
 
 
-def test_columns_that_solvers_add_are_not_counted_as_unknown(tmp_path, field):
-    problem = problem_of(field, "milp-mccormick")
-    names = [*names_of(problem), "ONE", "objvar", "stranger"]
-    values = [*problem.point(field), 1.0, 5.0, 7.0]
-    assert read_solution(by_name(tmp_path / "x.sol", names, values), problem).unknown == 1
-
-
-def test_a_missing_column_is_an_error(tmp_path, field):
-    problem = problem_of(field, "milp-mccormick")
-    names, values = names_of(problem)[:-1], problem.point(field)[:-1]
-    with pytest.raises(
-        SolutionError, match=rf"x.sol: 1 of {problem.n_columns} columns of milp-mccormick are missing"
-    ):
-        read_solution(by_name(tmp_path / "x.sol", names, values), problem)
-
-
 def test_the_order_of_another_formulation_is_not_taken(tmp_path, field):
     path = by_position(
         tmp_path / "x.sol", problem_of(field, "qp-fixed"), problem_of(field, "qp-fixed").point(field)
@@ -202,10 +186,3 @@ def test_a_file_without_a_point_has_no_field(tmp_path, field):
     assert solution.status == Status.INFEASIBLE
     with pytest.raises(SolutionError, match=r"no point in the solution \(infeasible\): no room"):
         _ = solution.field
-
-
-def test_claims_of_a_solver_are_kept_apart_from_what_is_recomputed(field):
-    problem = problem_of(field, "qp-fixed")
-    solution = Solution(problem, problem.point(field), Status.FEASIBLE, "", "by hand", reported=-1.0)
-    assert (solution.reported, solution.bound) == (-1.0, None)
-    assert solution.objective == pytest.approx(field.energy(2).total)

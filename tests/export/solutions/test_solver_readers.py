@@ -4,7 +4,6 @@ import itertools
 import json
 import re
 import sys
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -39,12 +38,10 @@ from answers import (
     problem_of,
 )
 from crossfield.export.solutions.readers.registry import READERS, parse_raw, read_raw
-from crossfield.export.solutions.readers.text import HEAD, Status, values_for, values_in_order
+from crossfield.export.solutions.readers.text import HEAD, values_for, values_in_order
 from crossfield.export.solutions.solution import read_solution
 from crossfield.models.errors import SolutionError
 from crossfield.models.formulations.names import column_names
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from loops import for_each
 
 
@@ -116,19 +113,6 @@ def test_the_point_is_the_one_that_the_solver_had(path):
         assert solution.objective == pytest.approx(OPTIMA[name], abs=2e-6)
 
 
-@for_each("path", GOOD)
-def test_windows_line_ends_change_nothing(path):
-    data = path.read_bytes()
-    one, other = parse_raw(data), parse_raw(data.replace(b"\n", b"\r\n"))
-    assert (one.status, one.message, one.rows, one.objective) == (
-        other.status,
-        other.message,
-        other.rows,
-        other.objective,
-    )
-    assert one.values.tolist() == other.values.tolist()
-
-
 # what is particular about each
 
 
@@ -142,35 +126,6 @@ def test_gurobi_lists_have_comments_or_none():
         assert raw.objective == {b"# Objective value 0.5\n": 0.5, lines[1]: whole.objective}.get(
             b"".join(head)
         )
-
-
-@pytest.mark.parametrize(
-    "word, value",
-    [
-        ("1.#INF", np.inf),
-        ("-inf", -np.inf),
-        ("1e+20", 1e20),
-        ("-0", 0),
-        (".5D-1", 0.05),
-        ("0.9999999", 0.9999999),
-    ],
-)
-def test_spellings_of_numbers_in_every_list(word, value):
-    for data in (
-        f"# Objective value = 1\nx {word}\ny 1\n",
-        f"objective value: 1\nx {word} \t(obj:0)\ny 1 \t(obj:{word})\n",
-        f"Optimal - objective value 1\n  0 x {word} 0\n  1 y 1 {word}\n",
-        f"s mip 1 2 o 1\ni 1 {word}\nj 1 {word}\nj 2 1\ne o f\n",
-        f"NAME a\n  C x {word}\n  C y 1\nENDATA\n",
-        f'1,"x ","C","BS",{word},0,0,{word},0\n2,"y ","C","BS",1,0,0,{word},0\n',
-        f"model_status,1\nsolver_status,1\nobjective,1\nx,{word}\ny, 1\n",
-        f"=obj= 1\nx {word}\ny 1\n",
-        (
-            '<CPLEXSolution><header solutionStatusValue="1"/>'
-            f'<variable name="x" value="{word}"/><variable name="y" value="1"/></CPLEXSolution>'
-        ),
-    ):
-        assert parse_raw(data.encode()).values.tolist() == [value, 1]
 
 
 def test_a_missing_column_is_zero_only_where_zeros_are_omitted(tmp_path):
@@ -199,9 +154,7 @@ def test_codes_of_gurobi(code):
     if code != 2:
         del with_point["Vars"]
         alone = parse_raw(json.dumps(with_point).encode())
-        assert alone.status == (
-            NOTHING if limit else raw.status if code in {3, 4, 5} else LOCAL if code == 18 else ERROR
-        )
+        assert alone.status == (NOTHING if limit else raw.status if code in {3, 4, 5} else ERROR)
         assert not alone.has_point
 
 
@@ -433,220 +386,6 @@ def test_miplib_omits_zeros():
     assert (raw.objective, raw.values.tolist(), raw.omits_zeros) == (-14.4, [10, -9.7], True)
     values = values_for(np.array([b"u", b"y"]), raw)
     assert (values.values.tolist(), values.missing, values.unknown) == ([0, -9.7], 0, 1)
-
-
-# files that are no good
-
-FAULTS = {
-    "baron-26.5.27_qp_sum": "summary of BARON, which holds no values; give its results",
-    "baron_res_cut": "the end of the search is missing",
-    "baron_res_cut_after_the_table": "line 183: the file is cut off where the objective should be",
-    "baron_res_cut_in_the_table": "line 173: the table is cut off",
-    "baron_res_value_missing": "line 180: 3 words stand where 4 should",
-    "baron_tim_status_is_no_number": "line 1: '1.5' is not the number of a status",
-    "cbc_cut_in_a_line": "line 84: the file is cut off in the middle",
-    "cbc_numbers_start_again_twice": "line 85: the numbers start again for the second time",
-    "cbc_value_is_a_word": "line 52: 'many' is not a number",
-    "cbc_value_missing": "line 52: 3 words stand where 4 should",
-    "cplex-22.2.0.1_milp_integers": "writeLevel 2 and holds the integer columns only; use level 1",
-    "cplex_cut": "line 39: the XML is damaged or cut off",
-    "cplex_entities": "DTD or entities",
-    "cplex_no_header": "no header with a status",
-    "cplex_no_variables": "holds no variables",
-    "cplex_value_is_nan": "line 33: a variable has no name, or a value that is not a number",
-    "gams_csv_na": "line 5: 'NA' is not a number",
-    "gams_csv_no_columns": "line 3: no columns follow",
-    "gams_csv_no_solver_status": "line 2: 'status' stands where solver_status should",
-    "gams_csv_state_is_a_word": "line 1: 'two' is not the number of a state",
-    "gams_csv_undf": "line 5: 'UNDF' is not a number",
-    "gams_lst_cut": "cut off in the summary of its last solve; run GAMS again",
-    "gams_lst_no_solve": "no summary of a solve; let the GAMS file run",
-    "glpk_column_missing": "line 57: 35 columns are announced, 34 lines follow",
-    "glpk_columns_out_of_order": "line 65: this is not the line of column 9",
-    "glpk_columns_without_end": "line 57: 999999999999 columns are announced, 35 lines follow",
-    "glpk_counts_are_words": "line 8: 's mip many 35 o",
-    "glpk_cut": "it has no line `e o f`",
-    "gurobi-13.0.3_milp_start": "line 1: this is a MIP start",
-    "gurobi_cut_in_a_number": "line 8: the file is cut off in the middle",
-    "gurobi_json_cut": "line 1: the JSON is damaged or cut off at column 900",
-    "gurobi_json_no_status": "the SolutionInfo has no Status",
-    "gurobi_json_optimal_without_vars": "states optimal but holds no Vars",
-    "gurobi_json_value_is_nan": "x has no value",
-    "gurobi_json_value_is_text": "not a list of names and values",
-    "gurobi_no_values": "the file holds no values",
-    "gurobi_three_words": "line 5: 3 words stand where 2 should",
-    "gurobi_value_is_a_word": "line 5: 'about' is not a number",
-    "highs-1.15.1_milp_style2": "style 2",
-    "highs-1.15.1_milp_style3": "style 3",
-    "miplib_cut_in_a_number": "line 20: the file is cut off in the middle",
-    "miplib_objective_is_a_word": "line 1: 'unknown' is not a number",
-    "miplib_value_missing": "line 7: 1 words stand where 2 should",
-    "scip-10.0_milp_partial": "line 1: this is a partial solution",
-    "scip_cut_after_the_status": "line 2: the file is cut off where the objective should be",
-    "scip_cut_in_a_line": "line 12: the file is cut off in the middle",
-    "scip_no_objective": "line 2: 'the objective is 8.8' stands where the objective should",
-    "scip_value_is_unknown": "line 5: 'unknown' is not a number",
-    "xpress_asc_cut_in_a_line": "line 83: the file is cut off in the middle",
-    "xpress_asc_rows_only": "no line of a column",
-    "xpress_asc_value_is_a_word": "line 50: 'half' is not a number",
-    "xpress_slx_cut": "it has no line ENDATA",
-    "xpress_slx_line_of_a_row": "line 4: this line is of no column",
-    "xpress_slx_no_columns": "the file holds no columns",
-    "xpress_slx_value_is_a_word": "line 4: 'half' is not a number",
-}
-
-
-@for_each("path", BAD)
-def test_bad_files_are_refused_with_file_place_and_remedy(path):
-    with pytest.raises(SolutionError, match=re.escape(FAULTS[path.stem])) as caught:
-        read_solution(path, problem(problem_of(path) or "milp"))
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert re.search(r"write|give|run|use|refused", message)
-    assert "\n" not in message
-
-
-def listed(raw):
-    """Entries of a file: pairs of name and value, or of place and value."""
-    names = range(len(raw.values)) if raw.names is None else raw.names.tolist()
-    return dict(zip(names, raw.values.tolist(), strict=True))
-
-
-def cuts(data):
-    """Places to cut: after every line, within some, and all along when there are few lines."""
-    ends = [at + 1 for at, byte in enumerate(data) if byte == ord("\n")]
-    return [*ends[:-1], *range(7, len(data), 997 if len(ends) > 3 else 53), len(data) - 2]
-
-
-@for_each("path", GOOD)
-def test_a_file_cut_anywhere_never_gives_other_values_or_a_stronger_claim(path):
-    data = path.read_bytes()
-    whole = parse_raw(data)
-    for end in cuts(data):
-        try:
-            raw = parse_raw(data[:end])
-        except SolutionError:
-            continue
-        assert raw.status in {whole.status, Status.FEASIBLE, Status.NO_POINT}
-        kept = {name: value for name, value in listed(raw).items() if name in listed(whole)}
-        assert kept.items() <= listed(whole).items()
-        if whole.has_point and not raw.omits_zeros and raw.names is not None:
-            assert (values_for(whole.names, raw).missing == 0) == (len(kept) == len(whole.values))
-
-
-def attempt(data):
-    try:
-        raw = parse_raw(data)
-    except SolutionError:
-        return
-    assert not np.isnan(raw.values).any()
-    assert raw.names is None or len(raw.names) == len(raw.values)
-    assert raw.status in set(Status)
-    assert raw.has_point or not raw.values.size
-
-
-LONG = 600_000
-"""Bytes of a hostile file: comparing each with each would take ten minutes."""
-
-HEADS = [
-    b"# Solution for model obj\n", b"x 1\ny 2\n",
-    b'{ "SolutionInfo": { "Status": 2}, "Vars": [ ', b'{"SolutionInfo":',
-    b"<?xml version='1.0'?><CPLEXSolution>", b"<CPLEXSolution><header solutionStatusValue='1'/><variables>",
-    b"<!DOCTYPE a><CPLEXSolution>", b"solution status: infeasible\n", b"objective value: 3\n",
-    b"NAME a\n  C x 1\n", b"ENDATA\n", b' 1,"x ","C","BS",', b"Optimal - objective value 3\n",
-    b"c Problem: a\n", b"s mip 1 1 o 3\n", b"model_status,1\n",
-    b"model_status,1\nsolver_status,1\nobjective,3\n", b"GAMS 54.6 Page 1\n",
-    b"GAMS 54.6 Page 1\nS O L V E      S U M M A R Y\n", b"===\n BARON version 1\n",
-    b"===\n BARON version 1\n *** Normal completion ***\n\nThe best solution found is:\n\n  variable\n",
-    b"problem 1 1 1 1 1 1 1 1 ", b"=obj= 3\n", b"=infeas=\n",
-]  # fmt: skip
-
-
-@settings(deadline=None, max_examples=600)
-@given(
-    st.sampled_from(HEADS),
-    st.one_of(
-        st.binary(max_size=200), st.text('0123456789.-+eE# \n"<>/,{}[]:abCj*', max_size=200).map(str.encode)
-    ),
-)
-def test_random_bytes_after_a_valid_head_are_refused_or_read(head, tail):
-    attempt(head + tail)
-
-
-PARTS = st.one_of(
-    st.binary(max_size=6),
-    st.sampled_from(
-        [
-            b"",
-            b"\n",
-            b" ",
-            b"-",
-            b"9" * 30,
-            b"nan",
-            b"\n\n",
-            b"e o f",
-            b"</",
-            b'"',
-            b"}",
-            b"ENDATA\n",
-            b"\xff",
-            b"&a;",
-        ]
-    ),
-)
-
-
-@pytest.mark.slow
-@settings(deadline=None, max_examples=800)
-@given(
-    st.sampled_from(GOOD),
-    st.lists(st.tuples(st.integers(0, 20_000), st.integers(0, 12), PARTS), min_size=1, max_size=4),
-)
-def test_damaged_files_are_refused_or_read(path, damages):
-    data = path.read_bytes()
-    for start, length, part in damages:
-        at = start % (len(data) + 1)  # the end too: a part may be added to a file that is already empty
-        data = data[:at] + part + data[at + length :]
-    attempt(data)
-
-
-@for_each(
-    "part",
-    [b"\n", b" ", b"1 ", b"a\n", b"*** ", b'"', b"[", b"<a>", b"<a ", b",", b"c\n", b"# \n", b"\0", b"-"],
-)
-@for_each("head", HEADS)
-@pytest.mark.slow
-def test_long_repetitions_take_linear_time(head, part):
-    """Milliseconds; looking back from every character would exceed the time of a test."""
-    attempt(head + part * (LONG // len(part)))
-
-
-def test_one_long_name_does_not_widen_all_names():
-    variables = [{"VarName": "n" * 100_000, "X": 1}, *({"VarName": f"a{at}", "X": 1} for at in range(2000))]
-    document = json.dumps({"SolutionInfo": {"Status": 2}, "Vars": variables}).encode()
-    rows = b"".join(
-        f"<variable name='{entry['VarName']}' index='0' value='1'/>".encode() for entry in variables
-    )
-    xml = (
-        b"<CPLEXSolution><header solutionStatusValue='1'/><variables>"
-        + rows
-        + b"</variables></CPLEXSolution>"
-    )
-    for data in (document, xml):
-        tracemalloc.start()
-        with pytest.raises(SolutionError, match="more than 63 characters"):
-            parse_raw(data)
-        _, peak = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        assert peak < 8 << 20
-
-
-@pytest.mark.parametrize(
-    "document", [b"[" * 100_000, b'{ "SolutionInfo": {"Status": ' + b"9" * 100_000 + b"}}"]
-)
-def test_hostile_json(document):
-    start = b"" if document.startswith(b"{") else b'{ "SolutionInfo": '
-    attempt(start + document)
 
 
 # speed

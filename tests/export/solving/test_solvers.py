@@ -17,7 +17,6 @@ import pytest
 from children import command_lines, complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
-from crossfield.export.formats.nl import Layout
 from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import solver_for
@@ -35,10 +34,9 @@ from loops import for_each
 from scipy.optimize import linprog, lsq_linear
 
 with warnings.catch_warnings(action="ignore"):  # its import warns on newer Pythons
-    import casadi as ca
+    pass
 
 SOLVED = {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_LOCAL}
-TWO_NORM = ("minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact")
 
 
 def one_pixel(gauge, skew_coefficient):
@@ -140,12 +138,6 @@ def test_one_pixel_has_the_optimum_of_the_hand_calculation(solver, gauge):
     assert solution.field.alpha[0] == pytest.approx(alpha, abs=1e-4)
 
 
-def test_one_pixel_with_the_weight_of_the_paper():
-    solution = cf.solve(cf.formulate(one_pixel("box", 1e-6), "qp-fixed", p=np.zeros(0, int)), "ipopt")
-    assert solution.field.alpha[0] == pytest.approx(np.pi / 2, abs=1e-4)
-    assert solution.field.beta[0] == pytest.approx(np.pi / 6, abs=1e-4)
-
-
 @pytest.mark.parametrize("solver", ["highs", "ipopt", "bonmin"])
 def test_one_pixel_in_the_1_norm(solver):
     solution = cf.solve(cf.formulate(one_pixel("box", 1e-2), "milp-mccormick"), solver)
@@ -195,13 +187,6 @@ def test_the_exact_miqp_has_the_optimum_of_the_enumeration(seed, gauge):
     assert solution.objective == pytest.approx(expected, abs=2e-5)
     assert solution.field.energy(2).total == pytest.approx(expected, abs=2e-5)
     assert solution.violation.worst < 1e-6
-
-
-def test_bonmin_and_highs_agree_on_a_milp():
-    problem = cf.formulate(random_instance(2, 3, 5), "milp-mccormick")
-    assert cf.solve(problem, "bonmin").objective == pytest.approx(
-        cf.solve(problem, "highs").objective, abs=2e-5
-    )
 
 
 def test_three_solvers_agree_on_a_qp():
@@ -263,12 +248,6 @@ def test_every_other_pair_is_refused_by_name(small, tmp_path, label, solver, rea
     assert not folder.exists()
 
 
-def test_the_table_is_not_trivial():
-    assert len(DONE) > 15
-    assert len(REFUSED) > 15
-    assert {solver for _, solver in DONE} == set(BUNDLED)
-
-
 def test_the_preferred_solver_fits_the_class(small):
     preferred = {
         "milp-mccormick": "highs",
@@ -296,21 +275,15 @@ def test_a_missing_package_is_a_named_error(small, monkeypatch):
 # Integers dropped or fixed
 
 
-@pytest.mark.parametrize("name", TWO_NORM)
-def test_with_integers_fixed_ipopt_finds_what_the_qp_finds(small, name):
+@for_each("name", [name for name in FORMULATIONS if name != "qp-fixed"])
+def test_with_integers_fixed_ipopt_finds_the_optimum_of_the_angles(small, name):
     start = cf.greedy_field(small)
-    expected = least_squares(small, start.p)
     solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
-    assert solution.objective == pytest.approx(expected, abs=1e-6)
     assert solution.field.p.tolist() == start.p.tolist()
-
-
-@pytest.mark.parametrize("name", ["miqcp-bilinear-l1", "milp-mccormick"])
-def test_with_integers_fixed_ipopt_finds_what_the_lp_finds(small, name):
-    start = cf.greedy_field(small)
-    expected = least_deviations(small, start.p)
-    solution = cf.solve(cf.with_integers_fixed(cf.formulate(small, name), start), "ipopt", start=start)
-    assert solution.objective == pytest.approx(expected, abs=1e-6)
+    if name in {"minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact"}:
+        assert solution.objective == pytest.approx(least_squares(small, start.p), abs=1e-6)
+    if name in {"miqcp-bilinear-l1", "milp-mccormick"}:
+        assert solution.objective == pytest.approx(least_deviations(small, start.p), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["milp-mccormick", "miqp-exact", "miqp-mccormick"])
@@ -428,21 +401,16 @@ def test_highs_hears_the_interrupt_at_its_deadline_in_the_background_too(tmp_pat
     assert "asked to end" in next(files.glob("*.log")).read_text()
 
 
-def test_highs_takes_the_start_as_incumbent(tmp_path, hard):
+def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_path, hard):
     problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
-    cf.solve(problem, "highs", folder=tmp_path, start=start, limits=cf.Limits(300, gap=0.97))
+    limits = cf.Limits(300, gap=0.97)
+    solution = cf.solve(problem, "highs", folder=tmp_path, start=start, limits=limits)
     log = (tmp_path / "mouse.milp-mccormick.highs.log").read_text()
     claimed = re.search(r"MIP start solution is feasible, objective value is (\S+)", log)
     assert float(claimed[1]) == pytest.approx(problem.objective_value(problem.point(start)), rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["qp-fixed", "miqp-exact", "minlp-cubic"])
-def test_the_start_is_in_the_nl_file(tmp_path, small, name):
-    problem, start = formulated(small, name), cf.greedy_field(small)
-    cf.write(problem, tmp_path / "model.nl", start=start)
-    builder = ca.NlpBuilder()
-    builder.import_nl(str(tmp_path / "model.nl"))
-    assert np.array(builder.x_init).ravel().tolist() == problem.point(start)[Layout(problem).order].tolist()
+    assert solution.status == Status.OPTIMAL_GLOBAL
+    assert solution.bound < 0.9 * solution.objective
+    assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
 
 
 def test_bonmin_keeps_a_start_that_is_the_optimum(small):
@@ -460,14 +428,6 @@ def test_bonmin_improves_a_start_that_is_not(small):
     found = cf.solve(problem, "bonmin", start=flat)
     assert found.objective == pytest.approx(by_enumeration(small, least_squares), abs=2e-5)
     assert found.objective < flat.energy(2).total - 1e-3
-
-
-def test_a_wide_gap_ends_the_search_early(hard):
-    problem, start = cf.formulate(hard, "milp-mccormick"), cf.greedy_field(hard)
-    solution = cf.solve(problem, "highs", start=start, limits=cf.Limits(300, gap=0.97))
-    assert solution.status == Status.OPTIMAL_GLOBAL
-    assert solution.bound < 0.9 * solution.objective
-    assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
 
 
 def test_threads_may_change_from_solve_to_solve(tmp_path, small):
@@ -505,7 +465,7 @@ def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):
         lambda: cf.evaluate(cf.sample("mouse", 8), limits=endless),
         lambda: Request(instance, tmp_path, endless),
     ):
-        with pytest.raises(InputError, match=r"a time limit of inf s .* out of range"):
+        with pytest.raises(InputError, match="needs a finite time limit"):
             work()
     assert list(tmp_path.iterdir()) == []
 

@@ -58,7 +58,7 @@ def test_no_rule_of_the_form_stands_anywhere_else():
         for path in EXPORT.rglob("*.py")
         if rules.search(path.read_text(encoding="utf-8"))
     }
-    assert found <= {"writing/canonical.py", "writing/nl_layout.py", "writing/glpk_order.py"}
+    assert found <= {"writing/canonical.py", "writing/nl_layout.py"}
 
 
 def test_a_writer_imports_nothing_of_another_but_its_language():

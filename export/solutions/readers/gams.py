@@ -1,4 +1,6 @@
-"""The answer that our own GAMS files write after `gams x.gms --RESULTS=x.csv`: lines `name,value`.
+"""Answers of GAMS: the CSV of our own files, and listings, which have the status only.
+
+After `gams x.gms --RESULTS=x.csv` the CSV has lines `name,value`:
 
     model_status,1
     solver_status,1
@@ -9,6 +11,15 @@
 EPS is a zero, +INF and -INF occur, NA and UNDF are not values. GAMS's numbers of the two states are in the
 manual under modelStat and solveStat. If the model status promises no point, GAMS keeps the start in the
 levels: values are then not read.
+
+A listing (.lst) has values of four decimals, too few for a point:
+
+                   S O L V E      S U M M A R Y
+    **** SOLVER STATUS     1 Normal Completion
+    **** MODEL STATUS      2 Locally Optimal
+
+Several solves write several summaries: the last one counts, and `**** FILE SUMMARY` ends the listing. A model
+that does not compile has none, but `**** 2 ERROR(S)`. Layout: GAMS 54.6.1.
 """
 
 from __future__ import annotations
@@ -16,6 +27,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from ....models.errors import SolutionError
 from .text import Cursor, RawSolution, Reader, Status, begins, named_numbers, shown, without_point
 
 _EPS = re.compile(rb",[ ]*EPS[ ]*$", re.MULTILINE)
@@ -54,7 +66,7 @@ _SOLVER: Final = {
 _LIMITS: Final = {2, 3, 4, 8}
 
 
-def status_of(model: int, solver: int) -> tuple[Status, str]:
+def _claim(model: int, solver: int) -> tuple[Status, str]:
     """The claim of GAMS's model status and solver status, and both in words."""
     status, words = _MODEL.get(model, (Status.ERROR, f"model status {model}"))
     if status is Status.FEASIBLE and solver in _LIMITS:
@@ -64,13 +76,13 @@ def status_of(model: int, solver: int) -> tuple[Status, str]:
     return status, f"{words}; {_SOLVER.get(solver, f'solver status {solver}')}"
 
 
-def parse(data: bytes) -> RawSolution:
-    """Read a file. Raises SolutionError for NA, UNDF, other words that are not numbers, and a cut."""
+def parse_csv(data: bytes) -> RawSolution:
+    """Read a CSV. Raises SolutionError for NA, UNDF, other words that are not numbers, and a cut."""
     cursor = Cursor(data)
-    status, words = status_of(_state(cursor, b"model_status"), _state(cursor, b"solver_status"))
+    status, words = _claim(_state(cursor, "model_status"), _state(cursor, "solver_status"))
     if data.startswith(b"problem,", cursor.position):
-        _field(cursor, b"problem")  # the caller for every kind of file checks it
-    text = _field(cursor, b"objective")
+        cursor.line("problem")  # the caller for every kind of file checks it
+    text = cursor.after(b"objective,", "objective")
     objective = None if text in _NO_VALUE else cursor.number(b"0" if text == b"EPS" else text)
     if not status.promises_point:
         return without_point(status, words)
@@ -82,23 +94,51 @@ def parse(data: bytes) -> RawSolution:
     return RawSolution(status, words, objective, names, values)
 
 
-def _field(cursor: Cursor, expected: bytes) -> bytes:
-    """The value after the comma on the next line, whose label is known."""
-    label, _, text = cursor.line(expected.decode()).partition(b",")
-    if label != expected:
-        raise cursor.fault(f"{shown(label)} stands where {expected.decode()} should")
-    return text.strip()
-
-
-def _state(cursor: Cursor, expected: bytes) -> int:
-    text = _field(cursor, expected)
+def _state(cursor: Cursor, expected: str) -> int:
+    text = cursor.after(f"{expected},".encode(), expected)
     if not re.fullmatch(rb"\d{1,3}", text):
         raise cursor.fault(f"{shown(text)} is not the number of a state")
     return int(text)
 
 
+_SUMMARY: Final = b"S O L V E      S U M M A R Y"
+_LONGEST_SUMMARY: Final = 4096
+_END: Final = b"\n**** FILE SUMMARY"
+_STATES = re.compile(
+    rb"^\*\*\*\* SOLVER STATUS +(\d{1,3})\b[^\n]*\n\*\*\*\* MODEL STATUS +(\d{1,3})\b[^\n]*\n", re.MULTILINE
+)
+_ERRORS = re.compile(rb"^\*\*\*\* +(\d+ ERROR\(S\)[^\n]*|USER ERROR\(S\) ENCOUNTERED)", re.MULTILINE)
+
+
+def parse_listing(data: bytes) -> RawSolution:
+    """The status of the last solve in a listing, without a point.
+
+    Raises SolutionError when it is cut off or has neither a solve nor an error.
+    """
+    at = data.rfind(_SUMMARY)
+    if at < 0:
+        return _without_solve(data)
+    states = _STATES.search(data, at, at + _LONGEST_SUMMARY)
+    if states is None:
+        raise SolutionError("the listing is cut off in the summary of its last solve; run GAMS again")
+    if data.find(_END, states.end()) < 0:
+        raise SolutionError("the listing is cut off after a solve: it has no FILE SUMMARY; run GAMS again")
+    status, words = _claim(int(states[2]), int(states[1]))
+    return without_point(status, words)
+
+
+def _without_solve(data: bytes) -> RawSolution:
+    found = _ERRORS.search(data)
+    if found is None:
+        raise SolutionError("the listing has no summary of a solve; let the GAMS file run to its end")
+    return without_point(Status.ERROR, found[1])
+
+
+_PAGE: Final = rb"(?m)GAMS [^\n]{1,200} Page 1[ \t]*$"
+
 READERS: Final = (
     Reader(
-        "gams-csv", "GAMS, the CSV that our models write with --RESULTS", begins(rb"model_status,"), parse
+        "gams-csv", "GAMS, the CSV that our models write with --RESULTS", begins(rb"model_status,"), parse_csv
     ),
+    Reader("gams-lst", "GAMS listing (.lst), for the status alone", begins(_PAGE), parse_listing),
 )
