@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -82,15 +82,7 @@ class Evaluation:
             "seconds_per_field": self.limits.time_limit,
             "curves_of": "sketch" if self.drawn else "chains",
             "methods": {method: _facts(self.summary(method)) for method in self.methods},
-            "curves": [
-                {
-                    "curve": each.curve,
-                    "pixels": each.pixels,
-                    "degrees": each.degrees,
-                    "failures": each.failures,
-                }
-                for each in self.curves
-            ],
+            "curves": [asdict(each) for each in self.curves],
             "interrupted": self.interrupted,
         }
 

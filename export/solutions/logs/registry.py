@@ -59,7 +59,7 @@ class LogReader:
             ended=self._end(text, proven=bound is not None),
             bound=bound,
             objective=best,
-            seconds=seconds(words.get("seconds")),
+            seconds=number(words.get("seconds")),
             threads=whole(words.get("threads")),
             limit=number(words.get("limit")),
             columns=whole(words.get("columns")),
@@ -234,7 +234,7 @@ LOG_READERS: Final = (
         facts={
             "bound": (r"^Final MIP bound +: (\S+)$",),
             "objective": (r"^Final MIP objective +: (\S+)$",),
-            "seconds": (r"^ +Solution time / primaldual integral : +([\d.]+s)",),
+            "seconds": (r"^ +Solution time / primaldual integral : +([\d.]+)s",),
             "threads": (r"using (?:up to )?(\d+) threads?",),
             "limit": (r"^TIMELIMIT = (\S+)$",),
             "columns": (r"^Original problem has:\n +\d+ rows +(\d+) cols",),

@@ -69,9 +69,9 @@ def test_gams_reads_the_problem(label: str, layout: str, tmp_path: Path, monkeyp
 
 
 @for_each("layout", LAYOUTS)
-@for_each("label", SOLVED)
+@for_each("label", [*SOLVED, "milp-mccormick shape=parts"])
 def test_a_start_comes_back_under_our_names(label: str, layout: str, tmp_path: Path):
-    """CONVERT solves nothing, so the results are the start."""
+    """CONVERT solves nothing, so the results are the start; `parts` has a column in no term."""
     problem = problem_of(label)
     start = problem.point(make_field(problem.instance))
     convert = [f"{model}=convert" for model in sorted(set(gams.MODEL_TYPES.values()))]
