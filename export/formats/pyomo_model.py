@@ -37,11 +37,28 @@ _FUNCTIONS: Final = {"cos": pyo.cos, "pi": math.pi}
 
 
 def to_pyomo(problem: Problem, *, start: CrossField | None = None) -> pyo.ConcreteModel:
-    """A Pyomo ConcreteModel of the problem: same columns, bounds and domains, rows and objective.
+    """Build a Pyomo model of a problem: the same columns, bounds, domains, rows and objective.
 
-    Indices are (row, column) of a pixel, and (row, column, 'u' or 'r') of a pair. A missing bound is None.
-    start: a field whose complete point is set as the value of every variable. Raises
-    InstanceError when it is on another instance.
+    Variables are indexed by (row, column) of a pixel, or (row, column, side) of a pair, where side is `u` or
+    `r`. They are in the order of the problem's columns, so their values are a point of the problem.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    start
+        A field whose point is the initial value of every variable.
+
+    Returns
+    -------
+    ConcreteModel
+        The model; its objective is `obj`.
+
+    Raises
+    ------
+    InstanceError
+        For a start on another instance.
+
     """
     model = pyo.ConcreteModel(name=f"{problem.instance.name} {problem.name}")
     point = None if start is None else problem.point(start)

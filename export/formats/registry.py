@@ -171,15 +171,38 @@ def header(problem: Problem) -> list[str]:
 def write(
     problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:
-    """Write a problem to `path`: its suffix names the format, `.gz` compresses.
+    """Write a problem to a file. Equal problems give equal bytes.
 
-    .nl gets a .row and a .col file, .mod its .dat.
+    Each writer counts its records and compares them with the problem; no file appears if they differ. A .nl
+    comes with a .row and a .col file, and a .mod with its .dat.
 
-    dialect: `text` or `binary` for .nl, `indexed` or `scalar` for .gms. start: a field whose complete point
-    is the starting point where the format has a place for one. Equal problems give equal bytes. Each writer
-    counts its records; no file appears when a count differs from the problem's. Raises
-    UnsupportedByFormatError before a byte is written, InputError for an unknown suffix or dialect,
-    OutputError, and ConsistencyError for such a difference.
+    Parameters
+    ----------
+    problem
+        The problem.
+    path
+        File to write. Its suffix names the format, and a further `.gz` compresses it.
+    dialect
+        `text` or `binary` for .nl, `indexed` or `scalar` for .gms.
+    start
+        A field whose point becomes the starting point, in formats that have a place for one.
+
+    Returns
+    -------
+    Written
+        Format, dialect, the problem as the file holds it, and size and SHA-256 by file name.
+
+    Raises
+    ------
+    UnsupportedByFormatError
+        If the format cannot carry the problem.
+    InputError
+        For an unknown suffix or dialect.
+    ConsistencyError
+        If the written records differ from the problem.
+    OutputError
+        If a file cannot be written.
+
     """
     path = Path(path)
     entry = format_of(path)

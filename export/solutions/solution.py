@@ -43,14 +43,37 @@ LARGEST: Final = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A point of a problem with its claimed and recomputed properties.
+    """A solver's answer: its point, its claims, and what was recomputed from the instance.
 
-    problem: as the file's columns have it (with products lifted, if the format needed it); point: float
-    (columns,), or None. claimed, message, reported: status, words and objective in the file; bound: the
-    solver's dual bound, if known. status is the remaining claim. rounded: the largest change of an integer
-    column by rounding. tolerance: largest error of a point that does not contradict the claim, in units of a
-    column. interrupted: whether the user ended the search. start_returned: whether the point is the start
-    that the solver was given; None if unknown. nodes: of the search tree, if reported.
+    Parameters
+    ----------
+    problem
+        The problem in the columns of the file, with products lifted if the format needed it.
+    point
+        Values of all columns, shape (n,), or None.
+    claimed
+        Status that the file claims. `status` is what remains of it after the point was checked.
+    message
+        The solver's own words.
+    reader
+        Name of the reader that recognised the file.
+    reported, bound
+        Objective and dual bound in the file, if any.
+    rounded
+        Largest change of an integer column by rounding.
+    unknown
+        Number of names in the file that the problem does not have.
+    seconds
+        Duration of the solve, if known.
+    interrupted
+        Whether the user ended the solve.
+    start_returned
+        Whether the point is the start that the solver was given; None if unknown.
+    tolerance
+        Largest error of a point, in units of a column, that does not contradict the claims.
+    nodes
+        Number of nodes of the search tree, if reported.
+
     """
 
     problem: Problem
@@ -179,18 +202,35 @@ def read_solution(
     held: Mapping[str, Problem] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Solution:
-    """Read the solution of the problem from a file; the format is detected by content.
+    """Read a solver's answer to a problem; the kind of file is detected from its content.
 
-    Named values are mapped by name, positional ones by the column order of the .nl, LP or MPS file. A file
-    without a point gives a Solution without one.
-    held: the problem by format, as the file for the solver holds it, with its products lifted or
-    not: `Manifest.held`. Without it, positional values follow a file as it is written today, and
-    names of lifted products show that they were lifted.
-    tolerance: largest error of a point, in units of a column, that does not contradict the file's
-    claims.
-    If the solver repeated the problem's stamp, it decides whether the file is of this problem.
-    Raises InputError when the file cannot be read, and SolutionError, naming it, when it is malformed or of
-    another problem.
+    Named values are mapped by name, and positional ones by the column order of the .nl, LP or MPS file. If
+    the solver repeated the problem's stamp, it decides whether the file belongs to the problem.
+
+    Parameters
+    ----------
+    path
+        The file, plain or .gz.
+    problem
+        The problem that was solved.
+    held
+        The problem by format, with products lifted as in the solved file: `Manifest.held`. By default
+        positional values follow the files as they are written today.
+    tolerance
+        Largest error of a point, in units of a column, that does not contradict the claims of the file.
+
+    Returns
+    -------
+    Solution
+        The point, what the file claims, and what was recomputed. The point is None if the file has none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    SolutionError
+        If it is damaged, or belongs to another problem.
+
     """
     raw = read_raw(path)
     if raw.stamp and raw.stamp != problem.stamp:

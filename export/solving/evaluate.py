@@ -45,10 +45,23 @@ class CurveDeviation:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The methods' angles to the hidden curves of an instance, the longest curve first.
+    """Mean angles between hidden curves of an instance and the fields of methods, the longest curve first.
 
-    drawn: whether the curves come from the sketch; otherwise they are chains of stroke pixels. interrupted:
-    whether Ctrl-C ended it; then these are the curves done before.
+    Parameters
+    ----------
+    instance
+        The instance.
+    methods
+        Names of the methods.
+    limits
+        Limits of each field.
+    curves
+        Angles in degrees by method for each hidden curve.
+    drawn
+        Whether the curves come from the sketch; otherwise they are chains of stroke pixels.
+    interrupted
+        Whether the evaluation was interrupted; it then has the curves that were done before.
+
     """
 
     instance: Instance

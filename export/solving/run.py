@@ -56,12 +56,27 @@ def facts_with_energies(solution: Solution) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Results of a run. candidates: every field, the lowest 2-norm energy first.
+    """Results of a run.
 
-    Manifests: the written sets. failures: reasons by method; interrupted: the method, `certificate`,
-    `drawing` or `surface` that Ctrl-C ended, and the run with it; empty without an interrupt. proven: a bound
-    of the 2-norm energy of all fields, None without one. stages: the seconds of each stage, in turn. surface:
-    over the kept field, None if the run stopped earlier.
+    Parameters
+    ----------
+    instance
+        The instance.
+    candidates
+        Every field that was found, lowest 2-norm energy first.
+    manifests
+        The sets of model files that were written.
+    failures
+        Reasons by name of the method that failed.
+    interrupted
+        The method, `certificate`, `drawing` or `surface` during which the run was interrupted; else empty.
+    proven
+        Proven bound of the 2-norm energy of all fields, or None.
+    stages
+        Seconds of each stage, in order.
+    surface
+        Surface over the kept field; None if the run stopped earlier.
+
     """
 
     instance: Instance

@@ -24,7 +24,16 @@ _STARTING: Final = 0.5  # share of the time of the first stage for its start
 
 @dataclass(frozen=True, eq=False)
 class TwoStage:
-    """Both solutions; `field` comes from the second stage, or from the first if the second has no point."""
+    """Solutions of both stages.
+
+    Parameters
+    ----------
+    milp
+        Solution of `milp-mccormick`, whose jumps the second stage takes.
+    qp
+        Solution of `qp-fixed`. `field` comes from it, or from the first stage if it has no point.
+
+    """
 
     milp: Solution
     qp: Solution

@@ -210,3 +210,18 @@ def test_pyomo_is_imported_in_one_file():
 def _imports(path):
     lines = (line.split() for line in path.read_text().splitlines())
     return {line[1].split(".")[0] for line in lines if len(line) > 1 and line[0] in {"import", "from"}}
+
+
+@pytest.mark.parametrize("name", crossfield.__all__)
+def test_the_reference_describes_every_parameter(name):
+    """In numpydoc sections, which the API reference shows; errors have their message alone."""
+    public = getattr(crossfield, name)
+    if inspect.isclass(public) and issubclass(public, Exception):
+        return
+    text = inspect.getdoc(public) or ""
+    named = list(inspect.signature(public).parameters)
+    described = re.split(r"^(?:Parameters|Attributes)\n-+\n", text, maxsplit=1, flags=re.MULTILINE)
+    assert len(described) == 2 or not named
+    entries = re.findall(r"^([a-z_]\w*(?:, \w+)*)$", described[-1].partition("\n\n")[0], re.MULTILINE)
+    listed = {word for entry in entries for word in entry.split(", ")}
+    assert [each for each in named if not each.startswith("_") and each not in listed] == []
