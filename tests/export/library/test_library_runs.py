@@ -371,7 +371,7 @@ def test_every_installed_program_solves_its_problems(lib):
     if len({SOLVERS[name].maker for name in names}) > 3:
         assert entry_of(lib)["solved"]["by"] == "agreement"
     assert verify_library(lib) == []
-    assert solve_library(lib, solvers=names, time_time_limit=60.0) == []
+    assert solve_library(lib, solvers=names, time_limit=60.0) == []
 
 
 def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others_run(lib, capfd):
