@@ -32,8 +32,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 COMPILING = pytest.StashKey[subprocess.Popen]()
-FIXTURES = {"gams_executable": "gams", "chromium": "chromium"}
-"""Fixtures, and the program that each needs."""
 
 
 @pytest.fixture
@@ -74,8 +72,8 @@ def pytest_collection_modifyitems(config, items):
     and counts who is left out.
     """
     for item in items:
-        for fixture in FIXTURES.keys() & set(item.fixturenames):
-            item.add_marker(pytest.mark.needs(FIXTURES[fixture]))
+        if "chromium" in item.fixturenames:
+            item.add_marker(pytest.mark.needs("chromium"))
         if item.get_closest_marker("needs"):
             item.add_marker("oracles")
     slow = sum("slow" in item.keywords for item in items)

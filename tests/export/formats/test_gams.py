@@ -29,6 +29,7 @@ GOLDEN = places.GOLDEN
 LAYOUTS = {"scalar": gams.generate, "indexed": gams_indexed.generate}
 HEADER = ["a comment with %per cent%, a $dollar and an é", "$call in a comment"]
 CHOSEN = [label for label in CASES if re.search("strokes|relax|facet|norm=|parts|row", label)]
+needs_gams = pytest.mark.needs("gams")
 SOLVED = ["milp-mccormick gauge=strokes", "qp-fixed gauge=strokes", "milp-mccormick shape=row"]
 
 
@@ -57,6 +58,7 @@ def solved(folder: Path, problem: Problem, layout: str, *options: str) -> tuple[
     return results["objective"], np.array([results[name] for name in names_of(column_names(problem))])
 
 
+@needs_gams
 @for_each("layout", LAYOUTS)
 @for_each("label", CHOSEN)
 def test_gams_reads_the_problem(label: str, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -68,6 +70,7 @@ def test_gams_reads_the_problem(label: str, layout: str, tmp_path: Path, monkeyp
     assert evaluation_difference(found, problem, points) == ""
 
 
+@needs_gams
 @for_each("layout", LAYOUTS)
 @for_each("label", [*SOLVED, "milp-mccormick shape=parts"])
 def test_a_start_comes_back_under_our_names(label: str, layout: str, tmp_path: Path):
@@ -83,6 +86,7 @@ def test_a_start_comes_back_under_our_names(label: str, layout: str, tmp_path: P
     np.testing.assert_allclose([results[name] for name in names], start, rtol=1e-15, atol=0)
 
 
+@needs_gams
 @for_each("layout", LAYOUTS)
 @for_each("label", SOLVED)
 def test_optimum_is_that_of_another_solver(label: str, layout: str, tmp_path: Path):
@@ -93,6 +97,7 @@ def test_optimum_is_that_of_another_solver(label: str, layout: str, tmp_path: Pa
     assert problem.violation(point).worst < 1e-6
 
 
+@needs_gams
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path, layout: str):
     """The point of `miqp-exact` by CPLEX costs the same in (8), and at most as much as any tried field."""
@@ -103,6 +108,7 @@ def test_exact_convex_model_has_the_energy_of_its_field(tmp_path: Path, layout: 
     assert all(make_field(problem.instance, seed).energy().total >= value - 1e-9 for seed in range(20))
 
 
+@needs_gams
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_one_pixel(tmp_path: Path, layout: str):
     """Stroke at 120 degrees: gauge box forces beta = 30 degrees and alpha = 90; gauge strokes nothing."""
@@ -128,6 +134,7 @@ def test_text_is_plain(label: str, layout: str):
     )
 
 
+@needs_gams
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_jump_bounds_computed_by_gams_are_ours(tmp_path: Path, gauge: str):
     """Directions in steps of pi/24 put differences of windows onto the jumps of floor and ceil."""
@@ -144,6 +151,7 @@ def test_jump_bounds_computed_by_gams_are_ours(tmp_path: Path, gauge: str):
     np.testing.assert_array_equal(bounds, np.stack([instance.p_min, instance.p_max], axis=1))
 
 
+@needs_gams
 def test_no_lists_of_names_end_open(tmp_path: Path):
     """Declarations that end on the last place of a line, before and after it: of 8 to 28 pixels."""
     for count in range(8, 29, 5):
