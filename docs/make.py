@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ import crossfield as cf
 import numpy as np
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import DEFAULTS
-from crossfield.export.solving.methods import METHODS, Candidate, Request
 from crossfield.models.formulations.catalogue import FORMULATIONS, declare
 from crossfield.models.formulations.latex import latex
 from crossfield.models.formulations.symbols import VARIABLES
@@ -27,7 +25,6 @@ from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / "README.md"
-SECONDS = 10.0
 
 
 def markdown(columns: tuple[str, ...], rows: list[list[str]]) -> str:
@@ -92,86 +89,6 @@ gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0,
 `box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the
 windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
 prints it. Sections and numbers in brackets are those of the paper."""
-
-
-def methods(instance: Instance) -> Iterator[Candidate]:
-    """Every field that a run considers, by method."""
-    with tempfile.TemporaryDirectory() as folder:
-        request = Request(instance, Path(folder), cf.Limits(SECONDS))
-        for method in METHODS.values():
-            yield from method.find(request)
-
-
-def accuracy() -> None:
-    """Write docs/accuracy.md: cross error against the exact answer of the analytic instances."""
-    rows: list[list[str]] = []
-    for name, entry in SAMPLES.items():
-        for size in (24, 48) if entry.kind == "analytic" else ():
-            known = cf.analytic(name, size)
-            share = len(known.instance.theta) / known.instance.grid.size
-            for candidate in methods(known.instance):
-                found = candidate.field
-                error = np.degrees(found.cross_error(known.u_angle, known.v_angle))
-                numbers = [error.mean(), np.median(error), np.percentile(error, 95), found.energy(2).total]
-                rows.append(
-                    [
-                        name,
-                        str(size),
-                        f"{share:.0%}",
-                        candidate.method,
-                        *(f"{value:.2f}" for value in numbers),
-                        str(len(found.singularities.index)),
-                    ]
-                )
-    columns = (
-        "instance",
-        "size",
-        "stroke pixels",
-        "method",
-        "mean",
-        "median",
-        "95th percentile",
-        "2-norm energy",
-        "singularities",
-    )
-    text = f"""# Accuracy on surfaces with a known answer
-
-{generated("python docs/make.py accuracy")}
-
-{errors_in_short(rows)}
-
-Cross error in degrees: for both assignments of lines the mean of the two angle differences, the smaller one;
-over all pixels. Strokes are exact curvature lines of both families. Search and MILP are given {SECONDS:g} s
-each, and start from the greedy field, improved. The MILP minimises the 1-norm energy, and a lower 1-norm
-energy can well mean a higher 2-norm energy and a worse field. `crossfield run` keeps the bend field,
-which is nearest to [hidden curves](fields.md) too.
-
-{markdown(columns, rows)}
-"""
-    (DOCS / "accuracy.md").write_text(text)
-
-
-def errors_in_short(rows: list[list[str]]) -> str:
-    """Errors of the fields of lowest energy, and how often another method has a smaller error.
-    rows: those of the page's table.
-    """
-    cases: dict[tuple[str, str], list[list[str]]] = {}
-    for row in rows:
-        cases.setdefault((row[0], row[1]), []).append(row)
-    kept = {case: min(found, key=lambda row: float(row[7])) for case, found in cases.items()}
-    finest = max(int(size) for _, size in cases)
-    errors = sorted(float(row[4]) for (_, size), row in kept.items() if size == str(finest))
-    nearer = sum(
-        min(float(row[4]) for row in found) < float(kept[case][4]) - 0.005 for case, found in cases.items()
-    )
-    highest = max(float(row[4]) for row in rows)
-    return (
-        f"At size {finest} the fields of lowest energy are off by {errors[0]:.1f} to {errors[-1]:.1f} "
-        "degrees on average. "
-        f"In {nearer} of {len(cases)} cases another method comes nearer than the field of lowest energy: "
-        "a lower energy need not be a better field. "
-        f"The worst field in the table is off by {highest:.1f} degrees."
-    )
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
@@ -400,7 +317,7 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 PAGES: dict[str, Callable[[], None]] = {
     page.__name__: page
-    for page in (formulations, errata, accuracy, pictures, shaded, figures, traps, architecture, readme)
+    for page in (formulations, errata, pictures, shaded, figures, traps, architecture, readme)
 }
 
 

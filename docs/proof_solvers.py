@@ -25,7 +25,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.proof.certificate import Certificate, write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import windows_left
-from energies import Sketch
+from drawings import Sketch
 
 THREADS: Final = 2
 PROVEN: Final = 1e-6

@@ -35,7 +35,7 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES
-from energies import PROVERS, Sketch, answered, optimum, sketches, tiny
+from drawings import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import generated, markdown
 from proof_text import PROOF
 

@@ -1,4 +1,4 @@
-"""Measure methods and formulations in practice, and make docs/study.md: `python docs/study.py --page`.
+"""Measure methods and formulations, and make docs/evidence.md: `python docs/study.py --page`.
 
     python docs/study.py [--jobs N | --scheduler ADDRESS] [--parts PART ...] [--sketches FOLDER]
     python docs/study.py --quick --data FOLDER
@@ -38,11 +38,10 @@ from typing import Final
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
 
 from studying.plan import FULL, QUICK, Plan, expected, stages
-from studying.rows import PARTS
+from studying.rows import DATA, PARTS
 from studying.work import carry_out
 
 DOCS: Final = Path(__file__).resolve().parent
-DATA: Final = DOCS / "studying" / "data"
 
 
 def overview(plan: Plan, folder: Path | None) -> str:
@@ -57,9 +56,9 @@ def overview(plan: Plan, folder: Path | None) -> str:
 
 def main() -> None:
     """Do the remaining runs of the plan, and make the page."""
-    parser = argparse.ArgumentParser(description="Measure what is of practical use; make docs/study.md.")
+    parser = argparse.ArgumentParser(description="Measure methods and formulations; make docs/evidence.md.")
     parser.add_argument("--quick", action="store_true", help="a small plan of two minutes; give --data too")
-    parser.add_argument("--plan", action="store_true", help="only tell the runs and their seconds")
+    parser.add_argument("--plan", action="store_true", help="only print the runs and their seconds")
     parser.add_argument("--page", action="store_true", help="only make the page from the rows")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the rows")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=[], help="only these parts")

@@ -26,7 +26,7 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.trust import OFF, off_right_angles
-from energies import SKETCHES
+from drawings import SUFFIXES
 from make import generated, markdown
 from surface_text import PAGE
 
@@ -151,7 +151,7 @@ def tasks(part: str, folder: Path | None) -> Iterator[tuple[Any, ...]]:
         yield from TIMED
     elif part == "trust":
         own = [(name, name) for name, entry in SAMPLES.items() if entry.kind == "sketch"]
-        files = (path for path in sorted(folder.iterdir()) if path.suffix in SKETCHES) if folder else ()
+        files = (path for path in sorted(folder.iterdir()) if path.suffix in SUFFIXES) if folder else ()
         others = [(path.name, str(path)) for path in files if not path.stem.endswith("_mask")]
         yield from ((name, what, 48) for name, what in [*own, *others])
     else:

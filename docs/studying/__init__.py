@@ -1,1 +1,1 @@
-"""The study of docs/study.md: its plan, its runs as rows of CSV files, and the page with its plots."""
+"""The study behind docs/evidence.md: its plan, its runs as rows of CSV files, and the page with its plots."""

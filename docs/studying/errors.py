@@ -67,6 +67,11 @@ class Change:
         return f"{self.mean:+.2f} ± {self.error:.2f}"
 
     @property
+    def cell(self) -> str:
+        """The effect in a table, bold beyond two standard errors."""
+        return f"**{self}**" if self.sure else str(self)
+
+    @property
     def range(self) -> str:
         """The interval of two standard errors around the mean, of 95 % confidence."""
         return f"{self.mean - 2 * self.error:+.1f} to {self.mean + 2 * self.error:+.1f}"

@@ -1,44 +1,39 @@
-"""docs/study.md from the rows: answers first, then the parts, then threats to validity."""
+"""docs/evidence.md and its tables as CSV files, from the rows."""
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from crossfield.export.solvers_table import PROGRAMS
-from make import generated
+from make import generated, markdown
 
-from . import errors, practice_page, quality_page, solver_page
+from . import errors, fields_page, practice_page, quality_page, solver_page
 from .instances import surfaces
 from .plan import FULL, Plan, stages
-from .rows import EVERY, NOT_RUN, PARTS, Row, key_of
+from .rows import EVERY, NOT_RUN, PARTS, Row, Table, key_of
 from .rows import read as read_rows
 from .solver_page import percent
-from .solving import PROOF
-from .words import QUESTION, ROWS, THREATS
 
 Kept = dict[str, list[Row]]
+TEMPLATE: Final = Path(__file__).with_name("evidence.md")
 COMMAND: Final = "python docs/study.py --page"
-
-
-def counted(text: str) -> dict[str, int]:
-    """Numbers of rows of each part from which a page was made, according to its end."""
-    counts = text.rstrip().rpartition("from the first ")[2].rstrip(".")
-    return {part: int(count) for count, part in (each.split() for each in counts.split(", "))}
+MADE_BY: Final = {
+    **dict.fromkeys(PARTS, "python docs/study.py"),
+    "fields": "python docs/fields.py hidden missed surface --sketches FOLDER",
+}
 
 
 def read(data: Path) -> Kept:
-    """The rows of all parts; a running study may add others."""
+    """The rows of all parts."""
     files = {part: data / f"{part}.csv" for part in PARTS}
     return {part: list(read_rows(path)) if path.exists() else [] for part, path in files.items()}
 
 
 def ordered(kept: Kept, plan: Plan) -> Kept:
-    """The rows in the order of the plan: colours and lines of tables follow it.
-
-    Rows that are not in the plan, of other drawings, come last.
-    """
+    """The rows in the order of the plan, which colours and lines of tables follow; others come last."""
     place = {run.key: number for number, run in enumerate(r for s in stages(plan, None) for r in s.runs)}
     return {
         part: sorted(rows, key=lambda row: place.get(key_of(row), len(place))) for part, rows in kept.items()
@@ -53,22 +48,19 @@ def completeness(kept: Kept, plan: Plan) -> str:
     have = sum(run.key in done for run in planned)
     left_out = sum((run.key[0], EVERY, *run.key[2:]) in skipped and run.key not in done for run in planned)
     rest = len(planned) - have - left_out
-    text = f"Of {len(planned):,} planned runs {have:,} are done and {left_out:,} left out by the rule below"
-    return f"{text}; the study is complete." if not rest else (
-        f"{text}; **{rest:,} are still to come**, and all that is said here is said of those that are done. "
-        "`python docs/study.py` goes on with them."
-    )  # fmt: skip
+    text = (
+        f"The study planned {len(planned):,} runs: {have:,} are done and {left_out:,} were left out by the "
+        "rule in the appendix"
+    )
+    return f"{text}." if not rest else f"{text}; **{rest:,} are still missing**."
 
 
-def answers(kept: Kept) -> dict[str, list[str]]:
-    """The answers in plain words: sentences by question, the most important one first."""
+def findings(kept: Kept) -> dict[str, list[str]]:
+    """Sentences by question, the most important one first."""
     return {
-        "Can solvers prove optima?": solvable(kept),
+        "Which method has the smallest error?": [by_others(), *practice_page.recommendation(kept)],
         "Do lower energies give better fields?": matters(kept),
-        "Which method should be used?": [
-            quality_page.by_others("polyvector", "bend"),
-            *practice_page.recommendation(kept),
-        ],
+        "Can solvers prove optima?": solvable(kept),
     }
 
 
@@ -77,114 +69,128 @@ def paragraphs(found: dict[str, list[str]], most: int | None = None) -> str:
     return "\n\n".join(f"**{question}** {' '.join(lines[:most])}" for question, lines in found.items())
 
 
+def by_others() -> str:
+    """The difference between the two best methods on drawings by others."""
+    sizes = sorted(fields_page.values("size", measure="hidden"))
+    found = {
+        size: fields_page.compared("polyvector", "bend", origin=fields_page.OTHERS, size=size)
+        for size in sizes
+    }
+    parts = [f"{each} degrees at {size} pixels" for size, each in found.items() if each is not None]
+    sure = [str(size) for size, each in found.items() if each is not None and each.sure]
+    beyond = f"only the difference at {' and '.join(sure)} pixels" if sure else "no difference"
+    return (
+        f"On {fields_page.counts()['others_drawings']} drawings by others, `bend` changes the mean error at "
+        f"hidden curves, compared with `polyvector`, by {', '.join(parts)}; {beyond} exceeds two standard "
+        "errors."
+    )
+
+
 def solvable(kept: Kept) -> list[str]:
     """Answer on the reach of solvers, and of `prove`."""
-    found = solver_page.facts_in_short(kept)
-    standing, own = found["standing"], found["prove"][2]
-    if not standing:
+    found = solver_page.reach_of(kept)
+    own = solver_page.proof_rungs(kept["proofs"], 2)
+    if not own:
         return ["Not measured yet."]
-    free = {pair: of for pair, of in standing.items() if pair[0] != solver_page.JUMPS_GIVEN}
-    parts = []
-    for size in sorted({size for of in free.values() for size in of}):
-        ran = {pair: of[size] for pair, of in free.items() if size in of and of[size].tried}
-        if ran:
-            pair, rung = max(ran.items(), key=lambda each: (each[1].share, -each[1].seconds))
-            large = len(rung.runs) - len(rung.tried)
-            note = f"; {large} are too large for its free edition" if large else ""
-            parts.append(
-                f"{rung.proven} of {len(rung.runs)} at {size} pixels ({solver_page.label(pair)}{note})"
-            )
-    ours = [f"{own[size].proven} of {len(own[size].runs)} at {size}" for size in sorted(own)]
-    reach = found["reach"]
-    last = max((size for of in free.values() for size, rung in of.items() if rung.tried), default=0)
-    if reach is None:
-        text = "no solver proves half of the instances of any size."
-    elif reach[0] == last:
-        text = f"a solver proves at least half of the instances at every size, up to {last} pixels per side."
+    if found is None:
+        reach = "no pair of formulation and solver proves half of the instances of any size"
     else:
-        text = f"a solver proves half of the instances up to {reach[0]} pixels per side."
-    sentences = (
-        f"{HOW}, {text}",
-        f"The best pair of formulation and solver proves {', '.join(parts)}.",
-        f"`prove`, which is made for this problem, proves {', '.join(ours)}.",
-        found["helped"],
-    )
-    return list(filter(None, sentences))
-
-
-HOW: Final = f"In {FULL.limit:g} s per run, on one thread, from a cold start and with free editions"
-"""The conditions under which solvers ran."""
+        reach = (
+            f"the best pair of formulation and solver ({solver_page.label(found[1])}) proves half of the "
+            f"instances up to {found[0]} pixels per side"
+        )
+    ours = [f"{own[size].proven} of {len(own[size].runs)} at {size} pixels" for size in sorted(own)[-2:]]
+    return [
+        f"In {FULL.limit:g} s per run, on one thread, from a cold start and with free editions, {reach}.",
+        f"`prove`, which uses the structure of the problem, proves {' and '.join(ours)}.",
+    ]
 
 
 def matters(kept: Kept) -> list[str]:
-    """Answer on the effect of the optimum on the error, and of other changes."""
-    found = quality_page.changes(kept["quality"], surfaces=False)
-    optimum = found["optimum"]
-    if optimum is None:
+    """Answer on the effect of the optimum on the error."""
+    own = quality_page.changes(kept["quality"], surfaces=False)["optimum"]
+    sizes = fields_page.values("size", measure="hidden", method="prove")
+    there = fields_page.compared("greedy", "prove", size=sizes[0])
+    search = fields_page.compared("greedy", "search", size=sizes[0])
+    if own is None or there is None or search is None:
         return ["Not measured yet."]
+    others = fields_page.counts()["others_drawings"]
     before = [gap for row, gap in errors.gaps(kept["quality"]) if row["way"] == "greedy"]
-    mean = percent(float(np.mean(before or [0.0])))
-    others = quality_page.elsewhere()
-    there = others.changes[PROOF]
-    verdict = "" if optimum.sure or there.sure else "No effect was found, and large ones are excluded. "
-    text = (
-        f"{verdict}From the greedy field to the best one found, the mean error at hidden curves changes by "
-        f"{there} degrees on {others.drawings} drawings, {others.others} of them by others (95 % interval "
-        f"{there.range}), and by {optimum} degrees on the study's own ({optimum.range})."
-    )
-    about = f"The greedy field's energy is {mean} above the proven optimum on average."
-    sure = {name: each for name, each in found.items() if each is not None and each.sure and each.mean < 0}
-    last = "No change that was tried lowers the error at hidden curves by more than two standard errors."
-    if sure:
-        most = sorted(sure, key=lambda name: sure[name].mean)[:3]
-        words = "; ".join(f"{quality_page.CHANGES[name][0]} ({sure[name]})" for name in most)
-        last = f"These changes lower the error at hidden curves, in degrees: {words}."
-    return [*filter(None, (text, about, quality_page.harmless(kept["quality"]))), last]
+    return [
+        (
+            "From the greedy field to the best field of `prove`, the mean error at hidden curves changes by "
+            f"{there} degrees on {there.drawings} drawings, {others} of them by others (95 % interval "
+            f"{there.range}), and by {own} degrees in the study of crossfield's own drawings ({own.range})."
+        ),
+        f"A search of 5 s changes it by {search} degrees on the {search.drawings} drawings.",
+        f"The energy of greedy fields is {percent(float(np.mean(before or [0.0])))} above the optimum.",
+        quality_page.harmless(kept["quality"]),
+    ]
 
 
-def threats(kept: Kept) -> str:
-    """Threats to validity, with the editions and the machine."""
+def threats(kept: Kept) -> dict[str, Any]:
+    """Numbers of drawings and surfaces, editions, and machine."""
     free = [f"{p.title}: {p.free}" for p in PROGRAMS.values() if p.free]
     rows = [row for part in kept.values() for row in part if row["machine"]]
     machines = ", ".join(sorted({row["machine"] for row in rows}))
     loads = [row["load"] for row in rows] or [0.0]
-    machine = (
-        f"{machines}; load average while measuring {min(loads):.1f} to {max(loads):.1f}, "
-        f"{float(np.median(loads)):.1f} in the median. Other work ran beside, and seconds are too many by "
-        "what it took."
-    )
     fields = [row for part in ("quality", "practice") for row in kept[part]]
     known = {row["instance"] for row in fields if row["instance"] in surfaces()}
-    drawings = {row["instance"] for row in fields} - known
-    return THREATS.format(
-        drawings=len(drawings), surfaces=len(known), free="; ".join(free) + ".", machine=machine
-    )
+    return {
+        "drawings": len({row["instance"] for row in fields} - known),
+        "surfaces_count": len(known),
+        "free": "; ".join(free) + ".",
+        "machine": (
+            f"{machines}. The load average was {min(loads):.1f} to {max(loads):.1f}, "
+            f"{float(np.median(loads)):.1f} in the median: other work ran at the same time, so seconds are "
+            "too long."
+        ),
+    }
+
+
+def tables(kept: Kept) -> dict[str, Table]:
+    """All tables by name; kept: in the order of the plan."""
+    found = fields_page.tables()
+    for part in (solver_page, quality_page, practice_page):
+        found |= part.tables(kept)
+    return found
 
 
 def page(kept: Kept, plan: Plan) -> str:
-    """The text of the page."""
-    kept = ordered(kept, plan)
-    parts = [
-        "# Are the formulations useful in practice?",
-        generated(COMMAND),
-        QUESTION,
-        paragraphs(answers(kept)),
-        completeness(kept, plan),
-    ]
-    parts += [*solver_page.section(kept), *quality_page.section(kept), *practice_page.section(kept)]
-    counts = ", ".join(f"{len(rows)} {part}" for part, rows in kept.items())
-    parts += [threats(kept).rstrip(), f"{ROWS} This page is made from the first {counts}."]
-    return "\n\n".join(filter(None, parts)) + "\n"
+    """The text of the page; kept: in the order of the plan."""
+    found = tables(kept)
+    heads, lines = found["variants"]
+    found["variants"] = heads[2:], [line[2:] for line in lines if line[0] == solver_page.ALL]
+    counts = {part: len(rows) for part, rows in kept.items()} | {"fields": len(fields_page.read())}
+    files = [f"| `{name}.csv` | {count:,} | `{MADE_BY[name]}` |" for name, count in counts.items()]
+    return TEMPLATE.read_text(encoding="utf-8").format(
+        generated=generated(COMMAND),
+        findings=paragraphs(findings(kept)),
+        completeness=completeness(kept, plan),
+        missed=fields_page.missed_sentence(),
+        files="\n".join(files),
+        **fields_page.counts(),
+        **solver_page.sentences(kept),
+        **quality_page.sentences(kept),
+        **practice_page.sentences(kept),
+        **threats(kept),
+        **{name: markdown(*table) for name, table in found.items()},
+    )
 
 
 def write_page(data: Path, target: Path, plan: Plan) -> None:
-    """Make study.md in a folder, and its plots in the folder `pictures` there."""
+    """Make evidence.md in a folder, its tables in `evidence` and its plots in `pictures` there."""
     kept = ordered(read(data), plan)
     for part in (solver_page, quality_page, practice_page):
         part.draw(kept, target / "pictures")
-    (target / "study.md").write_text(page(kept, plan))
+    (target / "evidence").mkdir(exist_ok=True)
+    for name, (heads, lines) in tables(kept).items():
+        with (target / "evidence" / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            plain = [[cell.replace("`", "").replace("**", "") for cell in line] for line in (heads, *lines)]
+            csv.writer(file, lineterminator="\n").writerows(plain)
+    (target / "evidence.md").write_text(page(kept, plan))
 
 
 def in_short(kept: Kept, plan: Plan) -> str:
-    """The first two sentences of each answer, for the index of all pages."""
-    return paragraphs(answers(ordered(kept, plan)), most=2)
+    """The first sentence of each answer, for the index of all pages."""
+    return paragraphs(findings(ordered(kept, plan)), most=1)

@@ -1,4 +1,4 @@
-"""Text of the page on ways to a field in practice: quality and time by size, and recommendations."""
+"""Tables and sentences on methods in practice: error, energy and time by size, and recommendations."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 from crossfield.models.evaluation.hidden import Summary
-from make import markdown
 
-from . import errors, plots, solver_page
-from .rows import Row
+from . import errors, plots
+from .rows import Row, Table
+from .solver_page import percent
 from .solving import FAILED
-from .words import PRACTICE_TEXT
 
 Kept = dict[str, list[Row]]
 QUICK: Final = 1.0
@@ -66,7 +65,7 @@ class Fare:
         notes = [f"{self.failed} without a field"] * bool(self.failed)
         notes += [f"{self.optimal} proven optimal"] * bool(self.optimal)
         return [
-            f"{self.seconds:.2g}", mean + spread, solver_page.percent(self.over), f"{self.off:.1f}",
+            f"{self.seconds:.2g}", mean + spread, percent(self.over), f"{self.off:.1f}",
             str(self.runs), ", ".join(notes),
         ]  # fmt: skip
 
@@ -95,16 +94,25 @@ def fares(rows: list[Row]) -> Fares:
     return found
 
 
-def table(found: Fares) -> str:
-    """All ways at all sizes."""
+def full_table(found: Fares) -> Table:
+    """All methods at all sizes."""
     cells = [
         [str(size), f"`{way}`", *fare.cells()] for size, ways in found.items() for way, fare in ways.items()
     ]
-    heads = (
-        "pixels", "way", "s, median", "hidden curves, degrees", "energy above the least, median",
-        "off the strokes, degrees", "fields", "",
-    )  # fmt: skip
-    return markdown(heads, cells)
+    return (
+        "pixels", "method", "s, median", "hidden curves, degrees", "energy above the least, median",
+        "from the strokes, degrees", "fields", "notes",
+    ), cells  # fmt: skip
+
+
+def short_table(found: Fares) -> Table:
+    """Error and seconds: a row for each method, a column for each size."""
+    ways = list(dict.fromkeys(way for of in found.values() for way in of))
+    cells = []
+    for way in ways:
+        fares = [of[way] for of in found.values()]
+        cells.append([f"`{way}`", *(f"{fare.cells()[1]}; {fare.seconds:.2g} s" for fare in fares)])
+    return ("method", *(f"{size} pixels" for size in found)), cells
 
 
 def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf)) -> list[str]:
@@ -118,11 +126,11 @@ def ranking(ways: dict[str, Fare], seconds: tuple[float, float] = (0.0, np.inf))
 
 
 def recommendation(kept: Kept) -> list[str]:
-    """Three sentences: ways for drawing, for the least energy, and for proofs."""
+    """Two sentences: methods for drawing, and for the least energy."""
     found = fares(kept["practice"])
     if not found:
-        return ["The ways to a field are not measured yet."]
-    return [_for_drawing(found, kept["practice"]), _for_energy(found), _for_solvers(kept)]
+        return ["The methods are not measured yet."]
+    return [_for_drawing(found, kept["practice"]), _for_energy(found)]
 
 
 def _for_drawing(found: Fares, rows: list[Row]) -> str:
@@ -133,7 +141,7 @@ def _for_drawing(found: Fares, rows: list[Row]) -> str:
         return f"No way that takes {QUICK:g} s or less is measured yet."
     mean = float(np.mean([_error(found, size, way) for size, way in best.items()]))
     text = (
-        f"On the study's own drawings, use {_grouped(best)} while drawing: of methods that take {QUICK:g} "
+        f"On crossfield's own drawings, use {_grouped(best)} while drawing: of methods that take {QUICK:g} "
         f"s or less, it has the smallest mean error at hidden curves, {mean:.1f} degrees on average"
     )
     others = [way for ways in order.values() for way in ways[1:2]]
@@ -199,24 +207,8 @@ def _for_energy(found: Fares) -> str:
     return f"{text}; `prove` proves {', '.join(proven)} optimal within its time." if proven else f"{text}."
 
 
-def _for_solvers(kept: Kept) -> str:
-    reach = solver_page.facts_in_short(kept)["reach"]
-    if reach is None:
-        return "No solver proves half of the instances of any size from a file with free jumps."
-    size, pair = reach
-    text = (
-        "Use solver files to prove optima on small grids and to compare solvers: the largest grid on which "
-        f"one proves half of the instances has {size} pixels per side ({solver_page.label(pair)})"
-    )
-    lower, tried = below_all_others(kept["practice"], MILP_WAY)
-    return (
-        f"{text}. The paper's two stages, started from an improved field, find a lower energy than all other "
-        f"methods on {lower} of {tried} fields."
-    )
-
-
 def below_all_others(rows: list[Row], way: str) -> tuple[int, int]:
-    """Number of fields on which a way has less energy than every other one, and number of all."""
+    """Number of fields for which a method has less energy than every other one, and number of all."""
     cases: dict[Any, tuple[list[float], list[float]]] = defaultdict(lambda: ([], []))
     for row in rows:
         if row["energy_2"] is not None:
@@ -245,10 +237,17 @@ def draw(kept: Kept, pictures: Path) -> None:
         for size, ways in fares(kept["practice"]).items()
     }
     if panels:
-        plots.error_by_seconds(pictures / "study_practice.svg", panels)
+        plots.error_by_seconds(pictures / "evidence_practice.svg", panels)
 
 
-def section(kept: Kept) -> list[str]:
-    """The part of the page."""
+def sentences(kept: Kept) -> dict[str, str]:
+    """The sentences of this part by name."""
+    lower, tried = below_all_others(kept["practice"], MILP_WAY)
+    text = f"`{MILP_WAY}` finds less energy than all other methods for {lower} of {tried} fields."
+    return {"two_stages": text}
+
+
+def tables(kept: Kept) -> dict[str, Table]:
+    """The tables of this part by name."""
     found = fares(kept["practice"])
-    return [PRACTICE_TEXT["head"], *([table(found), PRACTICE_TEXT["plot"]] if found else [])]
+    return {"practice": full_table(found), "practice-in-short": short_table(found)}

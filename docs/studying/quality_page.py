@@ -1,24 +1,17 @@
-"""Text of the page on the quality of fields: changes that improve it."""
+"""Tables and sentences on energies and errors of fields."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from crossfield.models.instance.weights import SKEW_WEIGHT, STROKE_WEIGHT
-from crossfield.models.sketch.samples import SAMPLES
-from make import DOCS, markdown
 
 from . import errors, plots
 from .errors import Change, Kind, change, is_default, is_surface, usable
-from .rows import Row
+from .rows import Row, Table
 from .solver_page import percent
-from .solving import PROOF
-from .words import QUALITY_TEXT
 
 Kept = dict[str, list[Row]]
 
@@ -65,88 +58,18 @@ def changes(rows: list[Row], *, surfaces: bool) -> dict[str, Change | None]:
     return {name: change(chosen, before, after) for name, (_, before, after) in CHANGES.items()}
 
 
-def changes_table(rows: list[Row]) -> str:
+def changes_table(rows: list[Row]) -> Table:
     """All changes, for hidden curves and surfaces; those beyond two standard errors are bold."""
     drawn, known = changes(rows, surfaces=False), changes(rows, surfaces=True)
     cells = [[words, _cell(drawn[name]), _cell(known[name])] for name, (words, *_) in CHANGES.items()]
     cells = [line for line in cells if any(line[1:])]
-    return markdown(("change", "hidden curves, degrees", "surfaces, degrees"), cells)
+    return ("change", "hidden curves, degrees", "surfaces, degrees"), cells
 
 
 def _cell(found: Change | None) -> str:
     if found is None:
         return ""
-    text = f"{found} ({found.pairs} pairs)"
-    return f"**{text}**" if found.sure else text
-
-
-@dataclass(frozen=True)
-class Elsewhere:
-    """Effects of changes from the greedy field on the drawings of docs/fields.md, including samples."""
-
-    drawings: int
-    others: int
-    size: int
-    seconds: float
-    changes: dict[str, Change | None]
-
-    def __str__(self) -> str:
-        parts = [
-            f"{OTHERS[way].format(seconds=self.seconds)} {_cell(found)}"
-            for way, found in self.changes.items()
-        ]
-        return (
-            f"On {self.drawings} drawings, {self.others} of them by others, at {self.size} pixels "
-            f"([how good the fields are](fields.md)), from the greedy field: {'; '.join(parts)}."
-        )
-
-
-def drawn_rows(facts: dict[str, Any], size: int) -> list[Row]:
-    """The rows of docs/fields.json at a size, one per hidden curve and method."""
-    return [
-        {"instance": row["drawing"], "size": size, "hidden": curve, "way": row["method"], "error": degrees}
-        for row in facts["rows"]["methods"]
-        if row["size"] == size
-        for curve, degrees in enumerate(row["degrees"])
-    ]
-
-
-@cache
-def by_others(before: str, after: str) -> str:
-    """Effect of a change of method on the drawings by others in docs/fields.json, at each of its sizes."""
-    facts = json.loads((DOCS / "fields.json").read_text())
-    parts, drawings = [], 0
-    for size in sorted({row["size"] for row in facts["rows"]["methods"]}):
-        rows = [row for row in drawn_rows(facts, size) if row["instance"] not in SAMPLES]
-        found = change(rows, lambda row: row["way"] == before, lambda row: row["way"] == after)
-        if found is not None:
-            drawings = max(drawings, found.drawings)
-            parts.append(f"{found} degrees at {size} pixels")
-    return (
-        f"On {drawings} drawings by others, `{after}` changes the mean error at hidden curves, compared with "
-        f"`{before}`, by {', '.join(parts)}."
-    )
-
-
-@cache
-def elsewhere() -> Elsewhere:
-    """The changes on the drawings of docs/fields.json, at the size at which it has proofs."""
-    facts = json.loads((DOCS / "fields.json").read_text())
-    size = max(row["size"] for row in facts["rows"]["methods"] if row["method"] == PROOF)
-    rows = drawn_rows(facts, size)
-    names = {row["instance"] for row in rows}
-    found = {
-        way: change(rows, lambda row: row["way"] == "greedy", lambda row, way=way: row["way"] == way)
-        for way in OTHERS
-    }
-    return Elsewhere(len(names), len(names - SAMPLES.keys()), size, facts["seconds"], found)
-
-
-OTHERS: Final = {
-    "search": "to the search of {seconds:g} s", PROOF: "to the best that `prove` finds",
-    "polyvector": "to the PolyVector field", "bend": "to the bend field",
-}  # fmt: skip
-"""Methods of docs/fields.json, and the words for the change to them."""
+    return f"{found.cell} ({found.pairs} pairs)"
 
 
 def kind_of(row: Row) -> str:
@@ -156,7 +79,7 @@ def kind_of(row: Row) -> str:
     return "perturbed" if row["way"].startswith("perturbed") else str(row["way"])
 
 
-def ways_table(rows: list[Row]) -> str:
+def ways_table(rows: list[Row]) -> Table:
     """Gap and error of every kind of field under default weights."""
     found = errors.gaps(rows)
     cells = []
@@ -170,14 +93,13 @@ def ways_table(rows: list[Row]) -> str:
                 "" if mean is None else f"{mean.mean:.1f}" + (f" ± {mean.error:.1f}" if mean.error else "")
             )
         cells.append(line)
-    heads = (
+    return (
         "field",
         "fields",
         "energy above the optimum, median",
         "hidden curves, degrees",
         "surfaces, degrees",
-    )
-    return markdown(heads, cells)
+    ), cells
 
 
 def proven_text(rows: list[Row]) -> str:
@@ -185,8 +107,8 @@ def proven_text(rows: list[Row]) -> str:
     best = errors.best_energies([row for row in usable(rows) if is_default(row)])
     closed = sum(proven for _, proven in best.values())
     return (
-        f"`prove` closes {closed} of the {len(best)} instances to {100 * errors.CLOSE:g} % within the time; "
-        "plot and table are of these."
+        f"`prove` closes {closed} of the {len(best)} instances to a gap of {100 * errors.CLOSE:g} %. The "
+        "plot and the table cover these instances."
     )
 
 
@@ -200,8 +122,8 @@ def correlation_text(rows: list[Row]) -> str:
             if found is not None and found.error is not None:
                 parts.append(f"{found.mean:+.2f} ± {found.error:.2f} over {found.count} {words}, {which}")
     return (
-        "Rank correlation of energy and error between the fields of one instance, 1 where less energy always "
-        f"means less error: {'; '.join(parts)}."
+        "Rank correlation of energy and error between the fields of one instance (1: less energy always "
+        f"means less error): {'; '.join(parts)}."
         if parts
         else ""
     )
@@ -214,13 +136,13 @@ def harmless(rows: list[Row]) -> str:
     if not gap:
         return ""
     after = max((place + 1 for place, each in enumerate(more) if each <= HARM), default=0)
-    worse = f"by more than {HARM:g} degrees, in the median of a bin"
+    worse = f"more than {HARM:g} degrees worse than the minimum-energy field, in the median of a bin,"
     if after == len(gap):
-        return f"Even {percent(gap[-1])} above the optimum's energy fields are not worse than it {worse}."
+        return f"No bin up to {percent(gap[-1])} above the optimum's energy is {worse[:-1]}."
     if not after:
-        return f"Fields of more energy than the optimum are worse {worse}."
+        return f"Fields with more energy than the optimum are {worse[:-1]}."
     return (
-        f"Fields become worse than the optimum {worse}, somewhere between {percent(gap[after - 1])} and "
+        f"Fields are {worse} only from somewhere between {percent(gap[after - 1])} and "
         f"{percent(gap[after])} above its energy."
     )
 
@@ -261,23 +183,24 @@ def draw(kept: Kept, pictures: Path) -> None:
         for kind in dict.fromkeys(kind_of(each[0]) for each in found):
             mine = [each for each in found if kind_of(each[0]) == kind and is_surface(each[0]) == surfaces]
             panels[title][kind] = ([100 * gap for _, gap, _ in mine], [more for _, _, more in mine])
-    plots.error_by_gap(pictures / "study_quality.svg", panels)
+    plots.error_by_gap(pictures / "evidence_quality.svg", panels)
     lines = {name: weight_lines(kept["quality"], name) for name in ("w_strokes", "w_beta")}
     titles = {"w_strokes": "weight of the strokes", "w_beta": "weight of the skew"}
     plots.error_by_weight(
-        pictures / "study_weights.svg", {titles[name]: each for name, each in lines.items()}
+        pictures / "evidence_weights.svg", {titles[name]: each for name, each in lines.items()}
     )
 
 
-def section(kept: Kept) -> list[str]:
-    """The part of the page."""
+def tables(kept: Kept) -> dict[str, Table]:
+    """The tables of this part by name."""
+    return {"changes": changes_table(kept["quality"]), "energies": ways_table(kept["quality"])}
+
+
+def sentences(kept: Kept) -> dict[str, str]:
+    """The sentences of this part by name."""
     rows = kept["quality"]
-    if not rows:
-        return [QUALITY_TEXT["head"], "Not measured yet."]
-    weights = (
-        QUALITY_TEXT["weights"] if weight_lines(rows, "w_strokes") else "Other weights: not measured yet."
-    )
-    return [
-        QUALITY_TEXT["head"], proven_text(rows), correlation_text(rows), QUALITY_TEXT["plot"], harmless(rows),
-        ways_table(rows), QUALITY_TEXT["changes"], changes_table(rows), str(elsewhere()), weights,
-    ]  # fmt: skip
+    return {
+        "proven": proven_text(rows),
+        "correlation": correlation_text(rows),
+        "harmless": harmless(rows),
+    }

@@ -67,6 +67,9 @@ NUMBERS: Final = frozenset(
     | {"columns", "rows", "load"}
 )
 Row = dict[str, Any]
+Table = tuple[tuple[str, ...], list[list[str]]]
+"""Heads and cells of a table."""
+DATA: Final = Path(__file__).resolve().parent / "data"
 
 
 def text(value: Any) -> str:
@@ -81,7 +84,7 @@ def number(given: str) -> float | None:
     return float(given) if given else None
 
 
-class Table:
+class Rows:
     """The rows of a part, in a file that grows by whole lines."""
 
     def __init__(self, path: Path) -> None:
@@ -140,7 +143,7 @@ def key_of(row: Row) -> tuple[str, ...]:
     return tuple(text(row[name]) for name in ASKED)
 
 
-def tables(folder: Path) -> dict[str, Table]:
-    """The table of every part in a folder, made where it is missing."""
+def tables(folder: Path) -> dict[str, Rows]:
+    """The rows of every part in a folder, made where it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
-    return {part: Table(folder / f"{part}.csv") for part in PARTS}
+    return {part: Rows(folder / f"{part}.csv") for part in PARTS}

@@ -1,4 +1,4 @@
-"""Text of the page on formulations and solvers."""
+"""Tables and sentences on formulations and solvers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from make import markdown
 
 from . import facts, plots
-from .rows import EVERY, NOT_RUN, Row
+from .rows import EVERY, NOT_RUN, Row, Table
 from .solving import FAILED, JUMPS_GIVEN, TOO_LARGE
-from .words import SOLVERS_TEXT
 
 HALF: Final = 0.5
 LINES: Final = 7  # of a panel of profiles, the best ones
@@ -129,7 +127,7 @@ def reach(standing: dict[Pair, dict[int, Rung]]) -> tuple[int, Pair] | None:
 # Tables
 
 
-def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> str:
+def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> Table:
     """Proofs and seconds of every pair on every rung."""
     sizes = sorted({size for of in standing.values() for size in of} | {int(row["size"]) for row in proofs})
     cells = [
@@ -139,10 +137,26 @@ def proven_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> st
     for norm in (2, 1):
         of = proof_rungs(proofs, norm)
         cells.append([f"energy, {norm}-norm", "`prove`", *(of[s].cell() if s in of else "" for s in sizes)])
-    return markdown(("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells)
+    return ("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells
 
 
-def kinds_table(rows: list[Row]) -> str:
+def best_table(standing: dict[Pair, dict[int, Rung]], proofs: list[Row]) -> Table:
+    """The pair with free jumps that proves most on each rung, and `prove` in the 2-norm."""
+    ours = proof_rungs(proofs, 2)
+    cells = []
+    for size in sorted(ours):
+        ran = {
+            pair: of[size]
+            for pair, of in standing.items()
+            if pair[0] != JUMPS_GIVEN and size in of and of[size].tried
+        }
+        best = max(ran, key=lambda pair: (ran[pair].proven, -ran[pair].seconds), default=None)
+        line = [label(best), ran[best].cell()] if best else ["none was run", "-"]
+        cells.append([str(size), *line, ours[size].cell()])
+    return ("pixels", "best pair", "proven by it", "proven by `prove`"), cells
+
+
+def kinds_table(rows: list[Row]) -> Table:
     """Proven instances by kind of instance, problem and size, for any solver."""
     sizes = sorted({int(row["size"]) for row in rows})
     cells = []
@@ -155,7 +169,7 @@ def kinds_table(rows: list[Row]) -> str:
                 done = {row["instance"] for row in mine if row["size"] == size and facts.is_proven(row)}
                 line.append(f"{len(done)} of {len(have)}" if have else "")
             cells.append([problem, KINDS[kind], *line])
-    return markdown(("problem", "instances", *(f"{size} pixels" for size in sizes)), cells)
+    return ("problem", "instances", *(f"{size} pixels" for size in sizes)), cells
 
 
 KINDS: Final = {
@@ -167,7 +181,7 @@ KINDS: Final = {
 """Kinds of instances by the first word of their names."""
 
 
-def open_table(rows: list[Row], known: facts.Optima) -> str:
+def open_table(rows: list[Row], known: facts.Optima) -> Table:
     """Results of pairs without a proof: points, their excess over the optimum, and gaps."""
     given_up = {TOO_LARGE, FAILED}
     left = [row for row in rows if not facts.is_proven(row) and row["status"] not in given_up]
@@ -178,7 +192,7 @@ def open_table(rows: list[Row], known: facts.Optima) -> str:
         of = facts.grouped(groups[way, solver], "size")
         line = [_left(of[size,], known) if (size,) in of else "" for size in sizes]
         cells.append([f"`{way}`", SOLVERS[solver].title, *line])
-    return markdown(("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells)
+    return ("formulation", "solver", *(f"{size} pixels" for size in sizes)), cells
 
 
 def _left(rows: list[Row], known: facts.Optima) -> str:
@@ -206,7 +220,7 @@ def variants(rows: list[Row]) -> dict[str, dict[Pair, Both]]:
     return {name: found[name] for name in sorted(found)}
 
 
-def variant_rungs_table(rows: list[Row]) -> str:
+def variant_rungs_table(rows: list[Row]) -> Table:
     """Proofs and seconds of every variant on every rung."""
     found = facts.grouped((row | {"variant": variant(row)} for row in rows if not is_cold(row)), "variant")
     sizes = sorted({int(row["size"]) for of in found.values() for row in of})
@@ -215,35 +229,25 @@ def variant_rungs_table(rows: list[Row]) -> str:
         for (name,) in sorted(found)
         for (way, solver), of in rungs_of(found[name,]).items()
     ]
-    heads = ("formulation", "solver", "variant", *(f"{size} pixels" for size in sizes))
-    return markdown(heads, cells) if cells else "Not measured yet."
+    return ("formulation", "solver", "variant", *(f"{size} pixels" for size in sizes)), cells
 
 
-def variants_table(rows: list[Row], known: facts.Optima) -> str:
+def variants_table(rows: list[Row], known: facts.Optima) -> Table:
     """Variants compared with the cold runs, pair by pair; then all pairs together."""
     cells = []
     for name, of in variants(rows).items():
         for (way, solver), both in of.items():
             cells.append([f"`{way}`", SOLVERS[solver].title, name, *_beside(both, known)])
         together = [each for both in of.values() for each in both]
-        cells.append(["**all**", "", name, *(f"**{c}**" for c in _beside(together, known))])
-    heads = (
+        cells.append([ALL, "", name, *_beside(together, known)])
+    return (
         "formulation", "solver", "variant", "runs", "proven: cold / variant", "s: cold / variant",
         "above the optimum: cold / variant",
-    )  # fmt: skip
-    return markdown(heads, cells) if cells else ""
+    ), cells  # fmt: skip
 
 
-def helped(rows: list[Row]) -> str:
-    """Sentence on the effect of a start and windows on the number of proofs."""
-    parts = []
-    for name, of in variants(rows).items():
-        both = [each for pairs in of.values() for each in pairs]
-        if name != PRINTED:
-            proven = [sum(facts.is_proven(each[i]) for each in both) for i in (0, 1)]
-            parts.append(f"{name} {proven[1]} of {len(both)} runs end with a proof instead of {proven[0]}")
-    text = "; ".join(parts)
-    return f"{text[:1].upper()}{text[1:]}." if text else ""
+ALL: Final = "all"
+"""The formulation of lines about all pairs together."""
 
 
 def _beside(both: Both, known: facts.Optima) -> list[str]:
@@ -276,42 +280,40 @@ _NONE: Final = 5e-6  # smaller values are rounding
 _WHOLE: Final = 0.1
 
 
-def contradictions_text(rows: list[Row], known: facts.Optima) -> str:
-    """Numbers of claims of optimality, and of claims that are contradicted."""
+def claims_sentence(rows: list[Row], known: facts.Optima) -> str:
+    """Numbers of claims of optimality, and the contradicted ones with an example."""
     claims = [row for row in rows if facts.is_proven(row) and row["facet"] == "hull"]
     judged = [r for r in claims if (facts.problem_of(r), r["instance"], r["size"]) in known]
     found = facts.contradictions(rows, known)
     kinds = Counter((row["solver"], row["way"], what.split(" ")[0]) for row, what in found)
-    summary = (
-        f"Of {len(claims):,} optima that solvers claim, {len(judged):,} can be held against what `prove` has "
-        "shown, or against the best point that any solver has of the mixed problem, which `prove` does not "
-        f"know; {len(found)} answers contradict these by more than {facts.WITHIN:g}, relative to 1, or to "
-        "the optimum if that is more."
+    text = (
+        f"Solvers claim {len(claims):,} optima. {len(judged):,} of them can be compared with the result of "
+        "`prove`, or, for the mixed problem, with the best point of any solver. "
+        f"{len(found)} answers contradict it by more than {facts.WITHIN:g}, relative to the larger of 1 and "
+        "the optimum"
     )
-    if not found:
-        return summary
     worst = {(row["solver"], row["way"], what.split(" ")[0]): (row, what) for row, what in found}
-    cells = [
-        [SOLVERS[solver].title, f"`{way}`", str(kinds[solver, way, first]),
-         f"{row['instance']}, {row['size']:.0f} pixels: {what}"]
+    examples = [
+        f"{label((way, solver))}, {kinds[solver, way, first]} times, such as {row['instance']} at "
+        f"{row['size']:.0f} pixels: {what}"
         for (solver, way, first), (row, what) in worst.items()
-    ]  # fmt: skip
-    return f"{summary}\n\n{markdown(('solver', 'formulation', 'how many', 'one of them'), cells)}"
+    ]
+    return f"{text} ({'; '.join(examples)})." if examples else f"{text}."
 
 
-def doubts_text(rows: list[Row]) -> str:
+def failures_sentence(rows: list[Row]) -> str:
     """Answers that failed the check of points and claims, and runs that failed."""
     unsure = Counter((row["solver"], row["way"]) for row in rows if row["status"] == "unknown")
     failed = Counter((row["solver"], row["way"]) for row in rows if row["status"] == FAILED)
     parts = [
         f"{words}: " + ", ".join(f"{label((way, solver))} {n}" for (solver, way), n in sorted(found.items()))
         for words, found in (
-            ("Answers whose point contradicts what is claimed of it, counted as unproven", unsure),
+            ("Answers whose point contradicts their claim, counted as unproven", unsure),
             ("Runs that failed", failed),
         )
         if found
     ]
-    return ". ".join(parts) + "." if parts else "No run failed, and no point contradicts what is claimed."
+    return ". ".join(parts) + "." if parts else "No run failed, and no point contradicts its claim."
 
 
 # Plots
@@ -360,39 +362,35 @@ def draw(kept: Kept, pictures: Path) -> None:
     rows = [row for row in kept["solvers"] if is_cold(row)]
     panels = {name: facts.ratios(times_of(rows, kept["proofs"], name)) for name in facts.PROBLEMS}
     del panels["given jumps"]
-    plots.profiles(pictures / "study_profiles.svg", panels)
+    plots.profiles(pictures / "evidence_profiles.svg", panels)
     standing = rungs_of(rows)
     sizes = sorted({size for of in standing.values() for size in of})
-    plots.growth(pictures / "study_growth.svg", sizes, *growth_lines(standing, kept["proofs"]))
+    plots.growth(pictures / "evidence_growth.svg", sizes, *growth_lines(standing, kept["proofs"]))
 
 
-def section(kept: Kept) -> list[str]:
-    """The part of the page."""
+def tables(kept: Kept) -> dict[str, Table]:
+    """The tables of this part by name."""
     rows = kept["solvers"]
     known = facts.optima(kept["proofs"], facts.measured(rows))
     cold = [row for row in rows if is_cold(row)]
     standing = rungs_of(cold)
-    return [
-        SOLVERS_TEXT["head"],
-        proven_table(standing, kept["proofs"]),
-        SOLVERS_TEXT["profiles"],
-        SOLVERS_TEXT["growth"],
-        SOLVERS_TEXT["kinds"],
-        kinds_table(facts.measured(cold)),
-        SOLVERS_TEXT["open"],
-        open_table(facts.measured(cold), known),
-        SOLVERS_TEXT["variants"],
-        variant_rungs_table(rows),
-        SOLVERS_TEXT["beside"],
-        variants_table(facts.measured(rows), known),
-        SOLVERS_TEXT["claims"],
-        contradictions_text(facts.measured(rows), known),
-        doubts_text(facts.measured(rows)),
-    ]
+    return {
+        "proofs-by-solver": proven_table(standing, kept["proofs"]),
+        "best-pairs": best_table(standing, kept["proofs"]),
+        "proofs-by-kind-of-instance": kinds_table(facts.measured(cold)),
+        "runs-without-a-proof": open_table(facts.measured(cold), known),
+        "variants-by-size": variant_rungs_table(rows),
+        "variants": variants_table(facts.measured(rows), known),
+    }
 
 
-def facts_in_short(kept: Kept) -> dict[str, Any]:
-    """Facts for the answers at the top: the reach of solvers, and of `prove`."""
-    standing = rungs_of([row for row in kept["solvers"] if is_cold(row)])
-    return {"helped": helped(facts.measured(kept["solvers"])), "reach": reach(standing), "standing": standing,
-            "prove": {norm: proof_rungs(kept["proofs"], norm) for norm in (2, 1)}}  # fmt: skip
+def sentences(kept: Kept) -> dict[str, str]:
+    """The sentences of this part by name."""
+    rows = facts.measured(kept["solvers"])
+    known = facts.optima(kept["proofs"], rows)
+    return {"claims": claims_sentence(rows, known), "failures": failures_sentence(rows)}
+
+
+def reach_of(kept: Kept) -> tuple[int, Pair] | None:
+    """The result of `reach` for the cold runs."""
+    return reach(rungs_of([row for row in kept["solvers"] if is_cold(row)]))

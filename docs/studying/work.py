@@ -15,7 +15,7 @@ from crossfield.export.solvers_table import SOLVERS
 from .facts import is_proven
 from .fields import fielded
 from .plan import FEWEST_PROVEN, Plan, Stage, stages
-from .rows import EVERY, NOT_RUN, Row, Run, Table, tables
+from .rows import EVERY, NOT_RUN, Row, Rows, Run, tables
 from .solving import FAILED, proved, solved
 
 Progress = Callable[[str], object]
@@ -82,11 +82,11 @@ def _can_run(run: Run) -> bool:
     return not run.solver or not SOLVERS[run.solver].missing
 
 
-def _keep(table: Table, run: Run, found: dict[str, Any]) -> None:
+def _keep(table: Rows, run: Run, found: dict[str, Any]) -> None:
     table.append(run, found)
 
 
-def left(runs: list[Run], stage: Stage, kept: dict[str, Table]) -> list[Run]:
+def left(runs: list[Run], stage: Stage, kept: dict[str, Rows]) -> list[Run]:
     """The runs of a stage without a row, except for pairs that proved too little of the rung before.
 
     Each of these pairs gets one row that states this.
@@ -106,7 +106,7 @@ def left(runs: list[Run], stage: Stage, kept: dict[str, Table]) -> list[Run]:
     return found
 
 
-def _say(run: Run, why: str, table: Table) -> None:
+def _say(run: Run, why: str, table: Rows) -> None:
     from dataclasses import replace
 
     every = replace(run, instance=EVERY)
@@ -119,7 +119,7 @@ def pair_of(run: Run) -> tuple[Any, ...]:
     return (run.way, run.solver, run.start, run.facet, run.windows, run.limit)
 
 
-def reason(kind: tuple[Any, ...], rung: int, table: Table) -> str:
+def reason(kind: tuple[Any, ...], rung: int, table: Rows) -> str:
     """The reason why a pair is not run on the next rung; empty if it is."""
     rows = [row for row in table.rows if row["size"] == rung and _pair(row) == kind]
     if any(row["status"] == NOT_RUN for row in rows):

@@ -1,0 +1,198 @@
+"""Tables and sentences on the errors of fields, from data/fields.csv."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from crossfield.models.evaluation.hidden import summary
+from crossfield.models.instance.weights import STROKE_WEIGHT
+from crossfield.models.sketch.samples import SAMPLES
+
+from .errors import Change, change
+from .rows import DATA, Row, Table
+
+OWN: Final = "of crossfield"
+OTHERS: Final = "by others"
+COMPARED: Final = (
+    ("polyvector", "bend"),
+    ("greedy", "bend"),
+    ("greedy", "polyvector"),
+    ("greedy", "search"),
+    ("greedy", "prove"),
+)
+"""Methods whose errors are compared: before, after."""
+
+
+@cache
+def read() -> list[Row]:
+    """The rows, each with the origin of its drawing."""
+    with (DATA / "fields.csv").open(newline="") as file:
+        found: list[Row] = list(csv.DictReader(file))
+    for row in found:
+        row |= {name: float(row[name]) for name in ("noise", "weight", "value")}
+        row |= {"size": int(row["size"]), "origin": OWN if row["name"] in SAMPLES else OTHERS}
+    return found
+
+
+def picked(**facts: Any) -> list[Row]:
+    """The rows with these facts."""
+    return [row for row in read() if all(row[name] == value for name, value in facts.items())]
+
+
+def values(name: str, **facts: Any) -> list[Any]:
+    """The different values of a column in the rows with these facts, in their order."""
+    return list(dict.fromkeys(row[name] for row in picked(**facts)))
+
+
+def over_drawings(rows: list[Row]) -> str:
+    """Mean over drawings of the means over their curves, with its standard error."""
+    of: dict[str, list[float]] = {}
+    for row in rows:
+        of.setdefault(row["name"], []).append(row["value"])
+    found = summary(np.array([np.mean(each) for each in of.values()]))
+    if found is None:
+        return "-"
+    return f"{found.mean:.1f}" + ("" if found.error is None else f" ± {found.error:.1f}")
+
+
+def by_origin(cell: Callable[..., str]) -> tuple[tuple[str, ...], list[str]]:
+    """Heads and cells for drawings by others, then for crossfield's, at each size."""
+    cases = [(origin, size) for origin in (OTHERS, OWN) for size in values("size", measure="hidden")]
+    heads = tuple(f"{origin}, {size} pixels" for origin, size in cases)
+    return heads, [cell(origin=origin, size=size) for origin, size in cases]
+
+
+def hidden_table() -> Table:
+    """Error at hidden curves: a row for each method."""
+    facts: dict[str, Any] = {"measure": "hidden", "weight": STROKE_WEIGHT}
+    heads: tuple[str, ...] = ()
+    cells = []
+    for method in values("method", **facts):
+        heads, line = by_origin(lambda m=method, **case: over_drawings(picked(method=m, **facts, **case)))
+        cells.append([f"`{method}`", *line])
+    return ("method", *heads), cells
+
+
+def compared(before: str, after: str, **case: Any) -> Change | None:
+    """The change of the error at hidden curves from one method to another."""
+    rows = [
+        {"instance": r["name"], "size": r["size"], "hidden": int(r["curve"]), "way": r["method"],
+         "error": r["value"]}
+        for r in picked(measure="hidden", weight=STROKE_WEIGHT, **case)
+    ]  # fmt: skip
+    return change(rows, lambda row: row["way"] == before, lambda row: row["way"] == after)
+
+
+def compared_table() -> Table:
+    """Differences of errors at hidden curves between methods."""
+    heads: tuple[str, ...] = ()
+    cells = []
+    for before, after in COMPARED:
+        heads, line = by_origin(
+            lambda b=before, a=after, **case: "-" if (c := compared(b, a, **case)) is None else c.cell
+        )
+        cells.append([f"`{after}` minus `{before}`", *line])
+    return ("difference", *heads), cells
+
+
+def by_drawing_table() -> Table:
+    """Error at hidden curves of every drawing: a row for each drawing, size and method."""
+    found: dict[tuple[str, ...], list[float]] = {}
+    for row in picked(measure="hidden", weight=STROKE_WEIGHT):
+        key = (row["origin"], row["name"], str(row["size"]), row["method"])
+        found.setdefault(key, []).append(row["value"])
+    heads = ("origin", "drawing", "pixels", "method", "curves", "mean", "median")
+    return heads, [
+        [*key, str(len(of)), f"{np.mean(of):.2f}", f"{np.median(of):.2f}"] for key, of in found.items()
+    ]
+
+
+def counts() -> dict[str, int]:
+    """Numbers of drawings by others and of crossfield's, and of their curves at the middle size."""
+    middle = sorted(values("size", measure="hidden"))[1]
+    found = {}
+    for origin, name in ((OTHERS, "others"), (OWN, "own")):
+        rows = picked(measure="hidden", weight=STROKE_WEIGHT, origin=origin, method="greedy", size=middle)
+        found |= {f"{name}_drawings": len({row["name"] for row in rows}), f"{name}_curves": len(rows)}
+    return found
+
+
+def surface_table() -> Table:
+    """Mean cross error over all surfaces: a row for each method."""
+    facts: dict[str, Any] = {"measure": "surface", "weight": STROKE_WEIGHT}
+    cases = [(size, noise) for size in values("size", **facts) for noise in values("noise", **facts)]
+    heads = (f"{size} pixels, noise {noise:g}" for size, noise in cases)
+    cells = [
+        [f"`{m}`", *(f"{mean(picked(method=m, size=s, noise=n, **facts)):.1f}" for s, n in cases)]
+        for m in values("method", **facts)
+    ]
+    return ("method", *heads), cells
+
+
+def by_surface_table() -> Table:
+    """Mean cross error of every surface, method and weight."""
+    heads = ("surface", "pixels", "noise", "weight", "method", "degrees")
+    return heads, [
+        [r["name"], str(r["size"]), f"{r['noise']:g}", f"{r['weight']:g}", r["method"], f"{r['value']:.2f}"]
+        for r in picked(measure="surface")
+    ]
+
+
+def weight_table() -> Table:
+    """Greedy fields under each weight of the strokes."""
+    sizes = sorted(values("size", measure="hidden"))
+    fine, noises = max(values("size", measure="surface")), sorted(values("noise", measure="surface"))
+    cells = []
+    for weight in sorted(values("weight")):
+        facts = {"weight": weight, "method": "greedy"}
+        hidden = [over_drawings(picked(measure="hidden", size=size, **facts)) for size in sizes]
+        off = [f"{mean(picked(measure='missed', size=size, **facts)):.1%}" for size in sizes]
+        known = [
+            f"{mean(picked(measure='surface', size=fine, noise=noise, **facts)):.2f}" for noise in noises
+        ]
+        cells.append([f"{weight:g}", *hidden, *off, *known])
+    heads = (
+        "weight",
+        *(f"hidden curves, {size} pixels" for size in sizes),
+        *(f"missed, {size} pixels" for size in sizes),
+        *(f"surfaces, noise {noise:g}" for noise in noises),
+    )
+    return heads, cells
+
+
+def missed_sentence() -> str:
+    """Sentence on the stroke pixels that the methods miss under the default weights."""
+    facts: dict[str, Any] = {"measure": "missed", "weight": STROKE_WEIGHT}
+    shares = {
+        (method, size): mean(picked(method=method, size=size, **facts))
+        for method in values("method", **facts)
+        for size in values("size", **facts)
+    }
+    (method, size), most = max(shares.items(), key=lambda each: each[1])
+    worst = max(picked(**facts), key=lambda row: row["value"])
+    return (
+        f"Under the default weights, every method misses at most {most:.1%} of the stroke pixels by more "
+        f"than 10 degrees, on average over drawings (`{method}` at {size} pixels). The worst drawing has "
+        f"{worst['value']:.1%} (`{worst['method']}` at {worst['size']} pixels)."
+    )
+
+
+def mean(rows: list[Row]) -> float:
+    """The mean value of the rows."""
+    return float(np.mean([row["value"] for row in rows]))
+
+
+def tables() -> dict[str, Table]:
+    """The tables of this part by name."""
+    return {
+        "hidden-curves": hidden_table(),
+        "methods-compared": compared_table(),
+        "hidden-curves-by-drawing": by_drawing_table(),
+        "surfaces": surface_table(),
+        "surfaces-by-weight": by_surface_table(),
+        "weights": weight_table(),
+    }
