@@ -382,7 +382,7 @@ OPENING: Final = """
 All rows below come from it, under the coefficients of the paper (1 and 1e-6 on every
 grid). Rows are kept in `proofs.json` beside this page; `python docs/proofs.py --measure samples` measures
 those of a part again, `python docs/proofs.py --help` lists the parts.
-[What MIP solvers do without it](bounds.md) has a page of its own.
+[How far MIP solvers get without it](evidence.md#how-far-solvers-get).
 """
 
 PICTURES: Final = """
@@ -415,7 +415,7 @@ CPLEX, else Bonmin, 60 s each. *Apart* is relative to 1, or to the optimum if th
 """
 
 DRAWINGS_TEXT: Final = """
-Line drawings by others, size 24, as in [how low the energies are](energies.md): `NAME.png` with its mask
+Line drawings by others, size 24: `NAME.png` with its mask
 where `NAME_mask.png` lies beside it. `--sketches FOLDER` names the folder in which they are.
 """
 

@@ -38,7 +38,7 @@ LONGEST_LIFT: Final = 10.0
 REPORT: Final = "report.json"
 MASK: Final = "mask.png"
 KEPT: Final = "bend"
-"""The method whose field is kept; docs/fields.md has the measurements."""
+"""The method whose field is kept; docs/evidence.md has the measurements."""
 LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
@@ -205,7 +205,7 @@ def run(
     """Do everything: files for solvers, every field that can be found here, pictures, and a report.
 
     The field that is kept is the bend field: it is nearer to curves that were hidden from it than fields of
-    less energy (docs/fields.md). Afterwards the folder contains
+    less energy (docs/evidence.md). Afterwards the folder contains
 
     - DIR/models: every formulation in every format, starting points, manifests, the instance
     - DIR/solve: what the local solvers read and wrote

@@ -15,7 +15,7 @@ from .digits import in_digits
 REFERENCE: Final = 24
 """Pixels of the longer side of the grid on which weights are the coefficients of the energy."""
 STROKE_WEIGHT: Final = 20.0
-"""Default weight of the strokes of a sketch; see docs/weights.md for the reason."""
+"""Default weight of the strokes of a sketch; see docs/evidence.md for the reason."""
 SKEW_WEIGHT: Final = 1e-6
 """Default weight of the skew in a sketch."""
 
