@@ -16,7 +16,8 @@ from typing import Any, Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.bundle.manifest import write_all
-from crossfield.export.verify.verify import Check, verify
+from crossfield.export.verify.checks import Check
+from crossfield.export.verify.verify import verify
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.weights import REFERENCE

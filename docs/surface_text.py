@@ -69,9 +69,9 @@ r^2 in the first line the torus from strokes is much farther off.
 ## Surfaces with a known answer
 
 Angle between normal and true normal in degrees, mean / 95 % of pixels, on the side that is nearer to the
-truth. Strokes are exact curvature lines, as in the [evidence](evidence.md#surfaces-with-a-known-answer). *Facing the viewer*: the error of a
-flat sheet. Vase, cone and spheroid are surfaces of revolution, cylinder and wave translated curves; the
-ellipsoid with three different axes is neither.
+truth. Strokes are exact curvature lines, as in the [evidence](evidence.md#surfaces-with-a-known-answer).
+*Facing the viewer*: the error of a flat sheet. Vase, cone and spheroid are surfaces of revolution, cylinder
+and wave translated curves; the ellipsoid with three different axes is neither.
 
 {known}
 

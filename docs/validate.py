@@ -20,7 +20,8 @@ from crossfield.export.bundle.manifest import write_all
 from crossfield.export.bundle.starts import STARTS
 from crossfield.export.cli.tables import smallest_problems
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
-from crossfield.export.verify.verify import Check, Verdict, Verification, verify
+from crossfield.export.verify.checks import Check, Verdict, Verification
+from crossfield.export.verify.verify import verify
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.instance.instance import GAUGES, Gauge, Instance
 from make import generated, markdown

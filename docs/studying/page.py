@@ -18,7 +18,7 @@ from .rows import read as read_rows
 from .solver_page import percent
 
 Kept = dict[str, list[Row]]
-TEMPLATE: Final = Path(__file__).with_name("evidence.md")
+TEMPLATE: Final = Path(__file__).with_name("evidence.template")
 COMMAND: Final = "python docs/study.py --page"
 MADE_BY: Final = {
     **dict.fromkeys(PARTS, "python docs/study.py"),

@@ -11,7 +11,7 @@ from .inputs import known
 from .output import print_line, print_notice, progress, show_table
 
 if TYPE_CHECKING:
-    from ..verify.verify import Verification
+    from ..verify.checks import Verification
 
 
 def verify_command(

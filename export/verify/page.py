@@ -10,7 +10,7 @@ from ..formats.registry import generator
 from ..solvers_table import PROGRAMS, SOLVERS
 
 if TYPE_CHECKING:
-    from .verify import Check, Verification
+    from .checks import Check, Verification
 
 PAGE: Final = "verify.html"
 _MEANING: Final = {

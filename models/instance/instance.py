@@ -295,7 +295,7 @@ class Instance(Pictured):
     def with_weights(
         self, *, stroke_weight: float | None = None, skew_weight: float | None = None
     ) -> Instance:
-        """Return the same instance under other weights, which mean the same on every grid (docs/mathematics.md).
+        """Return the same instance under other weights, which mean the same on every grid.
 
         Parameters
         ----------

@@ -10,7 +10,8 @@ from crossfield.export.bundle.manifest import write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS, carried
 from crossfield.export.solving.local import solver_for
-from crossfield.export.verify.verify import Verdict, compared, verify
+from crossfield.export.verify.checks import Verdict
+from crossfield.export.verify.verify import compared, verify
 
 LIFTED = ("minlp-quartic", "minlp-cubic")
 

@@ -28,8 +28,9 @@ from crossfield.export.programs import scip as scip_program
 from crossfield.export.programs.reading import Meaning, Points
 from crossfield.export.solutions.solution import read_solution
 from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.comparison import evaluation_difference, of_problem, values_at
-from crossfield.export.verify.verify import Verdict, verify
+from crossfield.export.verify.verify import verify
 from crossfield.export.writing.curvature import probtype
 from crossfield.export.writing.terms import terms
 from crossfield.models.errors import UnsupportedByFormatError

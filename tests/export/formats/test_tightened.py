@@ -10,7 +10,8 @@ from crossfield.export.bundle.manifest import is_recordable, read_manifest, writ
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.export.verify.verify import Verdict, verify
+from crossfield.export.verify.checks import Verdict
+from crossfield.export.verify.verify import verify
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS

@@ -19,16 +19,8 @@ from crossfield.export.solutions.readers.text import Status
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, takes
 from crossfield.export.solving.local import Files, Solvers
-from crossfield.export.verify.verify import (
-    Verdict,
-    Verification,
-    _energy_difference,
-    _judged,
-    _subjects,
-    random_field,
-    same,
-    verify,
-)
+from crossfield.export.verify.checks import Verdict, Verification
+from crossfield.export.verify.verify import _energy_difference, _judged, _subjects, random_field, same, verify
 from crossfield.models.errors import CrossfieldError, InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.formulations.catalogue import FORMULATIONS

@@ -8,7 +8,8 @@ import pytest
 from crossfield.export.bundle.manifest import read_manifest, write_all
 from crossfield.export.cli.tables import tables
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.verify.verify import Verdict, verify
+from crossfield.export.verify.checks import Verdict
+from crossfield.export.verify.verify import verify
 from crossfield.models.formulations import declaration
 from crossfield.models.formulations.catalogue import jump_bounds, skew, strokes
 from crossfield.models.formulations.declaration import FORMULATIONS, E, formulation, row, term
