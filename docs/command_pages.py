@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from crossfield.export.cli.app import app as commands
-from crossfield.export.cli.help_texts import filled
+from crossfield.export.cli.help_texts import EXAMPLES, filled
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def _group(prefix: str, group: Any) -> Iterator[str]:
 def _command(title: str, command: Any) -> Iterator[str]:
     context = command.make_context(title, [], resilient_parsing=True)
     yield from (f"## {title}", "", _text(command.help or ""), "")
+    yield from ("```sh", EXAMPLES[title.partition(" ")[2]], "```", "")
     for head, kind in (("Argument", "argument"), ("Option", "option")):
         records = [each.get_help_record(context) for each in command.params if each.param_type_name == kind]
         if records:

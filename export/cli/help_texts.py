@@ -61,11 +61,56 @@ def filled(text: str) -> str:
     return re.sub(r"\{([a-z ]+)\}", lambda match: ", ".join(NAMES[match[1]]()), text)
 
 
+PANELS: Final = {
+    "Sketch": "size mask silhouette curvature view gauge stroke-weight skew-weight",
+    "Formulation": "formulation facet stroke-norm beta-norm relax norm tightened manifest",
+    "Method and solver": "method solver start program solve curves check search",
+    "Files": "format gams-layout nl-form gzip on underlay",
+    "Picture and surface": "kind title scale light flip hint",
+    "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
+    "Facts about a run": "entry version status bound seconds machine by date",
+    "Output": "output quiet json help",
+}
+"""Panels of the help in their order, and their options."""
+EXAMPLES: Final = {
+    "run": "crossfield run mouse -o out --time-limit 5",
+    "instance": "crossfield instance mouse --size 48 -o mouse.json",
+    "export": "crossfield export skew --size 4 -f milp-mccormick -F mps -F lp -o files",
+    "solve": "crossfield solve mouse --size 48 --method bend -o field",
+    "prove": "crossfield prove skew --size 5 -o proof",
+    "evaluate": "crossfield evaluate mouse --curves 2 --method bend --method polyvector",
+    "read": "crossfield read skew.sol --manifest files/skew.milp-mccormick.manifest.json -o skew.npz",
+    "draw": "crossfield draw field/mouse.bend.field.npz --kind overview -o field.png",
+    "shade": "crossfield shade field/mouse.bend.field.npz --underlay mouse -o surface",
+    "verify": "crossfield verify files --solve --time-limit 2",
+    "list": "crossfield list",
+    "samples": "crossfield samples",
+    "library build": "crossfield library build small.toml -o library",
+    "library solve": "crossfield library solve library --solver highs --time-limit 2",
+    "library verify": "crossfield library verify library",
+    "library release": "crossfield library release library -o library.tar.gz",
+    "library submit": "crossfield library submit library proof",
+    "library points": "crossfield library points library -o points",
+    "library site": "crossfield library site library -o site",
+}
+"""An example of every command; each uses files that earlier examples write."""
+_PANEL_OF: Final = {f"--{name}": panel for panel, names in PANELS.items() for name in names.split()}
+
+
+def _panel(option: Any) -> str:
+    """The panel of an option; one without a name in the table belongs to the output."""
+    return next((_PANEL_OF[name] for name in option.opts if name in _PANEL_OF), "Output")
+
+
 class Command(TyperCommand):
     """Command whose help is filled from the tables when it is shown; brackets are printed as they are."""
 
     def __init__(self, *args: Any, **given: Any) -> None:
         super().__init__(*args, **given)
+        for option in (each for each in self.params if each.param_type_name == "option"):
+            option.rich_help_panel = _panel(option)  # type: ignore[attr-defined]
+        order = ["", *PANELS]
+        self.params.sort(key=lambda each: order.index(getattr(each, "rich_help_panel", None) or ""))
         if self.rich_markup_mode != "rich":  # brackets are no markup then, and a backslash would be printed
             return
         self.help = escape(self.help or "")
@@ -73,11 +118,19 @@ class Command(TyperCommand):
             if text := getattr(parameter, "help", None):
                 parameter.help = escape(text)  # type: ignore[attr-defined]
 
+    def get_help_option(self, ctx: Any) -> Any:
+        """The option --help, in its panel."""
+        option = super().get_help_option(ctx)
+        if option is not None:
+            option.rich_help_panel = _panel(option)  # type: ignore[attr-defined]
+        return option
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""
-        self.help = re.sub(
-            r"(?<!\n)\n(?!\n)", " ", filled(self.help or "")
-        )  # a line break in a docstring begins no paragraph
+        # A line break in a docstring begins no paragraph.
+        text = re.sub(r"(?<!\n)\n(?!\n)", " ", filled(self.help or ""))
+        example = EXAMPLES.get(ctx.command_path.partition(" ")[2])
+        self.help = f"Example: {example}\n\n{text}" if example else text
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
                 parameter.help = filled(text)  # type: ignore[attr-defined]

@@ -1,13 +1,16 @@
 """Help of the commands: it lists the names of the tables and fits a terminal of 80 columns."""
 
 import re
+import shlex
+import shutil
 from dataclasses import fields
 from typing import Annotated, get_args
 
+import highspy
 import pytest
 import typer
 from crossfield.export.cli.app import app, invoke
-from crossfield.export.cli.help_texts import Command
+from crossfield.export.cli.help_texts import EXAMPLES, PANELS, Command
 from crossfield.export.cli.sketch_options import SketchOptions
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.ledger.ledger import RunStatus
@@ -47,6 +50,27 @@ OTHERS = (
     "library release",
     "library site",
 )
+
+
+SPECIFICATION = """
+format = "crossfield-library-spec"
+version = 1
+title = "A small library"
+formulations = ["milp-mccormick", "miqp-exact"]
+
+[rungs.tiny]
+sizes = [5]
+formats = ["mps", "nl"]
+
+[release]
+version = "1.0.0"
+date = "2026-01-31"
+authors = ["The crossfield authors"]
+
+[[sketches]]
+name = "skew"
+sample = "skew"
+"""
 
 
 @pytest.fixture
@@ -108,9 +132,8 @@ def test_choices_are_those_of_the_models_and_of_the_formats(text):
 def test_every_command_that_reads_a_sketch_has_the_same_options_for_it(text):
     names = [f"--{field.name.replace('_', '-')}" for field in fields(SketchOptions)]
     for command in ("run", "instance", "export", "solve", "prove", "evaluate", "shade"):
-        shown = re.findall(r"--[a-z-]+", text(command))
-        begin = shown.index(names[0])
-        assert [name for name in shown[begin:] if name in names] == names, command
+        panel = text(command).split("─ Sketch ─")[1].split("╰")[0]
+        assert re.findall(r"^│ +(--[a-z-]+)", panel, re.MULTILINE) == names, command
 
 
 def test_the_help_lists_the_commands_in_the_order_of_use():
@@ -130,3 +153,39 @@ def test_files_and_samples_have_the_same_default_size(tmp_path, capsys):
     assert cf.read_instance(made).sha256 == cf.read_sketch(drawing).sha256
     assert max(cf.sample("skew").mask.shape) == max(cf.read_sketch(drawing).mask.shape) == DEFAULT_SIZE
     assert f"{DEFAULT_SIZE} x " in capsys.readouterr().out
+
+
+def commands_of(group=None, prefix=""):
+    """All commands by name."""
+    for name, each in (group or typer.main.get_command(app)).commands.items():
+        if hasattr(each, "commands"):
+            yield from commands_of(each, f"{name} ")
+        else:
+            yield f"{prefix}{name}", each
+
+
+def test_every_help_begins_with_an_example_and_every_option_has_a_panel(text):
+    assert [name for name, _ in commands_of()] == list(EXAMPLES)
+    panels = {name for names in PANELS.values() for name in names.split()}
+    for name, each in commands_of():
+        assert words(text(name)).split("Example: ")[1].startswith(EXAMPLES[name]), name
+        options = {option.lstrip("-") for each in each.params for option in each.opts if option[:2] == "--"}
+        assert options <= panels, name
+
+
+@pytest.mark.slow
+def test_examples_run(tmp_path, monkeypatch):
+    """In order: each uses files of earlier ones. That of `run` is in the README, whose commands are run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(SPECIFICATION)
+    for name, example in EXAMPLES.items():
+        if name == "read":
+            solver = highspy.Highs()
+            solver.readModel("files/skew.milp-mccormick.mps")
+            solver.run()
+            solver.writeSolution("skew.sol", 0)
+        if name == "library submit":
+            shutil.rmtree("proof")
+            assert invoke(["prove", "library/cf_skew_n005.instance.json", "-o", "proof"]) == 0
+        if name != "run":
+            assert invoke(shlex.split(example)[1:]) == 0, example
