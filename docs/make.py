@@ -305,7 +305,7 @@ def architecture() -> None:
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
-    columns = ("folder", "what lives there", "uses, beside the top of `models/`")
+    columns = ("folder", "content", "uses, besides the top of `models/`")
     replace_between(DOCS / "architecture.md", "folders", markdown(columns, rooms.table(DOCS.parent)))
 
 

@@ -23,4 +23,4 @@ def listed(page, heading):
 def test_every_page_that_lists_the_methods_has_those_of_the_table():
     (methods,) = (meaning for word, meaning in glossary() if word == "method")
     assert set(methods.partition(": ")[2].split(", ")) == set(METHODS)
-    assert listed("docs/mathematics.md", "## 10. Ways to a field") == set(METHODS)
+    assert listed("docs/mathematics.md", "## 10. Methods") == set(METHODS)
