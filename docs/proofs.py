@@ -37,10 +37,10 @@ from crossfield.models.proof.work import MOST_LABELS
 from crossfield.models.sketch.samples import SAMPLES
 from drawings import PROVERS, Sketch, answered, optimum, sketches, tiny
 from make import generated, markdown
-from proof_text import PROOF
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "proofs.json"
+TEMPLATE: Final = DOCS / "proofs.template"
 SIZE: Final = 24
 FINE: Final = 48
 AGREE: Final = 1e-6
@@ -49,10 +49,8 @@ WITHIN: Final = 1e-5
 """Greatest error of a solver within its tolerances."""
 PICTURED: Final = "mouse"
 MIP_SAMPLES: Final = ("bottle", "cylinder_bend", "mouse", "saddle", "singular")
-TRIED: Final = 4  # random instances for settings
 SECONDS: Final = {
-    "samples": 120.0, "fine": 600.0, "sketches": 120.0, "optima": 60.0, "solvers": 60.0, "settings": 30.0,
-    "pictures": 120.0,
+    "samples": 120.0, "fine": 600.0, "sketches": 120.0, "optima": 60.0, "solvers": 60.0, "pictures": 120.0,
 }  # fmt: skip
 Facts = dict[str, Any]
 Kept = dict[str, dict[str, Facts]]
@@ -136,12 +134,6 @@ def solvers(request: Request) -> Iterator[tuple[str, Facts]]:
                 yield f"{name} {row['solver']}", row
 
 
-def settings(request: Request) -> Iterator[tuple[str, Facts]]:
-    """Results of other settings of MIP solvers, compared with the default."""
-    chosen = [instance for instance in tiny() if instance.name.startswith("random")][:TRIED]
-    return proof_solvers.settings(chosen, request.seconds)
-
-
 def pictures(request: Request) -> Iterator[tuple[str, Facts]]:
     """The pictures of the crosses left at every level."""
     proof = prove(Sketch(PICTURED, PICTURED).instance(SIZE), limits=Limits(request.seconds, gap=0))
@@ -157,7 +149,6 @@ PARTS: Final[dict[str, Callable[[Request], Iterator[tuple[str, Facts]]]]] = {
     "sketches": drawings,
     "optima": optima,
     "solvers": solvers,
-    "settings": settings,
     "pictures": pictures,
 }
 
@@ -189,7 +180,7 @@ def read() -> Kept:
 
 
 PROOF_COLUMNS: Final = (
-    "sketch", "pixels", "energy", "bound", "gap", "", "forced jumps", "levels", "labels at most", "s",
+    "sketch", "pixels", "energy", "bound", "gap", "", "forced jumps", "levels", "labels", "s",
     "certificate, MB", "check, s", "GB",
 )  # fmt: skip
 
@@ -198,7 +189,7 @@ ENDS: Final = {
     "time": "open: out of time",
     "labels": "open: too many labels",
     "interrupted": "open: interrupted",
-    "gap": "open: gap asked for",
+    "gap": "open: requested gap reached",
 }
 """Reasons for the end of a proof without an optimum."""
 
@@ -250,7 +241,17 @@ def optima_table(rows: dict[str, Facts]) -> str:
         ]
         for name, row in rows.items()
     ]
-    columns = ("instance", "grid", "energy", "bound", "", "s", "optimum of another solver", "by", "apart")
+    columns = (
+        "instance",
+        "grid",
+        "energy",
+        "bound",
+        "",
+        "s",
+        "optimum of another solver",
+        "by",
+        "difference",
+    )
     return markdown(columns, sorted(cells, key=lambda row: (row[0].startswith("random"), row[0])))
 
 
@@ -280,7 +281,7 @@ def solvers_table(rows: dict[str, Facts]) -> str:
         for row in sorted(rows.values(), key=lambda row: (row["formulation"], row["solver"], row["name"]))
     ]
     columns = (
-        "solver", "formulation", "sample", "grid", "jumps left", "cold: best", "bound", "s",
+        "solver", "formulation", "sample", "grid", "free jumps", "cold: best", "bound", "s",
         "tightened: best", "bound", "s", "`prove`: best", "bound", "s",
     )  # fmt: skip
     return markdown(columns, cells)
@@ -296,31 +297,14 @@ def solver_cells(row: Facts, what: str) -> list[str]:
     return [best, f"**{bound}**" if answer["proven"] else bound, f"{answer['seconds']:.1f}"]
 
 
-def settings_table(rows: dict[str, Facts]) -> str:
-    """Proofs and mean seconds of every setting."""
-    cells = [
-        [
-            titled(row["solver"]),
-            f"`{row['formulation']}`",
-            row["setting"],
-            f"{row['proven']} of {row['instances']}",
-            f"{row['mean']:.1f}",
-        ]
-        for row in rows.values()
-    ]
-    return markdown(("solver", "formulation", "settings", "proven", "s, mean"), cells)
-
-
 def in_short(kept: Kept) -> str:
     """Summary: the reach of proofs, agreement with other solvers, and the reach of those."""
     rows, small, mip = kept["samples"], kept["optima"], kept["solvers"]
     closed = [row for row in rows.values() if row["status"] == "optimal"]
     open_gaps = ", ".join(
-        f"{name}, with a gap of {percent(row['gap'])}"
-        for name, row in rows.items()
-        if row["status"] != "optimal"
+        f"{name}, gap {percent(row['gap'])}" for name, row in rows.items() if row["status"] != "optimal"
     )
-    rest = f"; open is {open_gaps}" if open_gaps else ""
+    rest = f" (not closed: {open_gaps})" if open_gaps else ""
     known = [row for row in small.values() if row["other"] is not None]
     same = sum(difference(row) <= AGREE and row["status"] == "optimal" for row in known)
     exact = [row for row in mip.values() if row["formulation"] == "miqp-exact"]
@@ -330,13 +314,12 @@ def in_short(kept: Kept) -> str:
     here = sum(row["here"]["proven"] for row in large)
     seconds = max(row["seconds"] for row in exact)
     return (
-        f"Of the fields of {len(rows)} samples at {SIZE} pixels {len(closed)} are proven to be of least "
-        f"energy, each within {max(row['seconds'] for row in closed):.0f} s{rest}. "
-        f"In {same} of the {len(known)} small instances whose optimum another solver proves, both optima "
-        f"are the same to {AGREE:g}. "
-        f"From the files as they are, HiGHS and SCIP close {cold} of {len(large)} at this size in "
-        f"{seconds:g} s, and {narrow} of {len(large)} with the windows that proofs leave; `crossfield prove` "
-        f"closes {here} of them, the MILP by its 1-norm."
+        f"At {SIZE} pixels and under the paper's coefficients, `crossfield prove` closes {len(closed)} of "
+        f"{len(rows)} samples, each within {max(row['seconds'] for row in closed):.0f} s on two "
+        f"threads{rest}. Another solver proves the optimum of {len(known)} small instances; in {same} of them "
+        f"both optima agree to {AGREE:g}. HiGHS and SCIP close {cold} of {len(large)} files of this size in "
+        f"{seconds:g} s, and {narrow} of {len(large)} in the windows that proofs leave. `crossfield prove` "
+        f"closes {here} of them, the MILPs in the 1-norm."
     )
 
 
@@ -345,99 +328,26 @@ def where(rows: dict[str, Facts]) -> str:
     machines = [row["machine"] for row in rows.values()]
     first, loads = machines[0], [each["load"] for each in machines]
     return (
-        f"{first['processor']}, {first['cores']} cores, Python {first['python']}, 2 threads; load average "
-        f"while measuring {min(loads):.1f} to {max(loads):.1f}: where it is above the number of cores, other "
-        "programs had a part of them, and the seconds are too many."
+        f"{first['processor']}, {first['cores']} cores, Python {first['python']}, 2 threads. The load "
+        f"average was {min(loads):.1f} to {max(loads):.1f}; above the number of cores, seconds are too long."
     )
 
 
 def page(kept: Kept) -> str:
     """The text of docs/proofs.md."""
-    parts = [
-        "# Proven optima",
-        generated("python docs/proofs.py"),
-        in_short(kept),
-        OPENING,
-        PROOF,
-        PICTURES,
-    ]
-    parts += ["## Samples at 24", SAMPLES_TEXT, where(kept["samples"]), proof_table(kept["samples"])]
-    parts += ["## Beside other solvers", OPTIMA_TEXT, optima_table(kept["optima"])]
-    if "sketches" in kept:
-        parts += ["## Drawings", DRAWINGS_TEXT, where(kept["sketches"]), proof_table(kept["sketches"])]
-    if "fine" in kept:
-        limit = max(row["limit"] for row in kept["fine"].values())
-        parts += ["## Samples at 48", f"At most {limit:g} s each. {where(kept['fine'])}"]
-        parts += [proof_table(kept["fine"])]
-    mip = kept["solvers"]
-    parts += ["## What MIP solvers prove", SOLVERS_TEXT, where(mip), solvers_table(mip)]
-    if "settings" in kept:
-        parts += ["### Settings", SETTINGS_TEXT, settings_table(kept["settings"])]
-    return "\n\n".join(part.strip() for part in parts) + "\n"
-
-
-OPENING: Final = """
-`crossfield prove` finds a field, a lower bound of the 2-norm energy of all fields, and leaves a
-[certificate](files.md#certificates), which a checker of one file confirms without any code of the prover.
-All rows below come from it, under the coefficients of the paper (1 and 1e-6 on every
-grid). Rows are kept in `proofs.json` beside this page; `python docs/proofs.py --measure samples` measures
-those of a part again, `python docs/proofs.py --help` lists the parts.
-[How far MIP solvers get without it](evidence.md#how-far-solvers-get).
-"""
-
-PICTURES: Final = """
-## How the crosses that are left become fewer
-
-`mouse`, size 24. At every pixel the part of all crosses among which that of a better field may still be, on
-one logarithmic scale for all levels. Dots are pixels with strokes. The gaps of the levels have a logarithmic
-scale as well.
-
-![The part of the strip that is left at every pixel, level by level](pictures/proof_levels.png)
-
-The strips of two pixels: the cells that are left (filled), and the cross of the best field (where the red
-lines meet). The left and the right side of a strip are the same crosses, upside down. A level halves the
-distance of labels and drops the cells that cannot be part of a better field.
-
-![The cells that are left of two pixels, level by level](pictures/proof_strips.png)
-"""
-
-SAMPLES_TEXT: Final = f"""
-`crossfield prove NAME --size 24 -o DIR`, the search for the field included. *Labels at most*: of the largest
-level, over all pixels. *Forced jumps*: pairs at which every better field would have the jumps of this one.
-*Check*: `python check_certificate.py FILE`, its start included. GB: memory of all processes together.
-*Too many labels*: the next level would have more than {MOST_LABELS:,}, or branches as many as memory allows.
-"""
-
-OPTIMA_TEXT: Final = """
-The smallest instances of the samples, and random directions on half of 5 x 5 pixels (seeds 0 to 7). The other
-solver proves the optimum of `miqp-exact` from its written file: the free edition of Gurobi, else that of
-CPLEX, else Bonmin, 60 s each. *Apart* is relative to 1, or to the optimum if that is more.
-"""
-
-DRAWINGS_TEXT: Final = """
-Line drawings by others, size 24: `NAME.png` with its mask
-where `NAME_mask.png` lies beside it. `--sketches FOLDER` names the folder in which they are.
-"""
-
-SOLVERS_TEXT: Final = f"""
-{SECONDS["solvers"]:g} s each, one after the other, without a starting point. *Cold* is the file of
-`crossfield export`, *tightened* that of `crossfield export --tightened CERTIFICATE`: the same problem with
-the windows of alpha and beta and the ranges of the jumps that the certificate leaves to fields of its energy
-or less. *Jumps left* have more than one value in them. A bold bound is a proof. Gurobi and CPLEX are free
-editions (200 columns where a term is quadratic; 1000 columns and rows), so that they get the largest size
-below 24 that these take.
-
-`miqp-exact` is the problem of this page; its optimum lies in the windows, so that a bound of the tightened
-file is one of all fields. `milp-mccormick` minimises the 1-norm: its optimum need not lie in windows that
-hold all fields of low 2-norm energy, and the tightened file asks for the best 1-norm in them. Where all jumps
-are forced, what is left of the MILP is an LP, and that of the MIQP a convex QP. *prove* is `crossfield prove`
-for as long, in the norm that the formulation minimises (`--norm 1` for the MILP).
-"""
-
-SETTINGS_TEXT: Final = f"""
-{SECONDS["settings"]:g} s each, on small instances with random directions: where other settings than the
-default help. Means are geometric, shifted by 1 s, runs that met the limit counted as they stand.
-"""
+    parts = {part: kept[part] for part in ("samples", "sketches", "fine", "solvers")}
+    texts = {
+        "generated": generated("python docs/proofs.py"),
+        "short": in_short(kept),
+        "most": f"{MOST_LABELS:,}",
+        "optima": optima_table(kept["optima"]),
+        "solvers": solvers_table(kept["solvers"]),
+        "fine_limit": f"{max(row['limit'] for row in kept['fine'].values()):g}",
+        "solvers_limit": f"{SECONDS['solvers']:g}",
+    }
+    texts |= {part: proof_table(kept[part]) for part in ("samples", "sketches", "fine")}
+    texts |= {f"{part}_machine": where(rows) for part, rows in parts.items()}
+    return re.sub(r"@(\w+)@", lambda match: texts[match[1]], TEMPLATE.read_text(encoding="utf-8"))
 
 
 def main() -> None:
@@ -447,7 +357,7 @@ def main() -> None:
     parser.add_argument("--names", nargs="*", default=[], help="Only these of a part.")
     parser.add_argument("--seconds", type=float, help="Time limit of each proof or solve.")
     parser.add_argument("--sketches", type=Path, help="Folder with drawings: .svg, .png, .scap.")
-    parser.add_argument("--work", type=Path, help="Folder for what is done; to go on there later.")
+    parser.add_argument("--work", type=Path, help="Folder that keeps finished results.")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         for part in given.measure:
