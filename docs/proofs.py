@@ -315,9 +315,9 @@ def in_short(kept: Kept) -> str:
     seconds = max(row["seconds"] for row in exact)
     return (
         f"At {SIZE} pixels and under the paper's coefficients, `crossfield prove` closes {len(closed)} of "
-        f"{len(rows)} samples, each within {max(row['seconds'] for row in closed):.0f} s on two "
-        f"threads{rest}. Another solver proves the optimum of {len(known)} small instances; in {same} of them "
-        f"both optima agree to {AGREE:g}. HiGHS and SCIP close {cold} of {len(large)} files of this size in "
+        f"{len(rows)} samples, each within {max(row['seconds'] for row in closed):.0f} s on two threads"
+        f"{rest}. Another solver proves the optimum of {len(known)} small instances; in {same} of them both "
+        f"optima agree to {AGREE:g}. HiGHS and SCIP close {cold} of {len(large)} files of this size in "
         f"{seconds:g} s, and {narrow} of {len(large)} in the windows that proofs leave. `crossfield prove` "
         f"closes {here} of them, the MILPs in the 1-norm."
     )

@@ -1,8 +1,7 @@
-"""The folders of the package, their imports, and their picture, for docs/architecture.md:
-`python docs/make.py architecture`.
+"""Table and picture of the folders of the package (`python docs/make.py architecture`).
 
-A folder is described by the first line of the docstring in its `__init__.py`; its arrows are its imports.
-Only the order of the folders and their places in the picture are set here.
+Descriptions are the first lines of docstrings, and arrows are imports. Only the order of the folders and
+their places in the picture are set here.
 """
 
 from __future__ import annotations
@@ -46,11 +45,9 @@ def first_line(root: Path, folder: str) -> str:
 
 def uses(root: Path, folder: str) -> list[str]:
     """The other folders from which the modules of a folder import, except the ground."""
-    found = set()
-    for path in (root / folder).glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level:
-                found.update(targets(root, folder, node))
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (root / folder).glob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    found = {other for node in nodes if node.level for other in targets(root, folder, node)}
     return sorted(found - {folder, GROUND})
 
 
@@ -71,17 +68,18 @@ def table(root: Path) -> list[list[str]]:
         [
             f"`{folder}/`",
             first_line(root, folder),
-            ", ".join(f"`{other}`" for other in uses(root, folder)) or "-",
+            ", ".join(f"`{each}`" for each in uses(root, folder)) or "-",
         ]
         for folder in ORDER
     ]
 
 
-# The picture: five columns; the data goes right in the first row and back in the third, surfaces below it.
+# The picture has five columns. Data goes right in the first row and left in the third; surfaces are below.
 
 WIDE, HIGH, GAP, LEFT = 168, 84, 78, 30
 WHOLE: Final = 5 * WIDE + 4 * GAP
 WIDTH: Final = WHOLE + 2 * LEFT
+HEIGHT: Final = 940
 PLACES: Final = {
     "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
     "export/writing": (3, 320), "export/formats": (4, 320),
@@ -119,7 +117,6 @@ STYLE: Final = """text { font-family: Inter, 'Segoe UI', Helvetica, Arial, sans-
 .data { font-size: 11.5px; font-style: italic; fill: #555; }
 .flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }"""
 
-
 TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7"
 orient="auto-start-reverse">
 <path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>"""
@@ -127,21 +124,17 @@ orient="auto-start-reverse">
 
 def picture(root: Path) -> str:
     """The folders and the data between them, as SVG."""
-    height = 940
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
     parts = [
-        (
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
-            f'height="{height}" role="img">'
-        ),
+        f'{head}height="{HEIGHT}" role="img">',
         "<title>The folders of crossfield and the way of data through them</title>",
         f"<style>{STYLE}</style>",
         TIP,
-        f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
         *bars(root),
         *(box(root, folder) for folder in PLACES),
         *(arrow(*step) for step in FLOW),
-        outside("a sketch: SVG, bitmap, .scap, .curves", 270, down=True),
-        outside("pictures, report", 662, down=False),
+        *ends(),
         "</svg>",
     ]
     return "\n".join(parts) + "\n"
@@ -151,13 +144,11 @@ def bars(root: Path) -> list[str]:
     """The folders that use the whole flow, above it, and the ground below it."""
     library = [folder for folder in ORDER if folder.startswith("export/library/")]
     step = (WHOLE - 24 + 8) / len(library)
+    places = [(folder.rpartition("/")[2], LEFT + 12 + at * step) for at, folder in enumerate(library)]
     return [
         bar(root, "export/cli", 20, 50),
         bar(root, "export/library", 82, 84),
-        *(
-            chip(folder.rpartition("/")[2], LEFT + 12 + at * step, 130, step - 8)
-            for at, folder in enumerate(library)
-        ),
+        *(chip(name, x, 130, step - 8) for name, x in places),
         bar(root, "export/verify", 178, 50),
         chip("programs", LEFT + WHOLE - 132, 191, 120),
         bar(root, GROUND, 875, 50),
@@ -190,7 +181,7 @@ def panel(folder: str, x: float, y: float, width: float, height: float) -> str:
 
 
 def corner(folder: str) -> tuple[int, int]:
-    """Top left corner of a room."""
+    """Top left corner of a folder."""
     column, y = PLACES[folder]
     return LEFT + column * (WIDE + GAP), y
 
@@ -198,43 +189,33 @@ def corner(folder: str) -> tuple[int, int]:
 def box(root: Path, folder: str) -> str:
     """A folder with its name and description."""
     x, y = corner(folder)
-    lines = "".join(
+    lines = [
         f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
-    )
-    return panel(folder, x, y, WIDE, HIGH) + (
-        f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
-        f'<text class="what" x="{x + 12}" y="{y + 27}">{lines}</text>'
-    )
+    ]
+    name = f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
+    what = f'<text class="what" x="{x + 12}" y="{y + 27}">{"".join(lines)}</text>'
+    return panel(folder, x, y, WIDE, HIGH) + name + what
 
 
 def arrow(begin: str, end: str, above: str, below: str) -> str:
-    """An arrow between two rooms, with the names of the data."""
+    """An arrow between two folders, with the names of the data."""
     (x, y), (to_x, to_y) = corner(begin), corner(end)
+    middle, level = to_x + WIDE / 2, y + HIGH / 2
     if y == to_y:
-        side = 1 if to_x > x else -1
-        start, stop = (x + WIDE, to_x - 3) if side > 0 else (x, to_x + WIDE + 3)
-        middle, level = (start + stop) / 2, y + HIGH / 2
-        words = written(above, middle, level - 8) + (written(below, middle, level + 18) if below else "")
-        return f'<path class="flow" d="M{start} {level}H{stop}"/>{words}'
-    if to_x == x:
-        middle, downwards = x + WIDE / 2, to_y > y
-        start, stop = (y + HIGH, to_y - 3) if downwards else (y, to_y + HIGH + 3)
-        return (
-            f'<path class="flow" d="M{middle} '
-            f'{start}V{stop}"/>{written(above, middle + 8, (start + stop) / 2 + 4, "start")}'
-        )
-    return slanted(x, y, to_x, to_y, above)
-
-
-def slanted(x: float, y: float, to_x: float, to_y: float, above: str) -> str:
-    """An arrow to a room in another row and another column."""
-    if to_y < y:  # up between two rows
+        start, stop = (x + WIDE, to_x - 3) if to_x > x else (x, to_x + WIDE + 3)
+        path, at = f"M{start} {level}H{stop}", (start + stop) / 2
+        words = written(above, at, level - 8) + (written(below, at, level + 18) if below else "")
+    elif x == to_x:
+        path = f"M{middle} {y + HIGH}V{to_y - 3}"
+        words = written(above, middle + 8, (y + HIGH + to_y - 3) / 2 + 4, "start")
+    elif to_y < y:  # up between two rows
         leave, enter, lane = x + WIDE - 30, to_x + 30, y - 26
+        path = f"M{leave} {y}V{lane}H{enter}V{to_y + HIGH + 3}"
         words = written(above, (leave + enter) / 2, lane - 6)
-        return f'<path class="flow" d="M{leave} {y}V{lane}H{enter}V{to_y + HIGH + 3}"/>{words}'
-    level, middle = y + HIGH / 2, to_x + WIDE / 2
-    words = written(above, (x + WIDE + middle) / 2, level - 8)
-    return f'<path class="flow" d="M{x + WIDE} {level}H{middle}V{to_y - 3}"/>{words}'
+    else:
+        path = f"M{x + WIDE} {level}H{middle}V{to_y - 3}"
+        words = written(above, (x + WIDE + middle) / 2, level - 8)
+    return f'<path class="flow" d="{path}"/>{words}'
 
 
 def written(text: str, x: float, y: float, anchor: str = "middle") -> str:
@@ -242,10 +223,12 @@ def written(text: str, x: float, y: float, anchor: str = "middle") -> str:
     return f'<text class="data" text-anchor="{anchor}" x="{x}" y="{y}">{escape(text)}</text>'
 
 
-def outside(text: str, y: int, *, down: bool) -> str:
-    """The data that enter at the first folder, or leave at the last one."""
-    if down:
-        middle = LEFT + WIDE / 2
-        return f'{written(text, LEFT, y, "start")}<path class="flow" d="M{middle} {y + 10}V317"/>'
-    x, _ = corner("export/pictures")
-    return f'<path class="flow" d="M{x} {y}H{x - 50}"/>{written(text, x - 58, y + 4, "end")}'
+def ends() -> list[str]:
+    """The data that enter at the first folder, and those that leave at the last one."""
+    middle, (x, _) = LEFT + WIDE / 2, corner("export/pictures")
+    sketch = written("a sketch: SVG, bitmap, .scap, .curves", LEFT, 270, "start")
+    answer = written("pictures, report", x - 58, 666, "end")
+    return [
+        f'{sketch}<path class="flow" d="M{middle} 280V317"/>',
+        f'<path class="flow" d="M{x} 662H{x - 50}"/>{answer}',
+    ]

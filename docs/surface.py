@@ -1,4 +1,4 @@
-"""Make docs/surface.md, the errors of surfaces against known ones, from docs/surface.json.
+"""Replace the tables of docs/surface.md, the errors of surfaces against known ones, from docs/surface.json.
 
     python docs/surface.py [--measure PART ...] [--sketches FOLDER] [--jobs N]
 
@@ -27,8 +27,7 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.trust import OFF, off_right_angles
 from drawings import SUFFIXES
-from make import generated, markdown
-from surface_text import PAGE
+from make import markdown, replace_between
 
 DOCS: Final = Path(__file__).resolve().parent
 KEPT: Final = DOCS / "surface.json"
@@ -232,23 +231,41 @@ def by_time(rows: Rows) -> str:
     return markdown(("drawing", "pixels", "seconds"), table)
 
 
+def in_short(rows: Rows, drawings: Rows) -> str:
+    """Summary of the errors of known surfaces and of the doubts about drawings."""
+    bend = [row for row in rows if row["way"] == "bend"]
+    errors = [row["mean"] for row in bend if row["size"] == max(SIZES)]
+    sides = [row["side"] for row in rows if row["way"] != "power"]
+    ranks = [row["alike"] for row in bend]
+    others = [bool(row["doubts"]) for row in drawings if row["drawing"] not in SAMPLES]
+    return f"""\
+- Surfaces are good on smooth nets of curvature lines. On {len(errors)} known surfaces at {max(SIZES)} pixels,
+  the normals from bend fields have mean errors of {min(errors):.1f} to {max(errors):.1f} degrees.
+- Over drawings by others they can rarely be trusted. crossfield [doubts](#confidence-and-doubts)
+  {sum(others)} of the {len(others)} below, and doubted 18 of 18 others that are not in the table.
+- Catenoids and saddle sheets come out on the wrong side about half of the time. On the surfaces below, the
+  default side is right in {sum(sides):.0f} of {len(sides)} cases, from exact crosses and three methods.
+- `confidence` hardly shows errors: its rank correlation with the true error over the pixels of a surface
+  is {min(ranks):.1f} to {max(ranks):.1f}."""
+
+
 def write_page(rows: dict[str, Rows]) -> None:
-    """Write the page."""
-    ranks = [row["alike"] for row in rows["known"] if row["way"] == "bend"]
-    sides = [row["side"] for row in rows["known"] if row["way"] != "power"]
-    page = PAGE.format(
-        said=generated("python docs/surface.py"), known=by_surface(rows["known"]),
-        hints=with_hints(rows["known"]),
-        noise=by_noise(rows["noise"], rows["known"]), seeds=SEEDS, trust=by_drawing(rows["trust"]),
-        times=by_time(rows["times"]), least=f"{min(ranks):.1f}", most=f"{max(ranks):.1f}",
-        sides=f"{sum(sides):.0f} of {len(sides)}",
-    )  # fmt: skip
-    (DOCS / "surface.md").write_text(page)
+    """Replace the summary and the tables of the page."""
+    parts = {
+        "summary": in_short(rows["known"], rows["trust"]),
+        "known": by_surface(rows["known"]),
+        "hints": with_hints(rows["known"]),
+        "noise": by_noise(rows["noise"], rows["known"]),
+        "trust": by_drawing(rows["trust"]),
+        "times": by_time(rows["times"]),
+    }
+    for name, text in parts.items():
+        replace_between(DOCS / "surface.md", name, text)
 
 
 def main() -> None:
     """Measure the requested parts, and write the page."""
-    parser = argparse.ArgumentParser(description="Measure surfaces, and write docs/surface.md.")
+    parser = argparse.ArgumentParser(description="Measure surfaces, and replace the tables of their page.")
     parser.add_argument(
         "--measure", nargs="+", choices=MEASURES, default=[], help="parts to be measured anew"
     )

@@ -9,11 +9,14 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
+
+from crossfield.export.programs.protocol import RefusedError
 
 Answer = float | str
 REFUSED: Final = "refused"
@@ -40,29 +43,20 @@ def lp(
     return Trap(rule, what, "model.lp", text, meant, good)
 
 
+COST: Final = " x obj 1\n x c 1\n"
+
+
 def mps(rule: str, what: str, meant: Answer, *, good: bool = False, **sections: str) -> Trap:
     """An MPS with the row c, one column x of cost 1 unless another section is given."""
-    parts = {
-        "HEAD": "",
-        "ROWS": " G c\n",
-        "COLUMNS": COST,
-        "RHS": " RHS1 c 1\n",
-        "BOUNDS": "",
-        "TAIL": "",
-    } | sections
-    bounds = f"BOUNDS\n{parts['BOUNDS']}" if parts["BOUNDS"] else ""
-    text = (
-        f"NAME model FREE\n{parts['HEAD']}ROWS\n N obj\n{parts['ROWS']}COLUMNS\n{parts['COLUMNS']}"
-        f"RHS\n{parts['RHS']}{bounds}{parts['TAIL']}ENDATA\n"
-    )
-    return Trap(rule, what, "model.mps", text, meant, good)
+    parts = {"HEAD": "", "ROWS": " G c\n", "COLUMNS": COST, "RHS": " RHS1 c 1\n", "BOUNDS": "", "TAIL": ""}
+    text = "NAME model FREE\n{HEAD}ROWS\n N obj\n{ROWS}COLUMNS\n{COLUMNS}RHS\n{RHS}{BOUNDS}{TAIL}ENDATA\n"
+    return Trap(rule, what, "model.mps", text.format(**parts | sections), meant, good)
 
 
-COST: Final = " x obj 1\n x c 1\n"
 WHOLE: Final = " M1 'MARKER' 'INTORG'\n x obj -1\n x c 1\n M2 'MARKER' 'INTEND'\n"
 UP_TO_5: Final = {"ROWS": " L c\n", "RHS": " RHS1 c 5\n"}
 FIXED: Final = {
-    "COLUMNS": " x c 1\n y c 1\n", "RHS": " RHS1 c 0\n", "BOUNDS": " FX BND1 x 1\n FX BND1 y 1\n",
+    "COLUMNS": " x c 1\n y c 1\n", "RHS": " RHS1 c 0\n", "BOUNDS": "BOUNDS\n FX BND1 x 1\n FX BND1 y 1\n",
 }  # fmt: skip
 """x = y = 1, so that the objective is the sum of what was read of Q."""
 ONE_TRIANGLE: Final = " x x 2\n x y 1\n y y 2\n"
@@ -90,8 +84,8 @@ TRAPS: Final = (
     lp("L34", "`[ x ^ 2 ] / 2` at x = 2", "[ x ^ 2 ] / 2", "x >= 2", 2.0),
     mps("M1", "an integer without bounds, greatest x", -1.0, COLUMNS=WHOLE, **UP_TO_5),
     mps("M2", "an integer with `LO 0` alone, up to 5", -5.0, COLUMNS=WHOLE,
-        BOUNDS=" LO BND1 x 0\n", **UP_TO_5),
-    mps("M3", "`UP -3` alone, x from -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS=" UP BND1 x -3\n"),
+        BOUNDS="BOUNDS\n LO BND1 x 0\n", **UP_TO_5),
+    mps("M3", "`UP -3` alone, x from -9", -9.0, RHS=" RHS1 c -9\n", BOUNDS="BOUNDS\n UP BND1 x -3\n"),
     mps("M4", "right side 7 of the objective, at x = 1", -6.0, RHS=" RHS1 c 1\n RHS1 obj 7\n"),
     mps("M5", "`OBJSENSE MAX`, x up to 5", 5.0, HEAD="OBJSENSE MAX\n", **UP_TO_5),
     mps("M5", "`OBJSENSE MAXIMIZE`, x up to 5", 5.0, HEAD="OBJSENSE MAXIMIZE\n", **UP_TO_5),
@@ -104,19 +98,25 @@ TRAPS: Final = (
     mps("M14", "QMATRIX, one triangle", REFUSED, TAIL=f"QMATRIX\n{ONE_TRIANGLE}", **FIXED),
     mps("M15", "QSECTION", 3.0, TAIL=f"QSECTION obj\n{ONE_TRIANGLE}", **FIXED),
     mps("M25", "`BV`, then `UP 5`, greatest x", REFUSED, COLUMNS=" x obj -1\n x c 1\n",
-        BOUNDS=" BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
+        BOUNDS="BOUNDS\n BV BND1 x\n UP BND1 x 5\n", **UP_TO_5),
 )  # fmt: skip
 """`meant` is a human reader's interpretation of the file; `refused` for files without a clear meaning."""
 
 
+@contextmanager
+def reading(*errors: type[Exception]) -> Iterator[None]:
+    """Raise RefusedError in place of these errors of a program that reads a file."""
+    try:
+        yield
+    except errors as error:
+        raise RefusedError(str(error)) from error
+
+
 def highs(path: Path) -> Answer:
     """HiGHS's optimum."""
-    import highspy
+    from crossfield.export.programs.highs import loaded
 
-    model: Any = highspy.Highs()
-    model.setOptionValue("output_flag", "false")
-    if model.readModel(str(path)) == highspy.HighsStatus.kError:
-        return REFUSED
+    model = loaded(path)
     model.run()
     status = model.modelStatusToString(model.getModelStatus())
     return float(model.getInfo().objective_function_value) if status == "Optimal" else status.lower()
@@ -126,13 +126,9 @@ def gurobi(path: Path) -> Answer:
     """Gurobi's optimum."""
     import gurobipy
 
-    with gurobipy.Env(empty=True) as environment:
-        environment.setParam("OutputFlag", 0)
-        environment.start()
-        try:
+    with gurobipy.Env(params={"OutputFlag": 0}) as environment:
+        with reading(gurobipy.GurobiError):
             model = gurobipy.read(str(path), environment)
-        except gurobipy.GurobiError:
-            return REFUSED
         model.optimize()
         return float(model.ObjVal) if model.Status == gurobipy.GRB.OPTIMAL else "infeasible"
 
@@ -142,17 +138,10 @@ def cplex(path: Path) -> Answer:
     import cplex
 
     model = cplex.Cplex()
-    for silence in (
-        model.set_log_stream,
-        model.set_error_stream,
-        model.set_warning_stream,
-        model.set_results_stream,
-    ):
-        silence(None)
-    try:
+    for stream in ("log", "error", "warning", "results"):
+        getattr(model, f"set_{stream}_stream")(None)
+    with reading(cplex.exceptions.CplexError):
         model.read(str(path))
-    except cplex.exceptions.CplexError:
-        return REFUSED
     model.solve()
     found = model.solution
     return float(found.get_objective_value()) if "optimal" in found.get_status_string() else "infeasible"
@@ -164,10 +153,8 @@ def xpress(path: Path) -> Answer:
 
     model = xpress.problem()
     model.controls.outputlog = 0
-    try:
+    with reading(xpress.SolverError):
         model.readProb(str(path))
-    except xpress.SolverError:
-        return REFUSED
     model.optimize()
     found = model.attributes
     return float(found.objval) if found.solstatus == xpress.SolStatus.OPTIMAL else "infeasible"
@@ -179,37 +166,35 @@ def scip(path: Path) -> Answer:
 
     model = Model()
     model.hideOutput()
-    try:
+    with reading(OSError):
         model.readProblem(str(path))
-    except OSError:
-        return REFUSED
     model.optimize()
     return float(model.getObjVal()) if model.getStatus() == "optimal" else str(model.getStatus())
 
 
 def glpk(path: Path) -> Answer:
     """GLPK's optimum."""
-    report = path.with_suffix(".txt")
     kind = "--lp" if path.suffix == ".lp" else "--freemps"
-    executed("glpsol", kind, str(path), "-o", str(report))
-    text = report.read_text() if report.exists() else ""
+    text = report("glpsol", kind, str(path), "-o")
     found = re.search(r"Objective:.*= *(\S+)", text)
-    return REFUSED if found is None else float(found[1]) if "OPTIMAL" in text else "infeasible"
+    if found is None:
+        raise RefusedError("GLPK reports no objective")
+    return float(found[1]) if "OPTIMAL" in text else "infeasible"
 
 
 def cbc(path: Path) -> Answer:
     """CBC's optimum."""
-    report = path.with_suffix(".txt")
-    executed("cbc", str(path), "solve", "solution", str(report))
-    text = report.read_text() if report.exists() else ""
+    text = report("cbc", str(path), "solve", "solution")
     found = re.match(r"Optimal - objective value (\S+)", text)
-    return REFUSED if not text else float(found[1]) if found else "infeasible"
+    return float(found[1]) if found else "infeasible"
 
 
-def executed(*words: str) -> None:
-    """Run a program without its output."""
-    command = [shutil.which(words[0]) or words[0], *words[1:]]
-    subprocess.run(command, capture_output=True, check=False, timeout=SECONDS)
+def report(*words: str) -> str:
+    """Text of the report of a program, whose path is its last argument. Raises RefusedError without one."""
+    with tempfile.TemporaryDirectory() as folder, reading(FileNotFoundError):
+        path = Path(folder) / "report.txt"
+        subprocess.run([*words, str(path)], capture_output=True, check=False, timeout=SECONDS)
+        return path.read_text()
 
 
 PROGRAMS: Final[dict[str, tuple[str, Callable[[Path], Answer]]]] = {
@@ -229,19 +214,26 @@ def answer(title: str, trap: Trap) -> Answer:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / trap.name
         path.write_text(trap.text)
-        return PROGRAMS[title][1](path)
+        try:
+            return PROGRAMS[title][1](path)
+        except RefusedError:
+            return REFUSED
 
 
 def shown(value: Answer, trap: Trap) -> str:
     """A cell: bold where the program neither refuses nor finds the intended optimum."""
-    text = f"{value:g}" if isinstance(value, float) else value
-    wrong = value not in {REFUSED, trap.meant}
-    return f"**{text}**" if wrong else text
+    text = cell(value)
+    return text if value in {REFUSED, trap.meant} else f"**{text}**"
 
 
 def meaning(trap: Trap) -> str:
     """The intended optimum, as a cell."""
-    return f"{trap.meant:g}" if isinstance(trap.meant, float) else trap.meant.replace(REFUSED, "unclear")
+    return cell(trap.meant).replace(REFUSED, "unclear")
+
+
+def cell(value: Answer) -> str:
+    """An answer as text."""
+    return f"{value:g}" if isinstance(value, float) else value
 
 
 def table() -> tuple[tuple[str, ...], list[list[str]]]:

@@ -1,7 +1,6 @@
 """Make docs/validation.md, one instance through every route: `python docs/validate.py` (four minutes).
 
-Every row is a written file, a program that read it, and its answer, checked by `crossfield verify
---solve`.
+Every row is a written file and the answer of a program, checked by `crossfield verify --solve`.
 """
 
 from __future__ import annotations
@@ -59,64 +58,59 @@ class Run:
     facet: str
     result: Verification
 
-    def of(self, formulation: str) -> list[Check]:
+    def solves(self, formulation: str) -> list[Check]:
         """Its solves of a formulation."""
         found = (f for f in self.result.checks if f.problem.endswith(f" {formulation}") and f.step == "solve")
         return sorted(found, key=lambda f: (f.program, f.file))
 
-    def optimum(self, formulation: str) -> float:
-        """The best proven value."""
-        return min(f.objective for f in self.of(formulation) if f.proven and f.objective is not None)
+    def proven(self, formulation: str) -> list[tuple[float, float]]:
+        """Objective and energy of each proven optimum, in ascending order."""
+        found = self.solves(formulation)
+        return sorted((f.objective, f.energy or 0.0) for f in found if f.proven and f.objective is not None)
+
+    def apart(self, formulation: str) -> float:
+        """Largest difference between its proven optima."""
+        values = [value for value, _ in self.proven(formulation)]
+        return values[-1] - values[0]
 
 
-def run(gauge: Gauge, facet: str, formulations: tuple[str, ...], seconds: float) -> Run:
+def run(gauge: Gauge, facet: str, formulations: tuple[str, ...]) -> Run:
     """The verification of the instance's files, solves included."""
     instance = instance_of(gauge)
     best = cf.solve(cf.formulate(instance, "milp-mccormick"), start=cf.greedy_field(instance)).field
     with tempfile.TemporaryDirectory() as folder:
         write_all(instance, folder, formulations=formulations, start=best, options={"facet": facet})
-        found = verify(folder, seconds=seconds, progress=lambda words: print(words, file=sys.stderr))
+        found = verify(folder, seconds=SECONDS, progress=lambda words: print(words, file=sys.stderr))
     return Run(gauge, facet, found)
 
 
 def route(check: Check) -> list[str]:
     """A row about a solve."""
-    title = SOLVERS[check.program].title
-    value = "" if check.objective is None else f"{check.objective:.9f}"
-    bound = "" if check.bound is None else f"{check.bound:.9f}"
-    words = {
-        Verdict.AGREES: "optimal",
-        Verdict.LIMIT: f"gave up after {SECONDS:g} s",
-        Verdict.REFUSED: f"refused: {check.reason}",
-        Verdict.NOT_TRIED: f"not tried: {check.reason}",
-    }.get(check.verdict, f"{check.verdict}: {check.reason}")
-    seconds = "" if check.seconds is None else f"{check.seconds:.1f}"
-    return [title, check.file.rpartition(".")[2], value, bound, seconds, words]
+    numbers = ((check.objective, ".9f"), (check.bound, ".9f"), (check.seconds, ".1f"))
+    words = {Verdict.AGREES: "optimal", Verdict.LIMIT: f"stopped after {SECONDS:g} s"}
+    return [
+        SOLVERS[check.program].title,
+        check.file.rpartition(".")[2],
+        *("" if value is None else format(value, digits) for value, digits in numbers),
+        words.get(check.verdict, f"{check.verdict}: {check.reason}"),
+    ]
 
 
 def routes(main: Run) -> list[str]:
-    """A table for each formulation."""
+    """A table for each formulation, of the solvers that take it."""
     parts = []
-    for name in FORMULATIONS:
-        found = main.of(name)
-        proven = [f.objective for f in found if f.proven and f.objective is not None]
-        agree = (
-            (
-                f"{len(proven)} routes prove an optimum; "
-                f"the furthest two are {max(proven) - min(proven):.1e} apart."
+    for problem in smallest_problems():
+        found = [f for f in main.solves(problem.name) if takes(problem, f.program).answer == "yes"]
+        proven = "No route proves the optimum in time."
+        if proofs := len(main.proven(problem.name)):
+            proven = (
+                f"{proofs} routes prove the optimum. Their values differ by {main.apart(problem.name):.1e}."
             )
-            if proven
-            else "No route proves an optimum in the time."
-        )
-        tried = [f for f in found if f.verdict not in {Verdict.REFUSED, Verdict.NOT_TRIED}]
-        rest = [f for f in found if f not in tried]
         parts += [
-            f"## `{name}`",
-            agree,
-            markdown(("solver", "file", "objective", "bound", "s", "result"), [route(f) for f in tried]),
+            f"## `{problem.name}`",
+            proven,
+            markdown(("solver", "file", "objective", "bound", "s", "result"), [route(f) for f in found]),
         ]
-        reasons = sorted({f"- {SOLVERS[f.program].title}: {f.verdict}: {f.reason}." for f in rest})
-        parts += ["\n".join(reasons)] if reasons else []
     return parts
 
 
@@ -130,27 +124,22 @@ def same_problem(main: Run) -> str:
     rows = []
     for words, names in groups.items():
         for name in names:
-            best = min((f.objective for f in main.of(name) if f.objective is not None), default=np.nan)
-            proven = any(f.proven for f in main.of(name))
-            rows.append([words, f"`{name}`", f"{best:.9f}", "yes" if proven else "no"])
+            best = min((f.objective for f in main.solves(name) if f.objective is not None), default=np.nan)
+            rows.append([words, f"`{name}`", f"{best:.9f}", "yes" if main.proven(name) else "no"])
     return markdown(("problem", "formulation", "best objective", "proven"), rows)
 
 
 def in_short(main: Run, runs: list[Run]) -> str:
     """Numbers of files that were read as intended or not, and of formulations with a proven optimum."""
-    found = [f for each in runs for f in each.result.checks if f.step == "read"]
-    read = sum(f.verdict == Verdict.AGREES for f in found)
-    wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
-    values = [
-        [f.objective for f in main.of(name) if f.proven and f.objective is not None] for name in FORMULATIONS
-    ]
-    proven = [each for each in values if each]
-    apart = max(max(each) - min(each) for each in proven)
+    found = [f.verdict for each in runs for f in each.result.checks if f.step == "read"]
+    proven = [name for name in FORMULATIONS if main.proven(name)]
+    counts = [len(main.proven(name)) for name in proven]
     return (
-        f"{len(PROGRAMS)} programs read {read} files as they were meant, and {wrong} otherwise. "
-        f"Of the {len(FORMULATIONS)} formulations {len(proven)} are proven optimal "
-        f"by {min(map(len, proven))} to {max(map(len, proven))} routes each. "
-        f"The proven optima of one formulation are at most {apart:.1e} apart."
+        f"{len(PROGRAMS)} programs read {found.count(Verdict.AGREES)} files correctly and "
+        f"{found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED)} wrongly. "
+        f"{len(proven)} of the {len(FORMULATIONS)} formulations are proven optimal, "
+        f"each by {min(counts)} to {max(counts)} routes. "
+        f"The proven optima of a formulation differ by at most {max(map(main.apart, proven)):.1e}."
     )
 
 
@@ -159,21 +148,9 @@ def errata(runs: list[Run]) -> str:
     rows = []
     for each in runs:
         for name in VARIANTS:
-            best = min(
-                (f for f in each.of(name) if f.proven and f.objective is not None),
-                key=lambda f: f.objective or 0.0,
-            )
-            proofs = sum(f.proven for f in each.of(name))
-            rows.append(
-                [
-                    f"`{name}`",
-                    each.gauge,
-                    each.facet,
-                    f"{best.objective:.6f}",
-                    f"{best.energy:.6f}",
-                    str(proofs),
-                ]
-            )
+            (objective, energy), *more = each.proven(name)
+            numbers = (f"{objective:.6f}", f"{energy:.6f}", str(1 + len(more)))
+            rows.append([f"`{name}`", each.gauge, each.facet, *numbers])
     return markdown(
         ("formulation", "gauge", "facet", "optimum", "energy of its field", "proofs"), sorted(rows)
     )
@@ -183,58 +160,58 @@ def readings(runs: list[Run]) -> str:
     """Number of files that each program read, by result."""
     rows = []
     for name, entry in PROGRAMS.items():
-        found = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
-        counts = [
-            str(sum(f.verdict == verdict for f in found))
-            for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)
-        ]
-        wrong = sum(f.verdict in {Verdict.DIFFERS, Verdict.FAILED} for f in found)
+        checks = [f for each in runs for f in each.result.checks if f.program == name and f.step == "read"]
+        found = [f.verdict for f in checks]
+        counts = [found.count(verdict) for verdict in (Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED)]
+        counts.append(found.count(Verdict.DIFFERS) + found.count(Verdict.FAILED))
         version = runs[0].result.versions.get(name, f"absent: {entry.install}")
         by = ["coefficients"] * bool(entry.algebra) + ["values"] * bool(entry.behaviour)
-        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *counts, str(wrong)])
+        rows.append([entry.title, version, ", ".join(entry.formats), " and ".join(by), *map(str, counts)])
     return markdown(
         ("program", "version", "reads", "compared by", "agree", "refused, as stated", "not tried", "differ"),
         rows,
     )
 
 
-def capabilities() -> str:
-    """The solvers that take each formulation, with the reasons below."""
+def capabilities() -> list[str]:
+    """The solvers that take each formulation, and the reasons of the others."""
     marks = {"yes": "yes", "local": "local", "no": "-"}
     rows = [[f"`{p.name}`", *(marks[takes(p, name).answer] for name in SOLVERS)] for p in smallest_problems()]
     reasons = [
-        f"- {entry.title}, {trait}: {refusal.reason}."
+        [entry.title, trait, refusal.reason]
         for entry in SOLVERS.values()
         for trait, refusal in entry.refusals.items()
     ]
-    return f"{markdown(('formulation', *(e.title for e in SOLVERS.values())), rows)}\n\n" + "\n".join(reasons)
+    return [
+        markdown(("formulation", *(entry.title for entry in SOLVERS.values())), rows),
+        markdown(("solver", "trait", "reason"), reasons),
+    ]
 
 
 def main() -> None:
     """Run everything and write the page."""
     ArgumentParser(description=__doc__).parse_args()
     begin = time.perf_counter()
-    main_run = run("strokes", "hull", tuple(FORMULATIONS), SECONDS)
-    rest = [
-        run(gauge, facet, VARIANTS, SECONDS)
-        for gauge in GAUGES
-        for facet in ("hull", "printed")
-        if (gauge, facet) != ("strokes", "hull")
-    ]
-    runs = [main_run, *rest]
-    grid = f"{SHAPE[0]} x {SHAPE[1]} pixels, {STROKES} of them with a stroke "
-    grid += f"in a random direction (seed {SEED}), w_beta = 0.001"
+    main_run = run("strokes", "hull", tuple(FORMULATIONS))
+    others = [(gauge, facet) for gauge in GAUGES for facet in ("hull", "printed")][1:]
+    runs = [main_run, *(run(gauge, facet, VARIANTS) for gauge, facet in others)]
     parts = [
         "# One instance, all routes",
         generated("python docs/validate.py"),
-        in_short(main_run, runs),
         (
-            f"An instance of {grid}, in all formulations and all formats, handed to every program "
-            "that can be had for free. Objectives are recomputed "
-            f"from the declaration at the point that the solver gives; the limit is {SECONDS:g} s for each "
-            "solve, on one thread where that can be set. "
-            "Optima must agree to 1e-6. `crossfield verify DIR --solve` does the same for any folder."
+            "Results of free programs on one small instance, in every formulation and format. "
+            "A route is a written file and a solver that reads it."
         ),
+        in_short(main_run, runs),
+        f"""\
+- The instance has {SHAPE[0]} x {SHAPE[1]} pixels and w_beta = 0.001. {STROKES} pixels have a stroke in a
+  random direction (seed {SEED}).
+- Each solve may take {SECONDS:g} s, on one thread where that can be set.
+  Seconds depend on the load of the machine.
+- Objectives are recomputed from the declaration at the solver's point. Optima must agree to 1e-6.
+- Solvers are listed for the formulations that they [take](#solvers-and-formulations).
+
+`crossfield verify DIR --solve` makes the same checks for any folder.""",
         "## Reading",
         readings(runs),
         "## The same problem in several formulations",
@@ -242,14 +219,13 @@ def main() -> None:
         *routes(main_run),
         "## Gauge and facet",
         (
-            "The misprints of the paper as numbers. With the printed facet (26) the optimum falls "
-            "below the energy of the field it stands for; with the "
-            "printed box (1) it rises."
+            "The effect of the two [misprints of the paper](errata.md). The printed facet (26) lowers the "
+            "optimum below the energy of its field. The printed box (1) raises the optimum."
         ),
         errata(runs),
-        "## Who takes what",
-        "`local`: it answers without proof. `-`: for the reasons below.",
-        capabilities(),
+        "## Solvers and formulations",
+        "`local`: the solver answers without proof. `-`: it does not take the formulation. Reasons follow.",
+        *capabilities(),
         "## Starting points",
         markdown(
             ("solver", "suffix", "how"),

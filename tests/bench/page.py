@@ -27,6 +27,15 @@ MET: dict[str, Callable[[float, float], bool]] = {
     "under": operator.lt,
     "below": operator.lt,
 }
+METHOD = (
+    "`python tests/bench` measures every number in a separate process, one at a time.",
+    "The instance is a full square of pixels, a fifth of them with a stroke.",
+    "",
+    "- Seconds: from the instance to the closed file, with names, SHA-256 and, for .nl, the files of names.",
+    "  Median of three runs, or one run if it takes more than 5 s.",
+    "- CPU: time of all threads. Compare it if other programs shared the cores.",
+    "- Peak memory: of the whole process, with its libraries.",
+)
 PACKAGES = ("numpy", "sympy", "pyomo", "linopy", "highspy", "pyoptinterface")
 
 
@@ -78,51 +87,29 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     """The page as Markdown."""
     at = Page(document)
     given = document["machine"]
+    packages = ", ".join(f"{name} {given[name]}" for name in PACKAGES)
+    loads = [found["load"] for found in at.found.values()]
     lines = [
         "# How fast files are written",
         "",
-        "[All pages](index.md).",
+        "[All pages](index.md). Speed and memory of the writers, compared with other programs.",
         "",
         in_short(at, sizes, targets(at, sizes, names, middle, pixels)),
         "",
-        (
-            "Written by `python tests/bench`; every number is measured in a process of its own, "
-            "one at a time. The instance is a full square of pixels, a"
-        ),
-        (
-            "fifth of them with a stroke. Seconds go from the instance to the closed file (names, "
-            "SHA-256 and, "
-            "for .nl, the files of names included),"
-        ),
-        (
-            "the median of three runs, or of one when it takes more than 5 s. Every run writes new files. "
-            "*CPU* is the time of all threads: where other programs shared the cores, it is"
-        ),
-        "the number to compare. Peak memory is that of the whole process, libraries included.",
+        *METHOD,
         "",
-        f"{given['processor']}, {given['system']}. Python {given['Python']}, "
-        + ", ".join(f"{name} {given[name]}" for name in PACKAGES)
-        + (
-            ". Load average while measuring: "
-            f"{min(f['load'] for f in at.found.values()):.1f} to "
-            f"{max(f['load'] for f in at.found.values()):.1f}."
-        ),
+        f"{given['processor']}, {given['system']}. Python {given['Python']}, {packages}.",
+        f"Load average while measuring: {min(loads):.1f} to {max(loads):.1f}.",
         "",
         "## Targets",
         "",
         *table(["", "target", "measured", ""], targets(at, sizes, names, middle, pixels)),
         *reasons(at, sizes[-2], sizes[-1], middle),
-        "## LP and MPS of `milp-mccormick` beside the peers",
+        f"## LP and MPS of `{MILP}` next to other programs",
         "",
-        (
-            "Peers build their model from whole arrays where they can (linopy, HiGHS), "
-            "and write without our names: their files are smaller. A peer stops at the"
-        ),
-        (
-            "size before it would take more than about a minute. gurobipy's free licence ends at "
-            "2000 columns, "
-            "so it is not here."
-        ),
+        "linopy and HiGHS build their models from whole arrays. The other programs do not write our names.",
+        "Each stops before the size that would take more than about a minute.",
+        "gurobipy is missing, because its free licence ends at 2000 columns.",
         "",
     ]
     for suffix in ("lp", "mps"):
@@ -130,7 +117,7 @@ def page(document: Found, sizes: Sequence[int], names: Sequence[str], middle: in
     lines += [
         "## Every formulation against Pyomo",
         "",
-        f"{middle} x {middle}: seconds of ours, of Pyomo (model and writer), and how many times that is.",
+        f"{middle} x {middle}: seconds of crossfield, of Pyomo (model and writer), and their ratio.",
         "",
     ]
     lines += against_pyomo(at, names, middle)
@@ -152,22 +139,27 @@ def in_short(at: Page, sizes: Sequence[int], lines: list[list[str]]) -> str:
     all_formats = at("everything", sizes[-1], "scalar", MILP, 1)
     took = f"{seconds(all_formats)} s" if all_formats else "a time that was not measured"
     return (
-        f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} targets are met; "
-        "the first table has them all. "
-        f"At {size} x {size} pixels the writers make {rates or 'what was not measured'}. All formats of the "
-        f"largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
+        f"{sum(line[3] == 'met' for line in lines)} of {len(lines)} [targets](#targets) are met. "
+        f"At {size} x {size} pixels crossfield writes {rates or 'at a speed that was not measured'}. "
+        f"All formats of the largest grid, {sizes[-1]} x {sizes[-1]}, take {took}."
     )
 
 
 def reasons(at: Page, half: int, big: int, middle: int) -> list[str]:
     """The limits of the writers, in numbers of the same run."""
-    lines = [
-        linopy_reason(at, half),
-        pyomo_reason(at, middle),
-        *(write_reason(at, size, suffix) for suffix in ("lp", "mps") for size in (half, big)),
-        growth_reason(at, half, big),
+    lines = [linopy_reason(at, half), pyomo_reason(at, middle), growth_reason(at, half, big)]
+    return [
+        "Limits behind these numbers:",
+        "",
+        *filter(None, lines),
+        "- One write computes nothing. SHA-256 works through a file from end to end in one thread,",
+        "  and a file is closed after its last byte is hashed:",
+        "",
+        *table(
+            ["file", "one write, s", "SHA-256 / one write", "half of our CPU seconds / one write"],
+            [row for suffix in ("lp", "mps") for size in (half, big) for row in hashing(at, size, suffix)],
+        ),
     ]
-    return ["What stands behind these numbers, and behind those not met:", "", *filter(None, lines), ""]
 
 
 def pyomo_reason(at: Page, size: int) -> str:
@@ -175,45 +167,37 @@ def pyomo_reason(at: Page, size: int) -> str:
     mine, other = (at("ours", size, "lp", name) for name in ("qp-fixed", MILP))
     if not (mine and other):
         return ""
+    small, large = (
+        f"{found['bytes'] / 1e6:.1f} MB at {found['bytes'] / 1e6 / found['seconds']:.0f} MB/s"
+        for found in (mine, other)
+    )
     return (
-        "- Pyomo, objectives with products in LP and MPS: what does not grow counts in small files, "
-        f"and equal products are found by sorting. `qp-fixed` in LP, {size} x {size}, "
-        f"is {mine['bytes'] / 1e6:.1f} MB at {mine['bytes'] / 1e6 / mine['seconds']:.0f} MB/s, "
-        f"`{MILP}` {other['bytes'] / 1e6:.1f} MB at {other['bytes'] / 1e6 / other['seconds']:.0f} MB/s."
+        "- Pyomo, LP and MPS: fixed costs weigh more in small files, and products in objectives are sorted. "
+        f"At {size} x {size}, the LP of `qp-fixed` is {small}, that of `{MILP}` {large}."
     )
 
 
 def linopy_reason(at: Page, size: int) -> str:
-    """Work that linopy does not do, and the distribution of our CPU seconds."""
+    """Work that linopy does not do, and the least time of ours."""
     mine, theirs = at("ours", size), at("linopy", size)
-    made, hashed, written = (
-        at(*step) for step in (("rendered", size, "lp", MILP, ""), ("hashed", size), ("copied", size))
-    )
-    if not (mine and theirs and made and hashed and written):
+    if not (mine and theirs):
         return ""
     return (
-        "- linopy, LP: it is handed whole arrays of column numbers here, past its own expressions, "
-        "it hashes nothing, and its file has numbered names: "
-        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. A tenth of its time is "
-        f"{theirs['seconds'] / 10:.3f} s; "
-        f"on two cores ours can take no less than the half of its {mine['cpu']:.3f} CPU seconds "
-        f"({mine['cpu'] / 2:.3f} s), "
-        f"of which making the text alone takes {made['cpu']:.3f}, SHA-256 for the manifest, "
-        f"in one thread from end to end, {hashed['cpu']:.3f} and writing {written['cpu']:.3f}."
+        "- linopy, LP: it receives arrays of column numbers, hashes nothing and writes numbered names: "
+        f"{100 * theirs['bytes'] / mine['bytes']:.0f} % of our bytes. "
+        f"A tenth of its time is {theirs['seconds'] / 10:.3f} s. "
+        f"On two cores our {mine['cpu']:.3f} CPU seconds take at least {mine['cpu'] / 2:.3f} s."
     )
 
 
-def write_reason(at: Page, size: int, suffix: str) -> str:
-    """Time of hashing compared with one write: a file is not closed before its last byte is hashed."""
+def hashing(at: Page, size: int, suffix: str) -> list[list[str]]:
+    """A row with the time of hashing, and of our CPU seconds on two cores, relative to one write."""
     mine, hashed, written = at("ours", size, suffix), at("hashed", size, suffix), at("copied", size, suffix)
     if not (mine and hashed and written):
-        return ""
-    return (
-        f"- One write, {suffix.upper()} {size}: it takes {written['seconds']:.3f} s, "
-        "for nothing is computed. SHA-256 alone, which works through a file from end to end in one "
-        f"thread, takes {hashed['seconds'] / written['seconds']:.1f} times as long; all our CPU seconds, "
-        f"shared evenly by two cores, would take {mine['cpu'] / 2 / written['seconds']:.1f} times as long."
-    )
+        return []
+    ratios = (hashed["seconds"] / written["seconds"], mine["cpu"] / 2 / written["seconds"])
+    name = f"{suffix.upper()} {size}"
+    return [[name, f"{written['seconds']:.3f}", *(f"{ratio:.1f}" for ratio in ratios)]]
 
 
 def growth_reason(at: Page, half: int, big: int) -> str:
@@ -229,9 +213,8 @@ def growth_reason(at: Page, half: int, big: int) -> str:
         for found in (made, copies)
     )
     return (
-        f"- Growth: making the text grows {making} times in CPU seconds; "
-        f"one write of the finished bytes grows {writing} times in seconds, "
-        "which is the system's part."
+        f"- Growth from {half} to {big}: CPU seconds for making the text grow {making} times. "
+        f"Seconds for one write, which depend on the system, grow {writing} times."
     )
 
 
@@ -378,8 +361,8 @@ def where(at: Page, size: int) -> list[str]:
     """Times of making, hashing and writing, and the sections of a file."""
     lines = [
         (
-            f"`{MILP}`, {size} x {size}. CPU seconds: the bytes alone, their SHA-256, one write of them, "
-            "and the whole as it is."
+            f"`{MILP}`, {size} x {size}. CPU seconds for making the bytes, for their SHA-256, "
+            "for one write of them, and for the whole."
         ),
         "",
     ]
@@ -407,10 +390,7 @@ def where(at: Page, size: int) -> list[str]:
                 ]
             )
     lines += [
-        (
-            "By section, in file order. The first sections include the algebra (SymPy, some 10 ms a family, "
-            "whatever the size)."
-        ),
+        "By section, in file order. The first sections include SymPy, about 10 ms per family at every size.",
         "",
     ]
     return lines + table(["", "section", "seconds", "MB", "MB/s"], rows)
@@ -445,7 +425,7 @@ def others(at: Page, sizes: Sequence[int], pixels: int) -> list[str]:
         "## Every format",
         "",
         *table(["size", "format", "MB", "seconds", "CPU s", "peak MB"], rows),
-        "## And",
+        "## Other tasks",
         "",
     ]
     rest = [
