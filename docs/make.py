@@ -59,7 +59,7 @@ def formulations() -> None:
         parts += [f"## `{name}`", facts, f"$$\n{latex(formulation)}\n$$"]
     columns, rows = tables()["solvers"]
     parts += [
-        "## Who solves what here",
+        "## Formulations and bundled solvers",
         markdown(columns, [[str(row[column]) for column in columns] for row in rows]),
     ]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
@@ -73,22 +73,23 @@ def kinds_in_short() -> str:
     closed = {row["formulation"] for row in rows if any(row[solver] == "yes" for solver in solvers)}
     whole = [name for name in FORMULATIONS if name in closed]
     return (
-        f"There are {len(FORMULATIONS)} formulations, each printed here from its one declaration. "
-        f"{len(convex)} are convex once their integers are relaxed: "
-        f"{', '.join(convex)}. HiGHS, Ipopt and Bonmin, which are installed with crossfield, "
-        f"take {len(whole)} as they stand, and relaxations of others: the table at the end."
+        f"This page prints all {len(FORMULATIONS)} formulations from their declarations. {len(convex)} have "
+        f"convex relaxations: {', '.join(convex)}. The solvers that crossfield installs (HiGHS, Ipopt, "
+        f"Bonmin) solve {len(whole)} of them; the table at the end shows which."
     )
 
 
-INTRODUCTION = r"""[What the words and symbols mean](mathematics.md), step by step. In short: a cross at pixel
-$i$ has line $u$ at angle $\alpha_i + \beta_i$ and line $v$ at angle $\alpha_i + \pi/2 - \beta_i$. $I$ are the
-pixels of the mask, $S_c$ those that carry a stroke of direction $\theta_i$ and weight $w_i$, and $E$ the
-ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in radians,
-counter-clockwise, $y$ up. The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data: under the
-gauge `strokes` it is $[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere; under
-`box` it is $[0, \pi/2]$ everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the
-windows. With the facet `printed`, row (26) is dropped and $z \ge -\pi/4$ stays as a bound, as the paper
-prints it. Sections and numbers in brackets are those of the paper."""
+INTRODUCTION = r"""[The mathematics](mathematics.md) derives the model. A cross at pixel $i$ has the line
+$u$ at the angle $\alpha_i + \beta_i$ and the line $v$ at $\alpha_i + \pi/2 - \beta_i$. $I$ is the set of
+pixels of the mask. $S_c$ is the set of stroke pixels, with direction $\theta_i$ and weight $w_i$. $E$ is
+the set of ordered pairs $(i, j)$ in which $j$ is the upper or the right neighbour of $i$. Angles are in
+radians, counter-clockwise, with $y$ up.
+
+The window $[\underline\alpha_i, \underline\alpha_i + \pi/2]$ is data. Under the gauge `strokes` it is
+$[\theta_i - \pi/4, \theta_i + \pi/4]$ on strokes and $[0, \pi/2]$ elsewhere. Under `box` it is $[0, \pi/2]$
+everywhere, as printed in (1). The bounds $p^{\min}, p^{\max}$ follow from the windows. With the facet
+`printed`, the row (26) is replaced by the bound $z \ge -\pi/4$, as in the paper. Sections and numbers in
+brackets refer to the paper."""
 
 
 def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
@@ -116,7 +117,7 @@ def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
 ERRATA = (
     (
         "(26) reads z >= -pi/4",
-        "z >= -(pi/4) p1, the facet that was meant; the MILP is then exact for the 1-norm",
+        "z >= -(pi/4) p1, a facet; the MILP is then exact for the 1-norm",
         "`--facet printed`",
     ),
     (
@@ -128,7 +129,7 @@ ERRATA = (
     ("gamma rows for all pixels", "gamma rows for stroke pixels, where theta exists", ""),
     (
         "p2 may be any integer",
-        "p2 is bounded, so that solvers can branch on it; every optimum is within the bounds",
+        "p2 has bounds, which contain every optimum",
         "",
     ),
 )
@@ -171,32 +172,31 @@ def errata() -> None:
         field = cf.solve(cf.formulate(single.with_gauge(gauge), "qp-fixed", p=np.zeros(0, np.int32))).field
         degrees = np.degrees([field.alpha[0], field.beta[0], field.angle_between[0]])
         angles.append([gauge, *(f"{value:.2f}" for value in degrees)])
-    text = f"""# What the paper's misprints do
+    text = f"""# Errata of the paper
 
 {generated("python docs/make.py errata")}
 
 {misprints_in_short(facets, gauges, angles)}
 
-{markdown(("in the paper", "in crossfield", "option to write it as printed"), list(map(list, ERRATA)))}
+{markdown(("in the paper", "in crossfield", "option for the printed form"), list(map(list, ERRATA)))}
 
 ## (26) as printed
 
 `milp-mccormick` on 4 x 4 grids with random strokes, solved to proven optimality by HiGHS. With the printed
-facet the optimum drops below the true 1-norm energy of the field it stands for: where p1 = 0, z is free in an
-interval and t is cheated through it.
+facet the optimum is below the 1-norm energy of its field: for p1 = 0, z is free in an interval, and the model
+underestimates the change of skew t.
 
 {markdown(("seed", "facet", "optimum", "energy of its field", "status"), facets)}
 
 ## The box (1)
 
-`miqp-exact` on 2 x 3 grids with random strokes, solved by Bonmin. With the box of the paper the optimum is
-higher, and it changes when the sketch is turned by a quarter; with the gauge `strokes` it does not (to the
-accuracy of the solver).
+`miqp-exact` on 2 x 3 grids with random strokes, solved by Bonmin. With the paper's box the optimum is
+higher, and it changes when the sketch is rotated by 90 degrees. With the gauge `strokes` it does not change, up to the
+accuracy of the solver.
 
-{markdown(("seed", "gauge", "optimum", "of the turned sketch", "Bonmin says"), gauges)}
+{markdown(("seed", "gauge", "optimum", "rotated sketch", "status of Bonmin"), gauges)}
 
-One pixel with a stroke at 120 degrees (`qp-fixed`, Ipopt): the box forces a skewed cross where nothing asks
-for one. Degrees.
+One pixel with a stroke at 120 degrees (`qp-fixed`, Ipopt), angles in degrees. The box forces a skewed cross.
 
 {markdown(("gauge", "alpha", "beta", "angle between the lines"), angles)}
 """
@@ -215,12 +215,11 @@ def misprints_in_short(facets: list[list[str]], gauges: list[list[str]], angles:
     changed = sum(abs(values[seed, "box"][0] - values[seed, "box"][1]) > 1e-4 for seed in sketches)
     between = {gauge: degrees for gauge, _, _, degrees in angles}
     return (
-        f"With (26) as printed the optimum is too low in {len(lower)} of {len(seeds)} instances, "
-        f"and the field that comes with it has up to {worst:.1f} times the least energy. "
-        f"With the box (1) the optimum is higher in {higher} of {len(sketches)} sketches, "
-        f"and turning the sketch by a quarter changes it in {changed}. "
-        f"A lone stroke at 120 degrees gets lines {between['box']} degrees apart from the box, "
-        f"and {between['strokes']} from the window round the stroke."
+        f"With (26) as printed, the optimum is too low in {len(lower)} of {len(seeds)} instances, and its "
+        f"field has up to {worst:.1f} times the minimum energy. With the box (1), the optimum is higher in "
+        f"{higher} of {len(sketches)} sketches, and a rotation by 90 degrees changes it in "
+        f"{changed}. The lines at a single stroke of 120 degrees are {between['box']} degrees apart with the box, and "
+        f"{between['strokes']} degrees with the window around the stroke."
     )
 
 
@@ -263,9 +262,9 @@ def samples_in_short() -> str:
     known = [entry.kind for entry in SAMPLES.values()].count("analytic")
     return (
         f"There are {len(SAMPLES)} samples: "
-        f"{len(SAMPLES) - known} sketches and {known} computed surfaces whose true crosses are known. "
-        "Each can be named where a command takes a sketch, as in `crossfield run mouse -o out`. "
-        "The pictures show fields that a search of 10 rounds finds on grids of 48 pixels."
+        f"{len(SAMPLES) - known} sketches and {known} computed surfaces with known crosses. Use a name in "
+        "place of a sketch, as in `crossfield run mouse -o out`. The pictures show fields of a search of 10 "
+        "rounds at 48 pixels."
     )
 
 
