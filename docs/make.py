@@ -191,8 +191,8 @@ underestimates the change of skew t.
 ## The box (1)
 
 `miqp-exact` on 2 x 3 grids with random strokes, solved by Bonmin. With the paper's box the optimum is
-higher, and it changes when the sketch is rotated by 90 degrees. With the gauge `strokes` it does not change, up to the
-accuracy of the solver.
+higher, and it changes when the sketch is rotated by 90 degrees. With the gauge `strokes` it does not change,
+up to the accuracy of the solver.
 
 {markdown(("seed", "gauge", "optimum", "rotated sketch", "status of Bonmin"), gauges)}
 
@@ -218,8 +218,8 @@ def misprints_in_short(facets: list[list[str]], gauges: list[list[str]], angles:
         f"With (26) as printed, the optimum is too low in {len(lower)} of {len(seeds)} instances, and its "
         f"field has up to {worst:.1f} times the minimum energy. With the box (1), the optimum is higher in "
         f"{higher} of {len(sketches)} sketches, and a rotation by 90 degrees changes it in "
-        f"{changed}. The lines at a single stroke of 120 degrees are {between['box']} degrees apart with the box, and "
-        f"{between['strokes']} degrees with the window around the stroke."
+        f"{changed}. The lines at a single stroke of 120 degrees are {between['box']} degrees apart with the "
+        f"box, and {between['strokes']} degrees with the window around the stroke."
     )
 
 
