@@ -97,7 +97,7 @@ def strip(figure: Figure) -> None:
     for y, name in ((-45, "β = −45°"), (0, "0"), (45, "45°")):
         left.text(-3, y, name, ha="right", va="center")
     left.set(xlim=(-22, 96), ylim=(-60, 50))
-    bare(right, "a stroke at 120°: who can carry it", equal=False)
+    bare(right, "windows of alpha that admit a stroke at 120°", equal=False)
     for y, name, (low, high), colour in (
         (1, "box", (0, 90), GREY),
         (0, "strokes", (75, 165), U),

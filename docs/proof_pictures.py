@@ -68,7 +68,7 @@ def maps(proof: Proof, boxes: Floats, path: Path) -> None:
             _gaps(axes[len(values)], proof)
         _strokes(axes[0], proof)
         bar = figure.colorbar(shown, ax=axes, aspect=35, pad=0.02)
-        bar.set_label("part of the strip of crosses that is left")
+        bar.set_label("remaining share of the strip of crosses")
         figure.savefig(path, dpi=110, metadata={"Software": None})
 
 
@@ -80,7 +80,7 @@ def _gaps(place: Any, proof: Proof) -> None:
     place.semilogy(numbers, gaps, "o-", color=CELL, markersize=4)
     for number, gap in zip(numbers, gaps, strict=True):
         place.annotate(f"{gap:.2g} %", (number, gap), (4, 4), textcoords="offset points", fontsize=8)
-    place.set_title("energy less bound of each level", fontsize=10)
+    place.set_title("gap of each level", fontsize=10)
     place.set_xlabel("level", fontsize=9)
     place.set(xticks=list(numbers), xlim=(0.6, len(gaps) + 1.1), yticks=[])
     place.minorticks_off()
@@ -109,7 +109,7 @@ def strips(proof: Proof, path: Path) -> list[int]:
     late = shares(levels[2])
     drawn = instance.stroke_index
     pixels = (int(drawn[np.argsort(late[drawn])[len(drawn) // 2]]), int(np.argmax(late)))
-    names = ("on a stroke", "the one that\nholds out longest")
+    names = ("on a stroke", "decided last")
     with own_settings(STYLE):
         figure = Figure(figsize=(2.0 * len(levels) + 0.7, 4.5), layout="constrained")
         axes = figure.subplots(2, len(levels), squeeze=False)

@@ -122,15 +122,15 @@ class Command(TyperCommand):
         """The option --help, in its panel."""
         option = super().get_help_option(ctx)
         if option is not None:
-            option.rich_help_panel = _panel(option)  # type: ignore[attr-defined]
+            option.rich_help_panel = _panel(option)
         return option
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Fill the help texts of the command and of its parameters, then show them."""
         # A line break in a docstring begins no paragraph.
-        text = re.sub(r"(?<!\n)\n(?!\n)", " ", filled(self.help or ""))
+        described = re.sub(r"(?<!\n)\n(?!\n)", " ", filled(self.help or ""))
         example = EXAMPLES.get(ctx.command_path.partition(" ")[2])
-        self.help = f"Example: {example}\n\n{text}" if example else text
+        self.help = f"Example: {example}\n\n{described}" if example else described
         for parameter in self.params:
             if text := getattr(parameter, "help", None):
                 parameter.help = filled(text)  # type: ignore[attr-defined]

@@ -203,7 +203,7 @@ def submit_command(
     ] = None,
     status: Annotated[str | None, typer.Option("--status", help="Result of the run: {run statuses}.")] = None,
     bound: Annotated[
-        float | None, typer.Option("--bound", help="Dual bound of the run; by default that of its log.")
+        float | None, typer.Option("--bound", help="Dual bound of the run; by default the bound in its log.")
     ] = None,
     seconds: Annotated[
         float | None, typer.Option("--seconds", help="Duration of the run in seconds.")

@@ -70,7 +70,7 @@ def shade_command(
             write_field(field, output / FIELD)
     printing.show(surface_document(found, about), lambda: show_surface(found, output))
     if candidate is not None and candidate.interrupted:
-        print_notice("interrupted; the surface is that of the best field so far")
+        print_notice("interrupted; the surface belongs to the best field so far")
 
 
 def _saved(source: str, on: Path | None) -> CrossField | None:

@@ -1,6 +1,6 @@
 """The table of file formats, and the one function that writes a problem to a file.
 
-A format states what it can carry. Products beyond that are lifted, which is exact for whole jumps and
+A format states its highest degree. Products beyond it are lifted, which is exact for whole jumps and
 declared a relaxation otherwise; any other problem is refused by name before the first byte.
 """
 

@@ -62,7 +62,7 @@ class Drawing:
             return
         raise InputError(
             f"the drawing lies elsewhere than the field of {instance.name}, which is at x {left:g} to "
-            f"{right:g}, y {top:g} to {bottom:g}; give the one that its instance was read from"
+            f"{right:g}, y {top:g} to {bottom:g}; give the drawing from which its instance was read"
         )
 
 

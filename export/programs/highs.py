@@ -43,7 +43,7 @@ def loaded(path: Path, *, silent: bool = True, **options: str | float) -> Any:
 
 
 def set_options(highs: Any, **options: str | float) -> None:
-    """Set options by name; a number of threads that differs from that of an earlier solve takes effect."""
+    """Set options by name; a number of threads that differs from an earlier solve takes effect."""
     for option, value in options.items():
         highs.setOptionValue(option, value)
     if options.get("threads"):

@@ -43,7 +43,7 @@ LARGEST: Final = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A solver's answer: its point, its claims, and what was recomputed from the instance.
+    """A solver's answer: its point, its claims, and the values recomputed from the instance.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def read_solution(
     Returns
     -------
     Solution
-        The point, what the file claims, and what was recomputed. The point is None if the file has none.
+        The point, the claims of the file, and the recomputed values. The point is None if the file has none.
 
     Raises
     ------

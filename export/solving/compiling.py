@@ -49,7 +49,7 @@ def compile_proofs(folder: Path, deadline: Deadline) -> None:
             raise KeyboardInterrupt from error
         raise SolverError(
             f"the functions of proofs, which are compiled once on a machine, were not ready: {error}; "
-            "the next run goes on from there",
+            "the next run continues",
             file=log,
         ) from error
 

@@ -124,7 +124,7 @@ def evaluate(
     instance
         The instance.
     sketch
-        The file from which the instance was read, or the name of its sample: it says what is a curve. None:
+        The file from which the instance was read, or the name of its sample: it defines the curves. None:
         chains of stroke pixels count as curves (`curves_of`).
     methods
         Names in the table of methods.

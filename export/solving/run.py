@@ -246,7 +246,7 @@ def run(
     Returns
     -------
     Report
-        All fields, the one that is kept as `.field`, the manifests, and what is proven.
+        All fields, the kept one as `.field`, the manifests, and the proof.
 
     Raises
     ------

@@ -292,7 +292,7 @@ def _energy_difference(
         return ""
     if not proven and energy < objective:
         return ""
-    return f"its objective is {objective:.9g}, that of its field {energy:.9g}"
+    return f"its objective is {objective:.9g}, but its field has {energy:.9g}"
 
 
 def same(first: float, second: float) -> bool:

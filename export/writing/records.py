@@ -230,7 +230,7 @@ def filled(parts: Pieces, count: int) -> Bytes:
 
 
 class _Template:
-    """The pieces of a record and the bytes of the present block: literals stay, holes are filled anew.
+    """The pieces of a record and the bytes of the present block: literals stay, holes are filled again.
 
     A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
     which is rare.
@@ -417,7 +417,7 @@ def check_coefficients(values: Floats | float, where: str) -> None:
         remedy = _LARGER if worst < LEAST else _SMALLER
         raise UnsupportedByFormatError(
             f"{where} has the coefficient {worst!r}; "
-            f"readers drop or refuse what is outside [1e-9, 1e15): {remedy}"
+            f"readers drop or refuse values outside [1e-9, 1e15): {remedy}"
         )
 
 

@@ -18,7 +18,7 @@ class Terms(NamedTuple):
 
 
 def terms(at: Iterable[Sequence[int]], value: Iterable[float], *, indices: int, products: int = 0) -> Terms:
-    """The terms of that many indices, the last `products` of which have no order among themselves."""
+    """The terms of that many indices; the last `products` have no order among themselves."""
     index = np.array(list(at) if not isinstance(at, np.ndarray) else at, dtype=np.int64).reshape(-1, indices)
     given = np.array(list(value) if not isinstance(value, np.ndarray) else value, dtype=np.float64)
     if products:

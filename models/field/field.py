@@ -83,7 +83,7 @@ class CrossField(Pictured):
     """Angles of crosses and jumps between neighbours, on the grid of an instance with n pixels and m pairs.
 
     Line u is at alpha + beta and line v at alpha + pi/2 - beta, in radians counter-clockwise from +x with y
-    up. A jump compares the label of a pair's first pixel with that of its second (docs/mathematics.md, 2 and
+    up. A jump relates the labels of a pair's first and second pixel (docs/mathematics.md, 2 and
     3).
 
     Parameters

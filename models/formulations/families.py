@@ -19,7 +19,7 @@ from .symbols import SCALARS, SLOTS, IndexSet, numeric, way
 Coefficient = float | Floats
 
 ANY_DEGREE: Final = 99
-"""Degree of what is no polynomial."""
+"""Degree of a function that is not a polynomial."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Monomial:
 
     @property
     def factors(self) -> tuple[Ints, ...]:
-        """Columns of its symbols, one array (count,) each; made anew at every call to spare memory."""
+        """Columns of its symbols, one array (count,) each; created at every call to save memory."""
         return tuple(map(self.family.column_of, self.symbols))
 
     @property
@@ -87,7 +87,8 @@ class Monomial:
 class PlacedFamily:
     """A family placed on an instance: where its elements are and which columns its symbols mean.
 
-    elements: indices into the family's index set, shape (count,). `terms` is None for what is no polynomial.
+    elements: indices into the family's index set, shape (count,). `terms` is None unless it is a
+    polynomial.
     """
 
     family: Family
@@ -151,7 +152,7 @@ class PlacedFamily:
 
     @property
     def degree(self) -> int:
-        """Degree of the polynomial; 99 for what is none."""
+        """Degree of the polynomial; 99 for other functions."""
         return ANY_DEGREE if self.terms is None else max((term.degree for term in self.terms), default=0)
 
     def of_degree(self, degree: int) -> tuple[Monomial, ...]:

@@ -322,7 +322,7 @@ class Problem:
         Returns
         -------
         ProblemArrays
-            Costs, matrices, bounds and names. `nonlinear` lists what is not in the arrays.
+            Costs, matrices, bounds and names. `nonlinear` lists the parts that the arrays do not contain.
 
         """
         return arrays_of(self, names=names)

@@ -1,4 +1,4 @@
-"""Build of a library: missing files are made, and whole ones are kept.
+"""Build of a library: missing files are written, and complete ones are kept.
 
 Two kinds of tasks: an instance with its fields, then each of its entries. Their results are bytes, written
 here and nowhere else, each file beside and renamed, and the file that marks completion last. So a build that
@@ -53,7 +53,7 @@ def build(
             return _built(spec, plans, folder, points, jobs=jobs, scheduler=scheduler, progress=progress)
     except BaseException:
         if is_new:
-            with suppress(OSError):  # it may hold what is whole, for the next build
+            with suppress(OSError):  # it may contain complete files for the next build
                 folder.rmdir()
         raise
 
@@ -90,7 +90,7 @@ def _built(
 
 
 def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
-    """Bring a library up to date with its ledger; only files that the change affects are made again."""
+    """Bring a library up to date with its ledger; only files that the change affects are written again."""
     folder = read_library(folder).folder
     with locked(folder, "a build of the library", progress):
         return rebuilt(folder, jobs=jobs, progress=progress)
@@ -133,7 +133,7 @@ class _Build:
         """Instances whose size is too small for their sketch, and the reasons."""
 
     def begin(self, each: InstancePlan) -> None:
-        """Schedule an instance unless it is whole, and then its entries."""
+        """Schedule an instance unless it is complete, and then its entries."""
         task = self.inputs.preparation(each)
         about = self._whole(task.name, task.sha256)
         if about is not None:
@@ -160,7 +160,7 @@ class _Build:
         self.progress(f"left out: {error}")
 
     def _whole(self, instance: str, sha256: str) -> dict[str, Any] | None:
-        """The document of an instance if it was made from the same recipe and its files are whole."""
+        """The document of an instance if it was made from the same recipe and its files are complete."""
         try:
             about = read_about(self.folder / about_file(instance))
         except CrossfieldError:

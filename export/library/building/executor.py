@@ -39,7 +39,7 @@ def executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
         with _cluster(scheduler) if scheduler else workers(jobs) as chosen:
             yield chosen
     except WorkerError as error:
-        raise BuildError(f"{error}; of a build, what is whole is kept") from error
+        raise BuildError(f"{error}; complete files are kept") from error
 
 
 @contextmanager
@@ -64,11 +64,11 @@ def _cluster(address: str) -> Iterator[Executor]:
     except distributed.KilledWorker as error:
         raise BuildError(
             "a task ended several workers, for want of memory most likely; see their logs and build again, "
-            "what is whole is kept"
+            "complete files are kept"
         ) from error
     except (CancelledError, distributed.comm.core.CommClosedError) as error:
         raise BuildError(
-            f"the scheduler at {address[:100]} went away; start it and build again, what is whole is kept"
+            f"the scheduler at {address[:100]} is gone; start it and build again (complete files are kept)"
         ) from error
     finally:
         client.close()
@@ -90,7 +90,7 @@ class Tasks:
         self._waiting.append((function, value, finish))
 
     def run(self) -> None:
-        """Run all tasks. Raises what a task raises."""
+        """Run all tasks. Raises the error of a task."""
         while self._waiting or self._running:
             while self._waiting and len(self._running) < self._most:
                 function, value, finish = self._waiting.pop()

@@ -66,7 +66,7 @@ class Evidence:
     provenance: Provenance
 
     def certified(self, instance: Instance) -> Certified:
-        """Return what it proves of an instance. Raises InputError unless the checker accepts it there."""
+        """Return the verdict of a certificate. Raises InputError unless the checker accepts it."""
         return certified_by(self.data, self.file, instance, self.provenance)
 
 

@@ -59,7 +59,7 @@ def verify_entry(
 
 
 def _again(folder: Path, sidecar: dict[str, Any], task: Entry) -> Iterator[Finding]:
-    """Differences to the entry made again, or why it cannot be made."""
+    """Differences from the rebuilt entry, or the reason why it cannot be rebuilt."""
     try:
         yield from entry_findings(folder, sidecar, task)
     except CrossfieldError as error:

@@ -1,4 +1,4 @@
-"""Comparison of a library with its documents made again from their sources.
+"""Comparison of a library with its documents rebuilt from their sources.
 
 Only search results are taken from the library: the fields of each instance, and the records of the ledger.
 Everything else follows from these.
@@ -67,7 +67,7 @@ def _models(folder: Path, sidecar: dict[str, Any], made: Files) -> Iterator[Find
         if file["format"] not in FORMATS:
             continue
         if name not in made:
-            yield Finding(name, f"is not what is written as .{file['format']} of this problem")
+            yield Finding(name, f"differs from the .{file['format']} of this problem")
         elif _content(made[name], name) != _content(read_bytes(folder / name), name):
             yield Finding(name, "does not hold the problem that its sidecar describes")
 

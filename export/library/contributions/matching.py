@@ -77,7 +77,7 @@ def _unpacked_head(data: bytes) -> bytes:
 
 
 class Entries:
-    """The entries of a library with their problems, each of which is formulated once."""
+    """The entries of a library with their problems, each formulated once."""
 
     def __init__(self, library: Library) -> None:
         self.library = library

@@ -162,7 +162,7 @@ def _bound(facts: RunFacts, log: RunLog, best: float, entry: str) -> tuple[float
     if facts.bound is not None and log.bound is not None and abs(facts.bound - log.bound) <= slack(log.bound):
         bound, evidence = log.bound, "log"
     elif log.bound is not None and log.ended is not None and bound > log.bound:
-        raise SolutionError(f"the bound {bound!r} is not that of the log, {log.bound!r}; leave the bound out")
+        raise SolutionError(f"the bound {bound!r} differs from the log's, {log.bound!r}; omit the bound")
     if contradicts(bound, best):
         raise SolutionError(
             f"the bound {bound!r} lies above {best!r}, the objective of a feasible point of {entry}; "

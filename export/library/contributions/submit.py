@@ -141,7 +141,7 @@ def _settled(library: Library, progress: Progress) -> Library:
 
 @dataclass
 class _Session:
-    """A submission in progress: the ledger with what was accepted so far."""
+    """A submission in progress: the ledger with all accepted records."""
 
     library: Library
     entry: str | None

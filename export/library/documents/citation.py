@@ -138,7 +138,7 @@ class Terms:
         """One line per sketch with its stated origin."""
         for sketch in self.sketches:
             origin = sketch.origin
-            licence = origin.license or "no licence is stated; ask its author before you share what is here"
+            licence = origin.license or "no licence is stated; ask its author before you share it"
             parts = (
                 licence,
                 origin.author and f"author: {origin.author}",

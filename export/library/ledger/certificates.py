@@ -44,7 +44,7 @@ def certified(start: CrossField, file: str) -> Certified | None:
 
     file: the name under which it is stored.
     """
-    from ....models.proof.prove import prove  # it loads what is compiled
+    from ....models.proof.prove import prove  # loads compiled functions
 
     found = prove(start.instance, start=start, work=_MOST_WORK, jobs=1)
     field = pinned(found.field)

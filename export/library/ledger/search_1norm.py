@@ -38,7 +38,7 @@ def better_in_1norm(start: CrossField, rung: str) -> list[Known]:
 
 
 def _solved(problem: Problem, nodes: int, start: CrossField | None) -> CrossField | None:
-    """The field that HiGHS finds within so many nodes, or None."""
+    """The field that HiGHS finds within a number of nodes, or None."""
     with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
         model, first, answer = (Path(folder) / name for name in ("model.mps", "start.sol", "answer.sol"))
         write(problem, model)

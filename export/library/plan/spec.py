@@ -32,7 +32,7 @@ Read from TOML and checked.
     added = "2026-11-22"               when it came into the library; also of a rung: the later day counts
 
 Files are found from the folder of the specification. The form is library-spec.schema.json beside this module;
-what is checked here are words of tables that the program has, and what several keys say together.
+this module checks names in tables, and combinations of keys.
 """
 
 from __future__ import annotations
@@ -284,7 +284,7 @@ def _of_key(error: Any) -> str | None:
 
 
 def _of_value(error: Any) -> str:
-    """The message about a value; the place of a list's entry is that of the list."""
+    """The message about a value; the place of an entry is the place of its list."""
     place, schema, value = error.json_path[2:], error.schema, shortened(error.instance)
     if not isinstance(error.instance, dict):
         place = re.sub(r"\[\d+\]$", "", place)

@@ -54,12 +54,12 @@ _ROLES: Final = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A displayed field. roles: keys of _ROLES; facts: provenance; told: its singularities."""
+    """A displayed field. roles: keys of _ROLES; facts: provenance; singular: its singularities in words."""
 
     roles: tuple[str, ...]
     facts: dict[str, Any]
     file: str
-    told: str
+    singular: str
 
     @property
     def caption(self) -> str:

@@ -69,5 +69,5 @@ def test_a_process_that_ends_early_ends_the_build_with_its_exit_code():
     with pytest.raises(BuildError) as caught:
         build()
     assert str(caught.value) == (
-        "a process ended before its work was done: it ended with code 3; of a build, what is whole is kept"
+        "a process ended before its work was done: it ended with code 3; complete files are kept"
     )

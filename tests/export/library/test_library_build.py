@@ -668,9 +668,7 @@ def test_a_process_that_dies_ends_the_build_with_one_line_and_whole_files(built,
     assert process.returncode == 1
     assert len(error.splitlines()) == 1
     assert "a process ended before its work was done: it was killed by signal SIGKILL" in error
-    assert (
-        "probably for lack of memory; try fewer jobs or threads; of a build, what is whole is kept" in error
-    )
+    assert "probably for lack of memory; try fewer jobs or threads; complete files are kept" in error
     whole = content(built.folder)
     assert all(whole[name] == data for name, data in content(out).items())
 

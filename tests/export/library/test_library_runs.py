@@ -160,7 +160,7 @@ def test_an_invalid_run_is_refused_in_one_line_and_changes_nothing(built, lib, t
     for files, facts, words in (
         ([], {"entry": MILP, "bound": 1.01 * best}, "lies above .* the objective of a feasible point"),
         ([tmp_path / "higher.log"], {"entry": MILP}, "lies above .* of a feasible point"),
-        ([built / f"{MILP}.log"], {"bound": 1.001 * best}, "is not that of the log"),
+        ([built / f"{MILP}.log"], {"bound": 1.001 * best}, "differs from the log's"),
         ([other], {"entry": MILP}, f"is a log of {OTHER}, not of {MILP}"),
         ([tmp_path / "larger.log"], {"entry": MILP}, "is a log of a model of .* columns"),
         ([tmp_path / "none.log"], {"entry": MILP}, "is no solution, field, certificate, log"),
