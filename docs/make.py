@@ -216,8 +216,8 @@ def misprints_in_short(facets: list[list[str]], gauges: list[list[str]], angles:
     between = {gauge: degrees for gauge, _, _, degrees in angles}
     return (
         f"With (26) as printed, the optimum is too low in {len(lower)} of {len(seeds)} instances, and its "
-        f"field has up to {worst:.1f} times the minimum 1-norm energy. With the box (1), the optimum is higher in "
-        f"{higher} of {len(sketches)} sketches, and a rotation by 90 degrees changes it in "
+        f"field has up to {worst:.1f} times the minimum 1-norm energy. With the box (1), the optimum is "
+        f"higher in {higher} of {len(sketches)} sketches, and a rotation by 90 degrees changes it in "
         f"{changed}. The lines at a single stroke of 120 degrees are {between['box']} degrees apart with the "
         f"box, and {between['strokes']} degrees with the window around the stroke."
     )

@@ -47,11 +47,12 @@ def compile_proofs(folder: Path, deadline: Deadline) -> None:
     except WorkerError as error:
         if isinstance(error, KilledError) and error.interrupted:
             raise KeyboardInterrupt from error
-        raise SolverError(
-            f"the functions of proofs, which are compiled once on a machine, were not ready: {error}; "
-            "the next run continues",
-            file=log,
-        ) from error
+        if isinstance(error, KilledError):
+            raise SolverError(
+                "the functions of proofs are compiled once per machine, and the time limit ended this; run "
+                "it again to continue, or raise --time-limit"
+            ) from error
+        raise SolverError(f"the functions of proofs were not compiled: {error}", file=log) from error
 
 
 def is_compiled() -> bool:
