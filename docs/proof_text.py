@@ -92,7 +92,7 @@ The checkerboard makes this sharp where it matters: at the best known field each
 the middle between two values of its grid, where the variance is $h^2/4$ and nothing is given away. For
 strokes the same is reached in another way: on black pixels, where the best known cross is a label, the line
 $u$ may lose $0$ at labels with $k + l = 0$, $h^2$ where $|k + l| = 1$ and $h^2/2$ elsewhere; the mean of that
-is at least the variance in every cell (`models/proof/costs.py`).
+is at least the variance in every cell (`models/proof/lattice.py`).
 
 ### 4. Any shares give a bound
 

@@ -1,7 +1,7 @@
 """The lattice of the 1-norm: one for all pixels, on which pairs lose nothing.
 
 alpha and beta of every label are multiples of h, and h divides pi/4. So the differences A and B of two
-labels are multiples of h too, at every jump. Round crosses by thresholds as in models/proof/costs.py: A
+labels are multiples of h too, at every jump. Round crosses by thresholds as in check_certificate.py, 2: A
 and B each become one of two neighbouring multiples of h with the right mean. |.| is linear between them,
 and so it is for beta. Hence
 
@@ -32,13 +32,13 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..field.field import CrossField, Norm
 from ..instance.angles import wrap
 from ..instance.grid import Floats
 from ..instance.instance import HALF
-from ..smooth.systems import stroke_weight
-from .lattice import Lattice, few_unreached, reached, strip
+from .lattice import Lattice, reached, whole_ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,38 +57,29 @@ class CommonLattice(Lattice):
 
         steps: an even number. alpha covers pi/2 round the multiple of h nearest to the field's alpha.
         """
-        h, size = HALF / steps, field.instance.grid.size
-        known, beta = reached(field.instance), np.zeros(size)
-        alpha = h * np.round(field.alpha * known / h)
-        beta_first, beta_last = strip(beta, h, beta)
-        alpha_first, alpha_count = np.full(size, -steps // 2, np.int32), np.full(size, steps + 1, np.int32)
-        ranges = few_unreached(known, alpha_first, alpha_count, beta_first, beta_last - beta_first + 1)
-        allowed = np.ones(int((ranges[1].astype(np.int64) * ranges[3]).sum()), dtype=bool)
-        return cls(field.instance, h, alpha, beta, field.p, *ranges, allowed, slopes)
+        h, beta = HALF / steps, np.zeros(field.instance.grid.size)
+        alpha = h * np.round(field.alpha * reached(field.instance) / h)
+        ranges = whole_ranges(field.instance, beta, h, beta)
+        return cls(field.instance, h, alpha, beta, field.p, slopes=slopes, **ranges)
 
     @cached_property
     def offset(self) -> Floats:
         """0 at every pixel, shape (n,)."""
         return np.zeros(self.instance.grid.size)
 
-    def unary_costs(self) -> Floats:
-        """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
-        cost: Floats = self.instance.skew_coefficient * np.abs(self.angles[1])
-        weight = stroke_weight(self.instance)[self.pixel]
-        at = np.flatnonzero(weight)
-        pixel, alpha, beta = self.pixel[at], self.angles[0][at], self.angles[1][at]
-        target, slope = np.zeros((2, self.instance.grid.size))
-        target[self.instance.stroke_index], slope[self.instance.stroke_index] = (
-            self.instance.target,
-            self.slopes,
-        )
-        u = self._misfit(alpha + beta - target[pixel], slope[pixel])
-        v = self._misfit(alpha + HALF - beta - target[pixel], np.zeros(len(at)))
-        cost[at] += weight[at] * np.minimum(u, v)
-        return np.where(self.allowed, cost, np.inf)
+    def _skew(self, beta: Floats) -> Floats:
+        return np.abs(beta)
 
-    def _misfit(self, r: Floats, slope: Floats) -> Floats:
+    def _misfit(self, at: NDArray[np.int64], alpha: Floats, beta: Floats) -> Floats:
+        target, slope = np.zeros((2, self.instance.grid.size))
+        target[self.instance.stroke_index] = self.instance.target
+        slope[self.instance.stroke_index] = self.slopes
+        pixel = self.pixel[at]
+        u = self._away(alpha + beta - target[pixel], slope[pixel])
+        v = self._away(alpha + HALF - beta - target[pixel], np.zeros(len(at)))
+        return np.minimum(u, v)
+
+    def _away(self, r: Floats, slope: Floats) -> Floats:
         """The cost d(R) of a line, slightly reduced where rounding could increase it."""
         r = wrap(r, -HALF, np.pi)
-        found: Floats = np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)
-        return found
+        return np.where(np.abs(r) >= 2 * self.h * (1 + 1e-12) + 1e-12, np.abs(r), slope * r)

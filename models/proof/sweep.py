@@ -33,7 +33,6 @@ from ..instance.grid import Floats, Grid
 from ..processes.compiled import compiled
 from ..processes.crew import Crew
 from ..processes.deadline import Over, never
-from .costs import unary_costs
 from .lattice import Lattice
 from .products import add, pair_minimum, pixel_pass, share_of
 from .state import Indices, State
@@ -180,7 +179,7 @@ def _carry_on(shares: Floats, before: NDArray[np.float32], part: float) -> None:
 
 def _state(lattice: Lattice, first: Floats | None, second: Floats | None) -> State:
     grid = lattice.instance.grid
-    unary = unary_costs(lattice)
+    unary = lattice.unary_costs()
     start_first, start_second = lattice.share_starts(grid.first), lattice.share_starts(grid.second)
     return State(
         lattice.h,
