@@ -30,7 +30,7 @@ from ..processes.progress import Progress
 from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import first_field, polyvector_start
-from .certificate_pace import certificate_effort, checking_pace
+from .certificate import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
 from .lattice import Lattice, reached
