@@ -88,10 +88,10 @@ def prove(
     given = limits or Limits(math.inf, gap=0.0)
     began = time.monotonic()
     with interruptible() as interrupted, crew(given.threads or jobs) as hands:
+        asked = stop_function(stop)
         own = WorkLimits(
             given.deadline(),
-            interrupted,
-            stop_function(stop),
+            lambda: interrupted() or asked(),
             given.gap,
             certified and norm == 2,
             work or math.inf,

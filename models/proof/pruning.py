@@ -46,6 +46,12 @@ class RemainingCells:
     beta_low: Floats
     beta_high: Floats
 
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Least and greatest (alpha, beta) of the boxes, shapes (2n,)."""
+        low = np.concatenate([self.alpha_low, self.beta_low])
+        return low, np.concatenate([self.alpha_high, self.beta_high])
+
 
 def remaining_cells(dual: Dual, bound: float, energy: float) -> RemainingCells:
     """The cells that a level leaves below an energy, after a forward pass of the dual."""

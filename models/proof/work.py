@@ -13,7 +13,6 @@ the least of their bounds is that of all.
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
@@ -66,19 +65,18 @@ _ROUNDS: Final = 5  # of a search without a limit of time
 
 @dataclass
 class WorkLimits:
-    """When to end: a deadline, whether the user or the caller asks for it, a sufficient gap, enough work.
+    """When to end: a deadline, a request to stop, a sufficient gap, enough work.
 
-    whole: the deadline of proof and certificate. certified: whether there is a certificate to write. work:
+    whole: the deadline of proof and certificate. certified: whether to keep time for a certificate. work:
     greatest number of labels; labels: those so far. pace: greatest measured seconds per unit of the
     certificate's effort. kept: the seconds that the certificate is expected to take.
     """
 
     whole: Deadline
-    interrupted: Over
     stop: Over
     gap: float
     certified: bool
-    work: float = math.inf
+    work: float
     labels: int = 0
     pace: float = 0.0
     kept: float = 0.0
@@ -102,15 +100,15 @@ class WorkLimits:
         self.kept = seconds if self.certified else 0.0
 
     def met(self) -> str:
-        """Which limit is met; empty when none is."""
-        if self.interrupted() or self.stop():
+        """The limit that is met; empty when none is."""
+        if self.stop():
             return "interrupted"
         if self.labels > self.work:
             return "work"
         return "time" if self.deadline.passed() else ""
 
     def over(self, ahead: float = 0.0) -> bool:
-        """Whether work has to end now, or within so many seconds."""
+        """Whether work has to end now, or within `ahead` seconds."""
         return bool(self.met()) or self.deadline.left() <= ahead
 
 
