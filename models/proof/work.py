@@ -28,7 +28,7 @@ from ..processes.deadline import Deadline, Over, never
 from ..processes.progress import Progress
 from ..search.improvement import improved_field
 from ..search.search import search_patches
-from ..search.starts import first_field, polyvector_start
+from ..search.starts import best_start, polyvector_start
 from .certificate import certificate_effort, checking_pace
 from .check_certificate import MOST_LEVELS
 from .forced import Forced, forced
@@ -113,13 +113,8 @@ class WorkLimits:
 
 
 def first_of(instance: Instance, given: CrossField | None, over: Over) -> CrossField:
-    """The best of the first field, of what the user gives and, in time, of the PolyVector start, improved."""
-    fields = [first_field(instance, over)]
-    if given is not None:
-        fields.append(improved_field(given, stop=over))
-    if not over():
-        fields.append(improved_field(polyvector_start(instance, over), stop=over))
-    return min(fields, key=lambda field: round(field.energy().total, 9))
+    """The best of the first field, of the user's field and, in time, of the PolyVector start, improved."""
+    return best_start(instance, given, over, polyvector_start)
 
 
 @dataclass

@@ -19,9 +19,10 @@ from ..errors import CrossfieldError
 from ..field.field import CrossField
 from ..field.jumps import best_jumps, parity_sign
 from ..instance.grid import Floats, Ints
-from ..instance.instance import HALF, QUARTER, Instance
+from ..instance.instance import HALF, Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
+from .box_qp import bounds
 
 _BETTER = 1e-9  # relative: rounding is no improvement
 
@@ -47,13 +48,7 @@ class Residuals:
         return cls(
             sparse.vstack([a, b, r, skew], format="csr"),
             np.concatenate([HALF * p, np.zeros(m), -strokes.goal, np.zeros(n)]),
-            np.concatenate(
-                [
-                    np.full(2 * m, 2.0),
-                    strokes.weight,
-                    np.full(n, instance.skew_coefficient),
-                ]
-            ),
+            np.concatenate([np.full(2 * m, 2.0), strokes.weight, np.full(n, instance.skew_coefficient)]),
         )
 
     def bound(self, multipliers: Floats, lower: Floats, upper: Floats) -> float:
@@ -116,13 +111,7 @@ def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
     stroke, relative to its weight.
     """
     instance, m = field.instance, len(field.p)
-    quarter = np.full(instance.grid.size, QUARTER)
-    fit = LinearFit.of(
-        instance,
-        field.p,
-        np.concatenate([instance.alpha_lower, -quarter]),
-        np.concatenate([instance.alpha_upper, quarter]),
-    )
+    fit = LinearFit.of(instance, field.p, *bounds(instance))
     alpha, beta = np.split(fit.x, 2)
     strokes = fit.multipliers[2 * m : 2 * m + len(instance.theta)]
     return CrossField(instance, alpha, beta, field.p), strokes

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..field.field import CrossField
 from ..instance.grid import Floats
-from ..instance.instance import QUARTER
+from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
 from .energy import LinearSolver, Quadratic, energy_at
@@ -35,17 +35,25 @@ def fitted(field: CrossField, over: Over = never) -> CrossField:
     bound balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. If time is over before,
     the best angles so far are returned.
     """
-    instance = field.instance
+    energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
+    alpha, beta = np.split(least_in_box(energy, x, *bounds(field.instance), over=over), 2)
+    return CrossField(field.instance, alpha, beta, field.p)
+
+
+def bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """Least and greatest (alpha, beta) of a field, shapes (2n,)."""
     quarter = np.full(instance.grid.size, QUARTER)
-    x = least_in_box(
-        energy_at(instance, field.p),
-        np.concatenate([field.alpha, field.beta]),
-        np.concatenate([instance.alpha_lower, -quarter]),
-        np.concatenate([instance.alpha_upper, quarter]),
-        over=over,
-    )
-    alpha, beta = np.split(x, 2)
-    return CrossField(instance, alpha, beta, field.p)
+    lower = np.concatenate([instance.alpha_lower, -quarter])
+    return lower, np.concatenate([instance.alpha_upper, quarter])
+
+
+def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
+    """As `bounds`, with alpha bounded only at strokes."""
+    lower, upper = bounds(instance)
+    free = np.ones(instance.grid.size, dtype=bool)
+    free[instance.stroke_index] = False
+    lower[: len(free)][free], upper[: len(free)][free] = -np.inf, np.inf
+    return lower, upper
 
 
 @one_thread()
@@ -61,11 +69,9 @@ def least_in_box(
 ) -> Floats:
     """The point of least energy with lower <= x <= upper, shapes (2n,), searched from x.
 
-    Bounds may be infinite.
-
-    Rounding, 500 steps, or the end of time stop the search too and return the best point so far.
+    Bounds may be infinite. The search also ends when rounding decides, after 500 steps, or when time is over.
     tolerance: the largest remaining slope that no bound balances, relative to 1 + the largest entry of b.
-    solver: a solver that was used for a similar system, which saves a factorisation.
+    solver: one that was used for a similar system, which saves a factorisation.
     """
     solver = LinearSolver() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.vector).max())

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..field.field import CrossField, relabelled
 from ..instance.grid import Floats, Ints
-from ..instance.instance import QUARTER, Instance
+from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from .box_qp import fitted
 
@@ -53,12 +53,3 @@ class FreeField:
     def bounded(self, over: Over = never) -> CrossField:
         """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
         return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)
-
-
-def free_bounds(instance: Instance) -> tuple[Floats, Floats]:
-    """Least and greatest (alpha, beta), shapes (2n,): alpha is bounded only at strokes."""
-    size, at = instance.grid.size, instance.stroke_index
-    lower = np.concatenate([np.full(size, -np.inf), np.full(size, -QUARTER)])
-    upper = -lower
-    lower[at], upper[at] = instance.alpha_lower[at], instance.alpha_upper[at]
-    return lower, upper

@@ -31,8 +31,8 @@ from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from ..smooth.systems import PULL
+from .box_qp import free_bounds
 from .energy import energy_at
-from .free_field import free_bounds
 from .patch_energy import PatchEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
@@ -111,7 +111,7 @@ class Landscape:
         self._defined = PatchEnergy(patch.instance, patch.pixels, x, p)
         soft = max(PULL, _SOFTEST - patch.instance.skew_coefficient)
         self._soft = np.repeat([PULL, soft], len(patch.pixels))
-        self._lower, self._upper = _bounds(patch)
+        self._lower, self._upper = (each[patch.unknowns] for each in free_bounds(patch.instance))
         self._held: dict[int, float] = {}
         self._solve()
         self._settle()
@@ -193,8 +193,9 @@ class Landscape:
         self._x += moved
         places, added = self._couplings(pairs, steps)
         if len(places):
-            small = self._small(places, added)
+            # With C = `added`, H + C has the inverse G - G C (1 + G C)^-1 G.
             columns = self._inverse[:, places]
+            small = added @ np.linalg.inv(np.eye(len(places)) + columns[places] @ added)
             here = self._x[places]
             self.energy += float(here @ small @ here)
             self._x -= columns @ (small @ here)
@@ -263,12 +264,6 @@ class Landscape:
         added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.patch.pairs[odd]])
         return places + len(self.patch.pixels), added
 
-    def _small(self, places: Ints, added: Floats) -> Floats:
-        """C (1 + G C)^-1 for added couplings C: H + C has the inverse G - G (...) G."""
-        inside = self._inverse[np.ix_(places, places)]
-        small: Floats = added @ np.linalg.inv(np.eye(len(places)) + inside @ added)
-        return small
-
     def _update(self, factor: float, left: Floats, right: Floats) -> None:
         self._inverse = dgemm(factor, left, right, beta=1.0, c=self._inverse, trans_b=1, overwrite_c=1)
 
@@ -303,9 +298,3 @@ class Landscape:
         self.energy += share * off * off
         self._x += column[:, 0] * (share * off)
         self._update(-share, column, column)
-
-
-def _bounds(patch: Patch) -> tuple[Floats, Floats]:
-    """Least and greatest angles of the patch, shapes (2k,)."""
-    lower, upper = free_bounds(patch.instance)
-    return lower[patch.unknowns], upper[patch.unknowns]

@@ -25,13 +25,14 @@ from ..processes.progress import Progress, silent
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
 from ..smooth.systems import one_thread
+from .box_qp import free_bounds
 from .coarse import halved, prolonged
 from .energy import LinearSolver
-from .free_field import FreeField, free_bounds
+from .free_field import FreeField
 from .improvement import improved_field, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
-from .starts import first_field, polyvector_start
+from .starts import best_start, polyvector_start, rounded_energy
 from .walk import LOWER, Explored, Task, explore
 
 Suggest = Callable[[CrossField, Callable[[], float], Over], CrossField]
@@ -180,23 +181,9 @@ def _from_coarse(
 
 
 def _start(instance: Instance, given: CrossField | None, limits: _Limits) -> CrossField:
-    """The best of first field, given field and, in time, PolyVector and power field, or a suggestion from it.
-
-    Each is improved in time.
-    """
-    fields = [first_field(instance, limits.over)]
-    if given is not None:
-        fields.append(improved_field(given, stop=limits.over))
-    if not limits.over():
-        fields.append(improved_field(polyvector_start(instance, limits.over), stop=limits.over))
-    if not limits.over():
-        fields.append(improved_field(power_field(instance), stop=limits.over))
-    best = min(fields, key=_energy)
+    """The best start, or what is suggested from it."""
+    best = best_start(instance, given, limits.over, polyvector_start, lambda each, _: power_field(each))
     return best if limits.over() else limits.suggest(best, limits.deadline.left, limits.over)
-
-
-def _energy(field: CrossField) -> float:
-    return round(field.energy().total, 9)
 
 
 class _Hunt:
@@ -222,7 +209,7 @@ class _Hunt:
     def best(self, over: Over) -> CrossField:
         """The field of least energy so far."""
         self._settle(over)
-        return min(self._state.bounded(over), self._start, key=_energy)
+        return min(self._state.bounded(over), self._start, key=rounded_energy)
 
     @property
     def large(self) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import GAUGES
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.search.free_field import free_bounds
+from crossfield.models.search.box_qp import free_bounds
 from crossfield.models.search.improvement import stroke_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.perturbations import Perturbations
