@@ -20,9 +20,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
+from .control import Stop, Task, WorkerError, reason, send
 from .deadline import Deadline, Over, never
 from .groups import KILLED, ending, kill, start
-from .messages import Stop, Task, WorkerError, reason, send
 
 GRACE: Final = 0.5
 GRACE_SHARE: Final = 0.05

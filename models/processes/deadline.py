@@ -1,4 +1,4 @@
-"""End of work: created once from a limit and passed down, so that every part can ask for the time left.
+"""Deadlines, requests to stop and reports of progress of work, which all its parts receive.
 
 Work that may be cut off checks the deadline at every good place, and then returns its present result.
 """
@@ -16,14 +16,17 @@ from ..errors import InputError
 Clock = Callable[[], float]
 
 Over = Callable[[], bool]
-"""Returns whether work has to end now. Work calls it at every good place, then returns its present result."""
+"""Returns whether work has to end now."""
+
+Progress = Callable[[str], None]
+"""Receives one line that describes the current step."""
 
 
 class Event(Protocol):
     """Interface of `threading.Event` and `multiprocessing.Event`."""
 
     def is_set(self) -> bool:
-        """Return whether the event has happened."""
+        """Whether the event has happened."""
 
 
 Stop = Callable[[], bool] | Event
@@ -51,6 +54,10 @@ def stop_function(stop: Stop | None) -> Over:
 def never() -> bool:
     """Return False: the work runs to its own end, and its result depends only on its input."""
     return False
+
+
+def silent(_line: str) -> None:
+    """Ignore a report of progress."""
 
 
 @dataclass(frozen=True)

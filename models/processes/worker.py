@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from . import control
-from .messages import Stop, Task, WorkerError, reason, send
+from .control import Stop, Task, WorkerError, reason, send
 
 
 def main() -> None:

@@ -30,8 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.grid import Floats, Grid
-from ..processes.compiled import compiled
-from ..processes.crew import Crew
+from ..processes.compiled import Crew, compiled
 from ..processes.deadline import Over, never
 from .lattice import Lattice
 from .products import add, pair_minimum, pixel_pass, share_of

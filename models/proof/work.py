@@ -23,9 +23,8 @@ import numpy as np
 from ..field.field import CrossField, Norm, relabelled
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
-from ..processes.crew import Crew
-from ..processes.deadline import Deadline, Over, never
-from ..processes.progress import Progress
+from ..processes.compiled import Crew
+from ..processes.deadline import Deadline, Over, Progress, never
 from ..search.improvement import improved_field
 from ..search.search import search_patches
 from ..search.starts import best_start, polyvector_start

@@ -16,8 +16,7 @@ from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
-from ..processes.deadline import Over, Stop, never, stop_function
-from ..processes.progress import Progress, silent
+from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
 from ..smooth.systems import locally, one_thread
 from .energy import CLOSE, LinearSolver, energy_at
 from .free_field import FreeField

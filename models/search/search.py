@@ -19,9 +19,8 @@ from ..errors import InputError
 from ..field.field import CrossField
 from ..instance.grid import Bools
 from ..instance.instance import Instance
-from ..processes.deadline import Deadline, Over, never
-from ..processes.interruption import interruptible
-from ..processes.progress import Progress, silent
+from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..processes.groups import interruptible
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
 from ..smooth.systems import one_thread

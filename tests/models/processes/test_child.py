@@ -11,8 +11,8 @@ import pytest
 import work
 from children import all_end, descendants
 from crossfield.models.processes.child import Child, KilledError
+from crossfield.models.processes.control import WorkerError
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.processes.messages import WorkerError
 
 
 class Clock:

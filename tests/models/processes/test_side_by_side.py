@@ -13,7 +13,7 @@ import pytest
 from children import all_end, descendants
 from crossfield.models.errors import InputError
 from crossfield.models.processes import side_by_side as module
-from crossfield.models.processes.messages import WorkerError
+from crossfield.models.processes.control import WorkerError
 from crossfield.models.processes.side_by_side import MOST, checked, side_by_side
 
 

@@ -44,7 +44,7 @@ def test_levels_bound_any_field_from_any_slopes():
 
 
 def lattice_bound(lattice):
-    from crossfield.models.processes.crew import crew
+    from crossfield.models.processes.compiled import crew
     from crossfield.models.proof.sweep import Dual
 
     with crew(1) as hands:
