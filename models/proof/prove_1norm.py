@@ -1,4 +1,4 @@
-"""The work of a proof in the 1-norm: as in models/proof/work.py, on the lattices of common_lattice.py.
+"""The work of a proof in the 1-norm: as in models/proof/work.py, on a `CommonLattice`.
 
 Once a level's boxes leave no choice of jumps, a linear program gives the energy on them, except for strokes
 at the edges of their windows. Its multipliers prove its least value.
@@ -24,8 +24,8 @@ from ..instance.grid import Floats
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
 from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
-from .common_lattice import CommonLattice
 from .forced import Forced, at_pairs
+from .lattice import CommonLattice
 from .pruning import RemainingCells
 from .work import COARSEST, Work, first_of
 

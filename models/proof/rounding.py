@@ -17,8 +17,8 @@ from ..instance.grid import Bools, Floats
 from ..instance.instance import QUARTER
 from ..processes.compiled import compiled
 from ..processes.deadline import Over, never
+from ..search.box_qp import FreeField
 from ..search.energy import LinearSolver
-from ..search.free_field import FreeField
 from ..search.improvement import improved_field, settle
 from .products import add, share_of, sized
 from .state import Indices, State

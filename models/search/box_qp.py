@@ -8,12 +8,13 @@ found, one step leads to the minimum.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from ..field.field import CrossField
-from ..instance.grid import Floats
+from ..field.field import CrossField, relabelled
+from ..instance.grid import Floats, Ints
 from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
 from ..smooth.systems import one_thread
@@ -99,3 +100,44 @@ def _falls(energy: Quadratic, slope: Floats, step: Floats) -> bool:
     """Whether a nonzero step lowers the energy by a fair share of the decrease that the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised
+
+
+@dataclass(eq=False)
+class FreeField:
+    """A field under construction: angles that may be any real numbers, jumps without ranges.
+
+    Windows and ranges of an instance make the label of a cross unique, but hinder growth and search.
+    """
+
+    instance: Instance
+    alpha: Floats
+    beta: Floats
+    p: Ints
+
+    @classmethod
+    def of(cls, field: CrossField) -> FreeField:
+        """The same angles and jumps, free to change."""
+        return cls(field.instance, field.alpha, field.beta, field.p)
+
+    @property
+    def x(self) -> Floats:
+        """Both angles, (alpha, beta), shape (2n,)."""
+        return np.concatenate([self.alpha, self.beta])
+
+    @x.setter
+    def x(self, value: Floats) -> None:
+        self.alpha, self.beta = np.split(value, 2)
+
+    @property
+    def field(self) -> CrossField:
+        """The same angles and jumps as a field."""
+        return CrossField(self.instance, self.alpha, self.beta, self.p)
+
+    @property
+    def energy(self) -> float:
+        """The 2-norm energy."""
+        return self.field.energy().total
+
+    def bounded(self, over: Over = never) -> CrossField:
+        """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
+        return fitted(relabelled(self.instance, self.alpha, self.beta, self.p), over)

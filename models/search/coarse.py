@@ -17,8 +17,8 @@ from ..field.jumps import parity_sign, stepped
 from ..instance.grid import Floats, Ints
 from ..instance.instance import HALF, MOST_WEIGHT, Instance
 from ..processes.deadline import Over, never
+from .box_qp import FreeField
 from .energy import LinearSolver
-from .free_field import FreeField
 from .improvement import improved_field, settle
 
 _ALIGNED = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel

@@ -18,8 +18,8 @@ from ..instance.grid import Bools, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
 from ..smooth.systems import locally, one_thread
+from .box_qp import FreeField
 from .energy import CLOSE, LinearSolver, energy_at
-from .free_field import FreeField
 from .nearest_stroke import nearest_strokes
 
 _CLOSE_UP_TO: Final = (

@@ -20,9 +20,8 @@ from ..instance.grid import Ints
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, Stop, never, stop_function
 from ..smooth.systems import one_thread
-from .box_qp import free_bounds, least_in_box
+from .box_qp import FreeField, free_bounds, least_in_box
 from .energy import CLOSE, LinearSolver, energy_at
-from .free_field import FreeField
 from .nearest_stroke import chamfer, nearest_strokes
 
 FALL: Final = 1e-9

@@ -14,7 +14,7 @@ costs one update of G. Angles outside the patch stay as they are; the energy is 
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
-from its definition (models/search/patch_energy.py). If the updates give another energy, G is computed anew.
+from its definition (`PatchEnergy`). If the updates give another energy, G is computed anew.
 Gains that no energy can have are discarded too.
 """
 
@@ -27,13 +27,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
+from ..field.field import CrossField
 from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, Instance
 from ..smooth.systems import PULL
 from .box_qp import free_bounds
 from .energy import energy_at
-from .patch_energy import PatchEnergy
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)
 """Changes of one jump in the rows of `gains`."""
@@ -89,6 +89,44 @@ class Patch:
     def unknowns(self) -> Ints:
         """Places of the patch's angles in (alpha, beta), shape (2k,)."""
         return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
+
+
+class PatchEnergy:
+    """The 2-norm energy by its definition, free of errors of updates, where only a patch changes."""
+
+    def __init__(self, instance: Instance, pixels: Ints, x: Floats, p: Ints) -> None:
+        """Take over angles x (2n,) and jumps p (m,); those outside the pixels (k,) stay."""
+        grid, free = instance.grid, np.zeros(len(x) // 2, dtype=bool)
+        free[pixels] = True
+        self._instance = instance
+        self._pairs = np.nonzero(free[grid.first] | free[grid.second])[0].astype(np.int32)
+        ends = np.concatenate([grid.first[self._pairs], grid.second[self._pairs]])
+        # Local numbers: the pixels of the patch, and then those beside it, whose angles stay.
+        beside = np.setdiff1d(ends, pixels)
+        number = np.zeros(grid.size, dtype=np.int32)
+        number[np.concatenate([pixels, beside])] = np.arange(len(pixels) + len(beside))
+        self._first, self._second = np.split(number[ends], 2)
+        alpha, beta = np.split(x, 2)
+        self._alpha, self._beta = alpha[beside], beta[beside]
+        strokes = np.nonzero(free[instance.stroke_terms.pixel])[0].astype(np.int32)
+        self._strokes = instance.stroke_terms.chosen(strokes, number)
+        field, terms = CrossField(instance, alpha, beta, p), instance.stroke_terms
+        pair = field.residual_a**2 + field.residual_b**2
+        stroke = terms.weight * terms.residuals(alpha, beta) ** 2
+        pair[self._pairs], stroke[strokes] = 0.0, 0.0
+        skew = instance.skew_coefficient * (beta[~free] ** 2).sum()
+        self._rest = float(2 * pair.sum() + stroke.sum() + skew)
+
+    def __call__(self, x: Floats, p: Ints) -> float:
+        """The energy at the patch's angles x (2k,) and the jumps p (m,) of the whole field."""
+        inside = np.split(x, 2)
+        alpha, beta = np.concatenate([inside[0], self._alpha]), np.concatenate([inside[1], self._beta])
+        jumps = p[self._pairs]
+        a = alpha[self._first] - alpha[self._second] + HALF * jumps
+        b = parity_sign(jumps) * beta[self._first] - beta[self._second]
+        r = self._strokes.residuals(alpha, beta)
+        skew = self._instance.skew_coefficient * float(inside[1] @ inside[1])
+        return self._rest + 2 * float(a @ a + b @ b) + float(self._strokes.weight @ (r * r)) + skew
 
 
 class Landscape:

@@ -24,10 +24,9 @@ from ..processes.groups import interruptible
 from ..processes.side_by_side import checked, side_by_side
 from ..smooth.power_field import power_field
 from ..smooth.systems import one_thread
-from .box_qp import free_bounds
+from .box_qp import FreeField, free_bounds
 from .coarse import halved, prolonged
 from .energy import LinearSolver
-from .free_field import FreeField
 from .improvement import improved_field, settle, stroke_curves
 from .landscape import Point
 from .nearest_stroke import nearest_strokes

@@ -21,10 +21,9 @@ from ..instance.instance import Instance
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from ..smooth.systems import locally, one_thread
-from .box_qp import fitted, free_bounds
+from .box_qp import FreeField, fitted, free_bounds
 from .coarse import CREEP, halved, lifted
 from .energy import LinearSolver, energy_at
-from .free_field import FreeField
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
 

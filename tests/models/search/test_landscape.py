@@ -13,10 +13,9 @@ from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.box_qp import free_bounds
 from crossfield.models.search.improvement import stroke_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
-from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.search import _Hunt
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import explore
+from crossfield.models.search.walk import Perturbations, explore
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits

@@ -17,9 +17,8 @@ from crossfield.models.search.coarse import halved, prolonged
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field, stroke_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
-from crossfield.models.search.perturbations import Perturbations
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import Task, explore
+from crossfield.models.search.walk import Perturbations, Task, explore
 from exhaustive import exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
