@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
@@ -25,15 +25,10 @@ _MADE: Final[list[Any]] = []
 
 
 def compiled(work: _Work) -> _Work:
-    """The function compiled on its first call, and cached on disk where a folder is writable.
-
-    It runs without Python's lock.
-    """
-    made: Any
-    try:
-        made = numba.njit(cache=True, error_model="numpy", nogil=True)(work)
-    except RuntimeError:  # no folder is writable
-        made = numba.njit(error_model="numpy", nogil=True)(work)
+    """The function compiled on its first call, and cached on disk where a folder is writable."""
+    made: Any = numba.njit(error_model="numpy", nogil=True)(work)
+    with suppress(RuntimeError):  # no folder is writable
+        made.enable_caching()
     _MADE.append(made)
     return cast("_Work", made)
 

@@ -34,14 +34,7 @@ Stop = Callable[[], bool] | Event
 
 
 def stop_function(stop: Stop | None) -> Over:
-    """Return a request to stop as a function; for None it never stops.
-
-    Raises
-    ------
-    InputError
-        When `stop` is neither a function nor an event.
-
-    """
+    """A request to stop as a function; for None it never stops. Raises InputError for other values."""
     if stop is None:
         return never
     if callable(stop):
@@ -88,10 +81,7 @@ class Deadline:
         return self.left() == 0.0
 
     def steps(self) -> Over:
-        """Return a function to call before each of some equal steps of work.
-
-        It returns whether the deadline would pass during the next step, if that took as long as the last one.
-        """
+        """A function that returns whether the deadline would pass during a step as long as the last one."""
         began = [self.clock()]
 
         def over() -> bool:

@@ -49,10 +49,7 @@ _MOST_32: Final = 2**31 - 1
 _ADDITIONS: Final = 340_000.0  # of the checker, per unit of effort
 _LABELS: Final = 3_200.0  # compressed per unit of effort
 _SPARE_TIME: Final = 1.4  # factor for the rest of a check, and for a load that rises meanwhile
-_SPARE: Final = 1e-10
-"""Share of the checked bound that a claimed bound gives up, relative to 1 + bound, because other
-processors round differently.
-"""
+_SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: other processors round otherwise
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +178,7 @@ def read_certificate(path: str | Path, *, on: Instance | None = None) -> Certifi
 
 
 def _field(arrays: Arrays) -> CrossField:
-    """The field of a certificate, whose arrays must equal those of field and instance exactly.
-
-    An instance rounds its arguments. A certificate of other numbers proves nothing about the rounded ones.
-    """
+    """The field of a certificate; its instance must not round the arrays, which alone are proven."""
     parts = {name.removeprefix(_PREFIX): array for name, array in arrays.items() if name.startswith(_PREFIX)}
     field = CrossField(of_arrays(parts), arrays["alpha"], arrays["beta"], arrays["p"])
     written = arrays_of(field.instance)

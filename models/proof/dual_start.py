@@ -101,12 +101,9 @@ def suggested(
 ) -> CrossField:
     """A field of no more energy: itself, or one rounded from the dual of the coarsest lattice round it.
 
-    left: seconds that are left; with few of them, and for very small and large grids, it is the field itself.
-    over: whether the time is over. Any number of threads gives the same field.
+    left: returns the seconds that are left. Any number of threads gives the same field.
     """
-    if not _FEWEST < field.instance.grid.size <= _MOST:
-        return field
-    if left() < _LEAST_SECONDS:
+    if not _FEWEST < field.instance.grid.size <= _MOST or left() < _LEAST_SECONDS:
         return field
     # Code that Numba compiles is loaded only here: it takes a second.
     from ..processes.compiled import all_compiled, crew

@@ -50,10 +50,7 @@ class Forced:
         return bool(self.pairs.all() and self.strokes.all())
 
     def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:
-        """The field that minimises the quadratic of the lowest piece, and a lower bound of the energy on all.
-
-        Pieces with a bound of `energy` are not cut.
-        """
+        """The minimum of the lowest piece, and a bound of all; pieces with a bound of `energy` stay whole."""
         lines = np.zeros(len(self.strokes), dtype=np.int32)
         waiting = [(-np.inf, Piece(self.left, lines))]
         found: list[tuple[float, CrossField]] = []
@@ -94,10 +91,7 @@ class Piece:
         return field, value - _ROUNDING * (1 + abs(value))
 
     def cut(self, field: CrossField) -> list[Piece]:
-        """The piece cut at both edges of the window of the stroke with the largest deduction.
-
-        Empty if it crosses no edge.
-        """
+        """The piece cut at the edges of the window of the stroke with the largest deduction, if any."""
         above, below = self._beyond()
         if not (above + below).any():
             return []

@@ -87,12 +87,7 @@ def finer(left: RemainingCells) -> Lattice:
 
 
 def branches(dual: Dual, count: int) -> list[Dual]:
-    """The dual on parts of its lattice that together hold all its cells; the alpha of one pixel is cut.
-
-    The dual determines the alpha of this pixel least: the dearest alpha costs least there, at its best
-    beta. Where a vortex may be in many places, it is the pixel in their middle. Empty if there is nothing to
-    cut.
-    """
+    """The dual on parts of its lattice, cut at the alpha of one pixel; empty if there is nothing to cut."""
     dual.backward()
     pixel, lattice = _least_known(dual), dual.lattice
     begin, end = lattice.start[pixel : pixel + 2]
@@ -112,7 +107,7 @@ def branches(dual: Dual, count: int) -> list[Dual]:
 
 
 def _least_known(dual: Dual) -> int:
-    """The pixel whose dearest alpha costs least, after a pass."""
+    """The pixel whose alpha the dual determines least, after a pass: the dearest alpha costs least there."""
     lattice, theta = dual.lattice, dual.state.theta
     rows = starts(lattice.alpha_count)
     row = np.repeat(lattice.start[:-1], lattice.alpha_count)

@@ -38,11 +38,7 @@ from .state import Indices, State
 
 _ALONE: Final = 30_000  # labels up to which sharing a pass takes longer than it saves
 _ROUNDING: Final = 32 * 2.0**-53
-"""Relative error of one term of a bound.
-
-It is the sum of at most eight numbers. An angle among them is right to four units in the last place, and a
-square doubles that.
-"""
+"""Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 
 
 class Momentum:
@@ -94,10 +90,7 @@ class Dual:
         return self._pass(2, over)
 
     def ascend(self, times: int, over: Over = never) -> float:
-        """The bound after that many passes forwards and backwards, or fewer when the time is over.
-
-        It is -inf if a pass was cut off. The shares prove a bound all the same.
-        """
+        """The bound after that many passes forwards and backwards; -inf if time cut a pass off."""
         bound = -math.inf
         for _ in range(times):
             self._momentum.carry_on()
@@ -128,11 +121,7 @@ class Dual:
         return self.seconds * lattice.work / max(self.lattice.work, 1.0)
 
     def quantise(self) -> float:
-        """Round the shares to whole multiples of a quantum, 0 at labels not allowed; return the quantum.
-
-        It is the least power of two with less than 2^31 multiples, which certificates can hold; in the
-        1-norm, where bounds become exact, 2^49.
-        """
+        """Round the shares to whole multiples of a power of two, and return it; see `LevelRecord`."""
         both = (self.state.shares_first, self.state.shares_second)
         most = max(*(_most(shares) for shares in both), 2.0**-16)
         quantum = 2.0 ** (math.ceil(math.log2(most)) - (30 if self.lattice.norm == 2 else 48))
@@ -142,12 +131,7 @@ class Dual:
         return quantum
 
     def bound(self) -> float:
-        """The bound that any shares prove.
-
-        It is the sum of min (D + shares) over pixels + the sum of min (c - shares) over pairs, minus its
-        rounding error. Every minimum is right to 32 units in the last place of the largest number in it, and
-        the sum of the minima (math.fsum) is exact.
-        """
+        """The bound that any shares prove, as `LevelRecord` defines it."""
         pixels = self._minima(_pixel_minima, self.lattice.instance.grid.size)
         pairs = self._minima(_pair_minima, len(self.state.first))
         error = _ROUNDING * (len(pixels) + len(pairs)) * self._largest()

@@ -52,10 +52,7 @@ class Residuals:
         )
 
     def bound(self, multipliers: Floats, lower: Floats, upper: Floats) -> float:
-        """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers.
-
-        They are clipped to [-1, 1], and rounding errors are deducted.
-        """
+        """A lower bound of the energy with lower <= x <= upper, shapes (2n,), from any multipliers."""
         force = self.weight * np.clip(multipliers, -1.0, 1.0)
         slope = self.matrix.T @ force
         terms = np.concatenate([force * self.constant, np.minimum(slope * lower, slope * upper)])
@@ -77,10 +74,7 @@ class LinearFit:
 
     @classmethod
     def of(cls, instance: Instance, p: Ints, lower: Floats, upper: Floats) -> LinearFit:
-        """The fit at jumps p with lower <= x <= upper, shapes (2n,), by HiGHS.
-
-        Raises CrossfieldError when HiGHS ends without a solution, which a linear program of this kind has.
-        """
+        """The fit at jumps p with lower <= x <= upper, shapes (2n,), by HiGHS. Raises CrossfieldError."""
         from scipy.optimize import linprog
 
         terms = Residuals.at(instance, p)
@@ -90,9 +84,7 @@ class LinearFit:
             np.concatenate([np.zeros(len(lower)), terms.weight, terms.weight]),
             A_eq=sparse.hstack([terms.matrix, -both, both], format="csc"),
             b_eq=-terms.constant,
-            bounds=np.stack(
-                [np.append(lower, np.zeros(2 * rows)), np.append(upper, np.full(2 * rows, np.inf))], axis=1
-            ),
+            bounds=np.stack([np.pad(lower, (0, 2 * rows)), np.append(upper, [np.inf] * (2 * rows))], axis=1),
             method="highs",
         )
         if found.x is None:
@@ -105,11 +97,7 @@ class LinearFit:
 
 @one_thread()
 def fitted_1norm(field: CrossField) -> tuple[CrossField, Floats]:
-    """The field of least 1-norm energy with the jumps of `field` within its windows.
-
-    Also returns the multipliers of its first strokes, shape (s,) in [-1, 1]: the force that keeps each
-    stroke, relative to its weight.
-    """
+    """The field of least 1-norm energy with the jumps of `field`, and its strokes' multipliers, (s,)."""
     instance, m = field.instance, len(field.p)
     fit = LinearFit.of(instance, field.p, *bounds(instance))
     alpha, beta = np.split(fit.x, 2)

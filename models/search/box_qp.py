@@ -29,12 +29,9 @@ _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
 def fitted(field: CrossField, over: Over = never) -> CrossField:
-    """The field of least 2-norm energy with the jumps of `field`, alpha in its windows and |beta| <= pi/4.
+    """The field of least 2-norm energy with the jumps of `field` in its bounds: the optimum of `qp-fixed`.
 
-    This is the optimum of `qp-fixed`, the second stage of section 5 of the paper. Where the energy does not
-    determine angles (parts without strokes), they stay near the given ones. The gradient's entries that no
-    bound balances are below 1e-12 (1 + max |b|), see models/search/energy.py for b. If time is over before,
-    the best angles so far are returned.
+    Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
     energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
     alpha, beta = np.split(least_in_box(energy, x, *bounds(field.instance), over=over), 2)

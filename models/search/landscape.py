@@ -132,13 +132,9 @@ class PatchEnergy:
 class Landscape:
     """The least energy over a patch's angles at jumps that change step by step; angles outside stay.
 
-    energy: of the whole field, by its definition, plus the penalties that keep bounds and make H definite. A
-    stiff penalty on angles that would pass their bounds keeps them, so the energy is exact to about 1e-4
-    where bounds matter. Without bounds (`gains` does not look ahead to bounds that a change would meet) walks
-    lead to points that look low and are not, so bounds are kept at every step.
-
-    Raises LinAlgError, at the start and in a change, when the jumps lead to a system that double precision
-    cannot solve.
+    energy: of the whole field, by its definition, plus penalties. A stiff penalty keeps angles within their
+    bounds at every step, to about 1e-4; without it walks lead to points that look low and are not. Raises
+    LinAlgError when the jumps lead to a system that double precision cannot solve.
     """
 
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
@@ -181,10 +177,7 @@ class Landscape:
         self.energy, self._held, self._fresh = state.energy, dict(state.held), False
 
     def gains(self) -> Floats:
-        """Change of the energy when each jump changes by +1 and by -1; shape (2, e), rows as in STEPS.
-
-        Infinite where rounding hides the gain even from a fresh inverse.
-        """
+        """Change of the energy for each change of one jump, (2, e), rows as in STEPS; inf where unknown."""
         gains = self._gains()
         if np.isinf(gains).any() and not self._fresh:
             self._solve()

@@ -89,19 +89,9 @@ def search_patches(
     stop: Over = never,
     suggest: Suggest = lambda field, *_: field,
 ) -> Search:
-    """Search patch by patch, from the best of several fields and of what `suggest` makes of it.
+    """Search patch by patch, from the best start or from what `suggest` returns for it.
 
-    `crossfield.search` documents the parameters. The field is no higher than the first field
-    (models/search/starts.py), unless time cuts that off. Nor is it higher than what `suggest` makes of the
-    best of the starts, here and on grids of lower resolution.
-
-    Raises
-    ------
-    InputError
-        For a negative number of rounds, and for too few or too many jobs.
-    InstanceError
-        For a start on another instance.
-
+    `crossfield.search` documents the other parameters, and the errors.
     """
     if (rounds is not None and rounds < 0) or jobs < 1:
         raise InputError("a search needs a positive number of rounds and of jobs")

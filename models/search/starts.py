@@ -39,11 +39,10 @@ _FAINT: Final = 1e-2  # of the polynomials of an approximate field, whose values
 
 @one_thread()
 def first_field(instance: Instance, over: Over = never) -> CrossField:
-    """A field of low 2-norm energy within the time, to start searches and to give `qp-fixed` its jumps.
+    """A field of low 2-norm energy within the time.
 
     Up to 1024 pixels it is the improved greedy field. On larger grids it fuses fast approximate fields of up
     to ten strategies, fewer on larger grids, and a field grown from the grid of half the resolution.
-    Deterministic if time does not cut it off.
     """
     if instance.grid.size <= _SMALL:
         return improved_field(greedy_field(instance, stop=over), stop=over)
@@ -63,11 +62,7 @@ def best_start(
 
 @one_thread()
 def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
-    """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles.
-
-    The hold with the best jumps depends on how much strokes contradict each other, and a fit costs little.
-    When time is over, the best of the fields so far is returned.
-    """
+    """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles."""
     best = fitted(polyvector_field(instance, hold=HOLDS[0]), over)
     for hold in HOLDS[1:]:
         if over():

@@ -38,20 +38,15 @@ _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-cl
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A patch to explore from a field.
-
-    x: angles (alpha, beta) of the whole field, shape (2n,); p: jumps, shape (m,); free: pixels of the patch,
-    shape (n,); curve: number of the curve of each pixel, -1 without a stroke, shape (n,); perturbations:
-    how many to try; seed: of their choice; deadline: when to end.
-    """
+    """A patch to explore from a field."""
 
     instance: Instance
-    x: Floats
+    x: Floats  # angles (alpha, beta) of the whole field, (2n,)
     p: Ints
-    free: Bools
-    curve: Ints
-    perturbations: int
-    seed: tuple[int, ...]
+    free: Bools  # pixels of the patch
+    curve: Ints  # number of the curve of each pixel, -1 without a stroke
+    perturbations: int  # how many to try
+    seed: tuple[int, ...]  # of their choice
     deadline: Deadline
 
 
@@ -66,11 +61,7 @@ class Explored(NamedTuple):
 
 
 def explore(task: Task) -> Explored:
-    """Explore a patch; energies follow their definition, within all bounds of the angles.
-
-    The same task gives the same field unless its deadline cuts it off. It runs on one thread, because sums
-    over several threads end in other digits.
-    """
+    """Explore a patch on one thread: the same task gives the same point unless its deadline cuts it off."""
     with one_thread(), suppress(np.linalg.LinAlgError):
         return _explore(task, task.deadline.passed)
     return Explored(None, whole=True)
@@ -101,14 +92,11 @@ def _explore(task: Task, over: Over) -> Explored:
 def _perturbed(
     land: Landscape, perturbation: Change, rng: np.random.Generator, goal: float, over: Over
 ) -> Landscape | None:
-    """The landscape at the lowest point below `goal` of the walk after a perturbation, computed anew.
-
-    Rounding of many updates must not accumulate. None when there is no such point, or none that can be
-    computed.
-    """
+    """The landscape at the lowest point below `goal` of the walk after a perturbation; None without one."""
     with suppress(np.linalg.LinAlgError):
         land.change(*perturbation)
         jumps = _walk(land, rng, goal, over)
+        # Computed anew, because rounding of many updates must not accumulate.
         return None if jumps is None else Landscape(land.patch, land.angles, jumps)
     return None
 

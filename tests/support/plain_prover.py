@@ -129,7 +129,6 @@ class Table:
             "shares_first": np.concatenate([*first, []]),
             "shares_second": np.concatenate([*second, []]),
         }
-        shares = {"shares_first": first, "shares_second": second}
         return LevelRecord.on(lattice, **shares, quantum=QUANTUM, bound=bound, energy=energy)
 
 
