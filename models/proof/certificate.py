@@ -41,7 +41,7 @@ from ..storage import read_bytes, write_bytes
 from . import check_certificate
 from .check_certificate import Verdict
 from .lattice import Lattice
-from .record import LevelRecord, Proof, Status, relative_gap
+from .record import Claim, LevelRecord, Proof, Status
 
 _PREFIX: Final = "instance_"
 _MOST_16: Final = 2**15 - 1
@@ -53,7 +53,7 @@ _SPARE: Final = 1e-10  # deducted from the checked bound, relative to 1 + it: ot
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Claim):
     """A checked claim: no field has a 2-norm energy below the bound.
 
     Parameters
@@ -71,16 +71,7 @@ class Certificate:
 
     """
 
-    field: CrossField
-    energy: float
-    bound: float
-    status: Status
     verdict: Verdict
-
-    @property
-    def gap(self) -> float:
-        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return relative_gap(self)
 
     @property
     def forced(self) -> int:

@@ -22,7 +22,7 @@ from ..field.jumps import parity_sign
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import HALF, QUARTER
 from ..processes.deadline import Over, never
-from ..search.box_qp import least_in_box
+from ..search.box_qp import field_at, least_in_box
 from ..search.energy import Quadratic, energy_at
 from .pruning import RemainingCells
 from .record import EXACT
@@ -81,11 +81,10 @@ class Piece:
     def least(self, over: Over = never) -> tuple[CrossField, float]:
         """The field that minimises the quadratic on the piece, and a lower bound of the energy there."""
         lattice = self.left.lattice
-        instance, n = lattice.instance, lattice.instance.grid.size
         (lower, upper), quadratic = self.left.bounds, self._quadratic()
         x = least_in_box(quadratic, np.concatenate([lattice.alpha, lattice.beta]), lower, upper, over=over)
         gradient = 2 * quadratic.slope(x)
-        field = CrossField(instance, x[:n], x[n:], lattice.p)
+        field = field_at(lattice.instance, x, lattice.p)
         value = field.energy().total - float(self._given(field).sum())
         value += float(np.minimum(gradient * (lower - x), gradient * (upper - x)).sum())
         return field, value - _ROUNDING * (1 + abs(value))

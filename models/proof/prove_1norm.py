@@ -23,7 +23,8 @@ from ..field.jumps import best_jumps
 from ..instance.grid import Floats
 from ..instance.instance import HALF, QUARTER, Instance
 from ..processes.deadline import Over, never
-from ..search.box_lp import LinearFit, fitted_1norm, settled_1norm
+from ..search.box_lp import fitted_1norm, linear_fit, settled_1norm
+from ..search.box_qp import field_at
 from .forced import Forced, at_pairs
 from .lattice import CommonLattice
 from .pruning import RemainingCells
@@ -36,11 +37,10 @@ class Forced1Norm(Forced):
     def least(self, energy: float, over: Over = never) -> tuple[CrossField, float]:  # noqa: ARG002
         """The field of least energy with u at all strokes, and a lower bound of the energy on the boxes."""
         instance, p = self.left.lattice.instance, self.left.lattice.p
-        fit = LinearFit.of(instance, p, *self.left.bounds)
-        alpha, beta = np.split(fit.x, 2)
+        x, _, bound = linear_fit(instance, p, *self.left.bounds)
         above, below = _beyond(self.left)
         lost = 2 * instance.stroke_coefficient * float(instance.w @ (above + below))
-        return CrossField(instance, alpha, beta, p), fit.bound - lost
+        return field_at(instance, x, p), bound - lost
 
 
 def forced_1norm(left: RemainingCells) -> Forced1Norm:

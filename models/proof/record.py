@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, Self
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 from ..field.field import CrossField, Norm
 from ..instance.grid import Floats
@@ -16,6 +16,21 @@ Status = Literal["optimal", "gap"]
 
 EXACT: Final = 1e-9
 """Gap relative to 1 + energy that rounding leaves when the true gap is zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """A field and a proven lower bound of the energy of all fields."""
+
+    field: CrossField
+    energy: float
+    bound: float
+    status: Status
+
+    @property
+    def gap(self) -> float:
+        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
+        return 0.0 if self.status == "optimal" else (self.energy - self.bound) / max(self.energy, 1e-300)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,7 +64,7 @@ class LevelRecord(Lattice):
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
+class Proof(Claim):
     """The best field that was found, and what is proven of it.
 
     Parameters
@@ -80,34 +95,9 @@ class Proof:
 
     """
 
-    field: CrossField
-    energy: float
-    bound: float
-    status: Status
     forced: int
     levels: tuple[LevelRecord, ...]
     seconds: float
     ended: str
     norm: Norm = 2
     parents: tuple[int, ...] = ()
-
-    @property
-    def gap(self) -> float:
-        """The relative gap, (energy - bound) / energy; 0 where the field is proven optimal."""
-        return relative_gap(self)
-
-
-class _Bounded(Protocol):
-    """Common attributes of a proof and a certificate."""
-
-    @property
-    def status(self) -> Status: ...
-    @property
-    def energy(self) -> float: ...
-    @property
-    def bound(self) -> float: ...
-
-
-def relative_gap(claim: _Bounded) -> float:
-    """The gap relative to the energy, (energy - bound) / energy; 0 where the field is proven optimal."""
-    return 0.0 if claim.status == "optimal" else (claim.energy - claim.bound) / max(claim.energy, 1e-300)

@@ -41,32 +41,6 @@ _ROUNDING: Final = 32 * 2.0**-53
 """Relative error of a term: eight numbers, with angles right to four units in the last place, squared."""
 
 
-class Momentum:
-    """Extrapolates arrays along their last change, further the longer a bound has not fallen."""
-
-    def __init__(self, shares: tuple[Floats, ...], crew: Crew) -> None:
-        self._shares, self._crew = shares, crew
-        self._before: list[NDArray[np.float32]] = []  # the direction alone needs no more digits
-        self._times, self._bound = 0, -math.inf
-
-    def carry_on(self) -> None:
-        """Extrapolate the arrays; the first time there is no known change yet."""
-        part = self._times / (self._times + 3)
-        self._times += 1
-        if not self._before:
-            self._before = [shares.astype(np.float32) for shares in self._shares]
-            return
-        for shares, before in zip(self._shares, self._before, strict=True):
-            parts = [(shares[at], before[at]) for at in self._crew.equal_parts(len(shares))]
-            self._crew.run(lambda each: _carry_on(*each, part), parts)
-
-    def judge(self, bound: float) -> None:
-        """Restart if the bound has fallen."""
-        if bound < self._bound:
-            self._times = 0
-        self._bound = bound
-
-
 class Dual:
     """A dual solution on a lattice: the shares of all pairs, and the bound of the last pass."""
 
@@ -78,7 +52,8 @@ class Dual:
         self.state = _state(lattice, first, second)
         self._fronts = fronts(lattice.instance.grid)
         self._parts = [crew.parts(lattice.count[front]) for front in self._fronts]
-        self._momentum = Momentum((self.state.shares_first, self.state.shares_second), crew)
+        self._before: list[NDArray[np.float32]] = []  # the direction of a change needs no more digits
+        self._times, self._reached = 0, -math.inf
         self.seconds = 0.0  # of the last pass that was not cut off
 
     def forward(self, over: Over = never) -> float:
@@ -93,13 +68,27 @@ class Dual:
         """The bound after that many passes forwards and backwards; -inf if time cut a pass off."""
         bound = -math.inf
         for _ in range(times):
-            self._momentum.carry_on()
+            self._extrapolate()
             self.forward(over)
             bound = self.backward(over)
-            self._momentum.judge(bound)
+            if bound < self._reached:
+                self._times = 0
+            self._reached = bound
             if over():
                 break
         return bound
+
+    def _extrapolate(self) -> None:
+        """Move the shares along their last change, further the longer the bound has not fallen."""
+        part = self._times / (self._times + 3)
+        self._times += 1
+        both = (self.state.shares_first, self.state.shares_second)
+        if not self._before:
+            self._before = [shares.astype(np.float32) for shares in both]
+            return
+        for shares, before in zip(both, self._before, strict=True):
+            parts = [(shares[at], before[at]) for at in self.crew.equal_parts(len(shares))]
+            self.crew.run(lambda each: _carry_on(*each, part), parts)
 
     def _pass(self, earlier: int, over: Over) -> float:
         def work(pixels: Indices) -> None:

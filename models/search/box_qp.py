@@ -17,7 +17,7 @@ from ..field.field import CrossField, relabelled
 from ..instance.grid import Floats, Ints
 from ..instance.instance import QUARTER, Instance
 from ..processes.deadline import Over, never
-from ..smooth.systems import one_thread
+from ..smooth.systems import PULL, one_thread
 from .energy import LinearSolver, Quadratic, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
@@ -34,8 +34,14 @@ def fitted(field: CrossField, over: Over = never) -> CrossField:
     Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
     energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
-    alpha, beta = np.split(least_in_box(energy, x, *bounds(field.instance), over=over), 2)
-    return CrossField(field.instance, alpha, beta, field.p)
+    x = least_in_box(energy, x, *bounds(field.instance), over=over)
+    return field_at(field.instance, x, field.p)
+
+
+def field_at(instance: Instance, x: Floats, p: Ints) -> CrossField:
+    """The field with the angles x = (alpha, beta), shape (2n,), and jumps p."""
+    alpha, beta = np.split(x, 2)
+    return CrossField(instance, alpha, beta, p)
 
 
 def bounds(instance: Instance) -> tuple[Floats, Floats]:
@@ -73,7 +79,7 @@ def least_in_box(
     """
     solver = LinearSolver() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.vector).max())
-    stiffness = energy.stiffness
+    stiffness = energy.matrix.diagonal() + PULL
     x = np.clip(x, lower, upper)
     for _ in range(_MOST_STEPS):
         if over():

@@ -16,7 +16,7 @@ import numpy as np
 from ..field.field import CrossField
 from ..instance.grid import Floats
 from ..smooth.systems import one_thread
-from .box_qp import bounds, fitted
+from .box_qp import bounds, field_at, fitted
 from .energy import LinearSolver, Quadratic, energy_at
 from .nearest_stroke import nearest_strokes
 
@@ -62,8 +62,7 @@ def pinned(field: CrossField) -> CrossField:
             break
     x = np.round(x + rest, _DECIMALS) + 0.0  # no -0.0
     x = np.where(x - lower < _AT_BOUND, lower, np.where(upper - x < _AT_BOUND, upper, x))
-    alpha, beta = np.split(x, 2)
-    return CrossField(instance, alpha, beta, field.p)
+    return field_at(instance, x, field.p)
 
 
 def _slope(energy: Quadratic, x: Floats, rest: Floats) -> Floats:

@@ -14,11 +14,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..field.field import CrossField
 from ..instance.grid import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..processes.deadline import Deadline, Over
 from ..smooth.systems import one_thread
+from .box_qp import field_at
 from .landscape import STEPS, Landscape, Patch, Point
 
 Change = tuple[Ints, Ints]
@@ -72,8 +72,7 @@ def _explore(task: Task, over: Over) -> Explored:
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
     home, perturbations = land.saved(), Perturbations(patch, task.curve)
-    alpha, beta = np.split(task.x, 2)
-    given = CrossField(task.instance, alpha, beta, task.p).energy().total
+    given = field_at(task.instance, task.x, task.p).energy().total
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(given, land.point.energy)
     best: Point | None = None
