@@ -27,7 +27,7 @@ from ..smooth.systems import one_thread
 from .box_qp import FreeField, free_bounds
 from .coarse import halved, prolonged
 from .energy import LinearSolver
-from .improvement import improved_field, settle, stroke_curves
+from .improvement import improved_field, pixel_curves, settle
 from .landscape import Point
 from .nearest_stroke import nearest_strokes
 from .starts import best_start, polyvector_start, rounded_energy
@@ -191,8 +191,7 @@ class _Hunt:
         self._unsettled = False
         # Parts without a stroke are constant and cost nothing.
         self._reached = nearest_strokes(instance) >= 0
-        self._curve = np.full(instance.grid.size, -1)
-        self._curve[instance.stroke_index] = stroke_curves(instance)
+        self._curve = pixel_curves(instance)
 
     def best(self, over: Over) -> CrossField:
         """The field of least energy so far."""
